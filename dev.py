@@ -1,0 +1,367 @@
+#!/usr/bin/env python3
+"""The one entry for everything that needs an environment: try it, test it, serve it, pin it.
+
+    python3 dev.py demo            start the service, ask it one real question, stop it
+    python3 dev.py test [ARGS]     every check, then pytest (ARGS go to pytest)
+    python3 dev.py check           the checks without pytest
+    python3 dev.py serve [ARGS]    run the service until it is told to stop
+    python3 dev.py exec CMD [ARGS] run one command inside the development environment
+    python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
+
+Needs Python 3.11 or newer and nothing else.  The rest is installed into ``.venv`` beside this file, with
+versions and hashes from ``requirements/``; nothing outside of ``.venv`` is touched.  An environment is
+used again as long as the lock file it was made from is unchanged.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import http.client
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+ROOT = Path(__file__).resolve().parent
+VENV = ROOT / ".venv"
+BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
+PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
+MARKER = VENV / "mumacro-installed.json"
+
+OLDEST = (3, 11)
+NEWER_NAMES = ("python3.13", "python3.12", "python3.11")
+
+SETS = ("service", "dev")  # "dev" holds all of "service" at the same versions, so it can stand in for it
+UV = "uv==0.13.8"  # pins the resolver too: two people who lock on one day get one file
+
+CASE = {"mu0": "0.3", "Fz": "10", "k": "1e6", "y0": "2e-6", "omega": "1.3e5", "v0": "0.01"}
+UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
+READY_S = 120.0  # a first start compiles the kernels; on a slow machine that alone takes half a minute
+STOP_S = 20.0
+
+
+class FailedError(Exception):
+    """What to tell the person who ran this; the message stands alone."""
+
+
+# --- environment --------------------------------------------------------------------------------------
+
+
+def run(*command: str | Path, env: dict[str, str] | None = None, quiet: bool = False) -> int:
+    """Run one command from the root of the project and return its exit code.
+
+    With `quiet`, its output is held back and shown only when it fails.
+    """
+    words = [str(word) for word in command]
+    out = subprocess.PIPE if quiet else None
+    done = subprocess.run(  # noqa: S603 - every command is written in this file or typed by its user
+        words, cwd=ROOT, env=env, stdout=out, stderr=subprocess.STDOUT if quiet else None, text=True, check=False
+    )
+    if quiet and done.returncode:
+        print(done.stdout, file=sys.stderr, flush=True)
+    return done.returncode
+
+
+def environment() -> dict[str, str]:
+    """The caller's variables with ``.venv`` in front; what would leak other packages in is left out."""
+    env = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
+    env["VIRTUAL_ENV"] = str(VENV)
+    env["PATH"] = f"{BIN}{os.pathsep}{env.get('PATH', os.defpath)}"
+    return env
+
+
+def lock_path(name: str) -> Path:
+    return ROOT / "requirements" / f"{name}.txt"
+
+
+def digest(name: str) -> str:
+    return hashlib.sha256(lock_path(name).read_bytes()).hexdigest()
+
+
+def installed() -> dict[str, str]:
+    """Lock digests of what ``.venv`` holds; empty when it is absent, broken or half made."""
+    try:
+        marker = json.loads(MARKER.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    works = PYTHON.exists() and run(PYTHON, "-c", "", quiet=True) == 0
+    return marker if works and isinstance(marker, dict) else {}
+
+
+def ensure(name: str) -> None:
+    """Make ``.venv`` hold the locked set `name`, at the least cost that is still exact."""
+    have = installed()
+    wanted = SETS[SETS.index(name) :]
+    if any(have.get(one) == digest(one) for one in wanted):
+        return
+    env = environment()
+    if not have or any(have[one] != digest(one) for one in have if one in SETS):
+        print(f"Making {VENV} with Python {sys.version.split()[0]}", flush=True)
+        if run(sys.executable, "-m", "venv", "--clear", VENV, quiet=True):
+            raise FailedError(
+                "Python could not make a virtual environment (see above).\n"
+                "Debian and Ubuntu keep that in a package of its own: apt-get install python3-venv"
+            )
+        have = {}
+    MARKER.unlink(missing_ok=True)
+    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install")
+    started = time.monotonic()
+    print(f"Installing {lock_path(name).relative_to(ROOT)} (a minute or two)", flush=True)
+    if run(*pip, "--require-hashes", "-r", lock_path(name), env=env, quiet=True):
+        raise FailedError(f"pip could not install {lock_path(name)} (see above)")
+    if name == "dev" and run(*pip, "--no-deps", "--no-build-isolation", "-e", ".", env=env, quiet=True):
+        raise FailedError("pip could not install the project itself in place (see above)")
+    MARKER.write_text(json.dumps({**have, name: digest(name)}), encoding="utf-8")
+    print(f"Installed in {time.monotonic() - started:.0f} s", flush=True)
+
+
+# --- demo and serve -----------------------------------------------------------------------------------
+
+
+def ask(port: int, path: str) -> tuple[int, str]:
+    """GET `path` from the local service; http.client because it never goes through a proxy."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    try:
+        connection.request("GET", path, headers={"Accept": "application/json"})
+        reply = connection.getresponse()
+        return reply.status, reply.read().decode("utf-8", "replace")
+    finally:
+        connection.close()
+
+
+def wait_until_ready(server: subprocess.Popen[bytes], port: int) -> float:
+    """Poll /readyz; return the seconds it took."""
+    started = time.monotonic()
+    last = "no connection yet"
+    while time.monotonic() - started < READY_S:
+        if server.poll() is not None:
+            raise FailedError(f"The service ended by itself with exit code {server.returncode}")
+        try:
+            status, body = ask(port, "/readyz")
+        except (OSError, http.client.HTTPException) as error:
+            last = str(error)
+        else:
+            if status == 200:
+                return time.monotonic() - started
+            last = f"{status} {body}"
+        time.sleep(0.1)
+    raise FailedError(f"The service was not ready after {READY_S:.0f} s: {last}")
+
+
+def stop(server: subprocess.Popen[bytes]) -> None:
+    if server.poll() is None:
+        server.terminate()
+        try:
+            server.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            server.kill()
+            server.wait()
+
+
+def demo() -> int:
+    """Start the service on a free loopback port, ask one question over HTTP, stop it."""
+    ensure("service")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = int(probe.getsockname()[1])
+    # The demo shows the defaults, not whatever the caller's shell happens to set.
+    env = {name: value for name, value in environment().items() if not name.startswith("MUMACRO_")}
+    env |= {"MUMACRO_HOST": "127.0.0.1", "MUMACRO_PORT": str(port)}
+    with tempfile.TemporaryFile() as log:
+        server = subprocess.Popen(  # noqa: S603 - our own interpreter and module
+            [str(PYTHON), "-m", "service"], cwd=ROOT, env=env, stdin=subprocess.DEVNULL, stdout=log, stderr=log
+        )
+        try:
+            seconds = wait_until_ready(server, port)
+            print(f"The service is ready on port {port} after {seconds:.1f} s\n")
+            path = f"/v1/mu-macro?{urlencode(CASE)}"
+            print("Question: " + ", ".join(f"{name} = {value} [{UNITS[name]}]" for name, value in CASE.items()))
+            print(f"GET http://127.0.0.1:{port}{path}")
+            status, body = ask(port, path)
+            if status != 200:
+                raise FailedError(f"The service answered {status}: {body}")
+            answer = json.loads(body)
+            print(json.dumps(answer, indent=2))
+            if not 0.0 <= float(answer["mu_macro"]) <= float(CASE["mu0"]):
+                raise FailedError("That answer cannot be right: mu_macro lies between 0 and mu0")
+            print(f"Answer:   mu_macro = {answer['mu_macro']:.12g} [-]\n")
+        except BaseException:
+            log.seek(0)
+            tail = log.read().decode("utf-8", "replace").splitlines()[-30:]
+            print("--- last lines of the service's log", *tail, "---", sep="\n", file=sys.stderr)
+            raise
+        finally:
+            stop(server)
+    start = f"{Path(sys.executable).stem} dev.py serve"
+    print(f"The service is stopped.  To start it for good, on port 8000:  {start}")
+    return 0
+
+
+def serve(arguments: list[str]) -> int:
+    """Run the service in the foreground; it receives the signals itself."""
+    ensure("service")
+    command = [str(PYTHON), "-m", "service", *arguments]
+    os.chdir(ROOT)
+    if os.name != "nt":
+        os.execve(PYTHON, command, environment())  # noqa: S606 - replaces this process on purpose
+    return run(*command, env=environment())
+
+
+# --- checks and tests ---------------------------------------------------------------------------------
+
+
+def stale_locks() -> list[str]:
+    """The lock files that were made from other requirements than pyproject.toml now has."""
+    return [name for name in SETS if f"# inputs: {inputs_digest()}" not in lock_path(name).read_text("utf-8")]
+
+
+def check() -> list[str]:
+    """Run every check but pytest, all of them even when one fails; return the names of those that failed."""
+    if stale := stale_locks():
+        raise FailedError(
+            f"requirements/{' and '.join(stale)}.txt no longer match pyproject.toml: run python3 dev.py lock"
+        )
+    ensure("dev")
+    tables = sorted((ROOT / "tables").glob("*.nc"))
+    scripts = ("dev.py", "deploy/read_only_cache.py")
+    commands: dict[str, tuple[str | Path, ...]] = {
+        "ruff check": ("ruff", "check", "."),
+        "ruff format": ("ruff", "format", "--check", "."),
+        "mypy": ("mypy",),
+        "mypy of the scripts": ("mypy", *scripts),
+        "import-linter": ("lint-imports",),
+        "CF conventions": ("compliance-checker", "--test=cf:1.11", *tables),
+    }
+    failed = []
+    for title, (tool, *arguments) in commands.items():
+        print(f"--- {title}", flush=True)
+        if tool == "compliance-checker" and not tables:
+            print("no *.nc in tables/")
+            failed.append(title)
+        elif run(BIN / tool, *arguments, env=environment()):
+            failed.append(title)
+    return failed
+
+
+def test(arguments: list[str]) -> int:
+    """Run the checks, then pytest, which has the last word when all is well."""
+    failed = check()
+    print("--- pytest", flush=True)
+    code = run(PYTHON, "-m", "pytest", *arguments, env=environment())
+    if failed:
+        print(f"FAILED before pytest: {', '.join(failed)}", file=sys.stderr)
+    return code or len(failed)
+
+
+# --- lock ---------------------------------------------------------------------------------------------
+
+
+def project_table() -> dict[str, Any]:
+    import tomllib  # not at the top: an interpreter too old for it must still reach the hint in main()
+
+    return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+
+
+def inputs_digest() -> str:
+    """Stamp of everything in pyproject.toml that the locks depend on; stands in their second line."""
+    table = project_table()
+    project = table["project"]
+    names = ("requires-python", "dependencies", "optional-dependencies")
+    inputs = [table["build-system"]["requires"], *(project[name] for name in names)]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def lock(arguments: list[str]) -> int:
+    """Write requirements/dev.txt, then requirements/service.txt as a part of it.
+
+    ``--universal`` keeps one file right for every platform and every Python from 3.11 on.  No index is
+    named in the result: where packages come from is the installing machine's business.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        venv = Path(folder) / "venv"
+        bin_ = venv / BIN.name
+        if run(sys.executable, "-m", "venv", venv, quiet=True):
+            raise FailedError("Python could not make a virtual environment (see above)")
+        if run(bin_ / PYTHON.name, "-m", "pip", "--disable-pip-version-check", "install", UV, quiet=True):
+            raise FailedError(f"pip could not install {UV} (see above)")
+        for name in reversed(SETS):
+            # With the build backend among the pins, installing the project in place downloads nothing unpinned.
+            backend = Path(folder) / "backend.in"
+            backend.write_text("\n".join(project_table()["build-system"]["requires"]), encoding="utf-8")
+            out = Path(folder) / f"{name}.txt"
+            if lock_path(name).exists():
+                shutil.copyfile(lock_path(name), out)  # uv keeps the pins it finds there
+            scope: list[str | Path] = ["pyproject.toml"]
+            scope += [backend] if name == "dev" else ["--constraint", lock_path("dev")]
+            command: list[str | Path] = [
+                *(bin_ / "uv", "pip", "compile", "--universal", "--python-version", ".".join(map(str, OLDEST))),
+                *("--generate-hashes", "--no-annotate", "--no-header", "--quiet"),
+                *("--no-emit-index-url", "--no-emit-find-links"),
+                *("--extra", name, "--output-file", out, *arguments, *scope),
+            ]
+            if run(*command):
+                raise FailedError(f"uv could not resolve {name} (see above)")
+            pins = out.read_text("utf-8")
+            if "://" in pins or "file:" in pins or " @ " in pins:
+                raise FailedError(f"the lock for {name} names a place to download from; it must not")
+            header = f"# Pinned by: python3 dev.py lock\n# inputs: {inputs_digest()}\n"
+            body = "".join(line for line in pins.splitlines(keepends=True) if not line.startswith("#"))
+            lock_path(name).parent.mkdir(exist_ok=True)
+            lock_path(name).write_text(header + body, encoding="utf-8", newline="\n")
+            print(f"{lock_path(name).relative_to(ROOT)}: {body.count('==')} pins, {body.count('--hash')} hashes")
+    return 0
+
+
+# --- command line -------------------------------------------------------------------------------------
+
+
+def use_a_newer_python() -> None:
+    """On an interpreter that is too old, go on in a newer one if the machine has it."""
+    for name in NEWER_NAMES:
+        other = shutil.which(name)
+        if other and run(other, "-c", "", quiet=True) == 0:
+            raise SystemExit(run(other, Path(__file__).resolve(), *sys.argv[1:]))
+    version = ".".join(map(str, sys.version_info[:3]))
+    raise FailedError(f"Python 3.11 or newer is needed; this is {version}, and no newer one is on the PATH")
+
+
+def main(arguments: list[str]) -> int:
+    """Do what the first word says; 2 when it says nothing known."""
+    word, rest = (arguments[0], arguments[1:]) if arguments else ("", [])
+    try:
+        if sys.version_info < OLDEST:
+            use_a_newer_python()
+        if word == "demo" and not rest:
+            return demo()
+        if word == "test":
+            return test(rest)
+        if word == "check" and not rest:
+            failed = check()
+            print(f"FAILED: {', '.join(failed)}" if failed else "All checks passed")
+            return len(failed)
+        if word == "serve":
+            return serve(rest)
+        if word == "exec" and rest:
+            ensure("dev")
+            return run(shutil.which(rest[0], path=environment()["PATH"]) or rest[0], *rest[1:], env=environment())
+        if word == "lock":
+            return lock(rest)
+    except FailedError as error:
+        print(f"dev.py {word}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    print(__doc__)
+    return 0 if word in ("-h", "--help", "help") else 2
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
