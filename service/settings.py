@@ -1,0 +1,103 @@
+"""Settings of the service: ``MUMACRO_*`` environment variables, checked before anything starts.
+
+Each setting has a heading of the same name in docs/operations.md.  A bad one is reported in one line that
+names the variable, the value and what it must be; the value of the API key is never shown.
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, SecretStr, ValidationError, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+__all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
+
+PREFIX = "MUMACRO_"
+
+
+class SettingsError(ValueError):
+    """One or more settings cannot be used; the text says which, and what they must be."""
+
+
+def _split_paths(value: object) -> object:
+    """``a:b`` (``a;b`` on Windows) -> (``a``, ``b``); one path or a sequence of paths is taken as it is."""
+    if isinstance(value, str):
+        return tuple(part for part in value.split(os.pathsep) if part)
+    if isinstance(value, Path):
+        return (value,)
+    if isinstance(value, Sequence):
+        return tuple(value)
+    return value
+
+
+def _default_tables() -> tuple[Path, ...]:
+    # An installed package has site-packages as its parent, where PyTables owns a folder of this name:
+    # only a folder that really holds tables counts.
+    beside = Path(__file__).resolve().parent.parent / "tables"
+    return (beside,) if any(beside.glob("*.nc")) else (Path("tables"),)
+
+
+class Settings(BaseSettings):
+    """What an operator can choose.  Each description says what a value must be."""
+
+    model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
+
+    tables: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(_split_paths)] = Field(
+        default_factory=_default_tables,
+        min_length=1,
+        description=f"a table file or a directory of *.nc files, or several joined by {os.pathsep!r}",
+    )
+    host: str = Field("127.0.0.1", min_length=1, description="an address or host name to listen on")
+    port: int = Field(8000, ge=0, le=65535, description="an integer from 0 (any free port) to 65535")
+    workers: int = Field(1, ge=1, le=256, description="an integer from 1 to 256")
+    max_body_bytes: int = Field(16 * 2**20, ge=1024, le=2**31, description="an integer from 1024 to 2147483648")
+    max_batch: int = Field(100_000, ge=1, le=10_000_000, description="an integer from 1 to 10000000")
+    api_key: SecretStr | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
+    log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
+        "info", description="one of debug, info, warning, error, critical"
+    )
+    shutdown_grace_s: int = Field(10, ge=0, le=3600, description="an integer from 0 to 3600")
+
+    @field_validator("log_level", mode="before")
+    @classmethod
+    def _lower(cls, value: object) -> object:
+        return value.lower() if isinstance(value, str) else value
+
+    @field_validator("api_key")
+    @classmethod
+    def _usable_key(cls, key: SecretStr | None) -> SecretStr | None:
+        # An empty variable must not pass for "no key": whoever set it meant the service to be closed.
+        if key is not None:
+            text = key.get_secret_value()
+            if not (1 <= len(text) <= 512 and all("!" <= character <= "~" for character in text)):
+                raise ValueError("unusable key")
+        return key
+
+
+def load_settings(**chosen: Any) -> Settings:
+    """Read the settings from the environment; ``chosen`` wins over it.
+
+    Raises
+    ------
+    SettingsError
+        Names every bad variable, its value and its bound, in one line.
+    """
+    try:
+        return Settings(**chosen)
+    except ValidationError as error:
+        lines: dict[str, str] = {}
+        for problem in error.errors(include_url=False):
+            name = str(problem["loc"][0]).lower() if problem["loc"] else "settings"
+            field = Settings.model_fields.get(name)
+            bound = field.description if field is not None else "a known setting"
+            given = "(hidden)" if name == "api_key" else repr(problem["input"])[:200]
+            lines.setdefault(name, f"{PREFIX}{name.upper()} must be {bound}, got {given}")
+        raise SettingsError("; ".join(lines.values())) from None
+
+
+def unknown_variables() -> list[str]:
+    """Variables that look like ours and are not: most often a spelling mistake, so worth a warning."""
+    known = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
+    return sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
