@@ -1,0 +1,179 @@
+"""The loaded tables: opened, checksummed, warmed up and asked one known answer, once, before any request."""
+
+import logging
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from starlette.requests import Request
+
+from friction import Surrogate, TableError
+from service.errors import FieldFault, InvalidFieldsError, NotReadyError
+
+__all__ = ["LoadedTable", "Shelf", "shelf_of", "table_files"]
+
+_log = logging.getLogger("mumacro.tables")
+
+
+def table_files(paths: Sequence[Path]) -> list[Path]:
+    """Files among ``paths``, and the ``*.nc`` files of the directories among them, in order of name.
+
+    Raises
+    ------
+    TableError
+        A path is missing, or a directory holds no table.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found = sorted(file for file in path.glob("*.nc") if not file.name.startswith("."))
+            if not found:
+                raise TableError(path, "the directory holds no *.nc file")
+            files.extend(found)
+        elif path.exists():
+            files.append(path)
+        else:
+            raise TableError(path, "missing")
+    return files
+
+
+def _stamp(path: Path) -> tuple[int, int, int]:
+    status = os.stat(path)
+    return status.st_size, status.st_mtime_ns, status.st_ino
+
+
+@dataclass(frozen=True)
+class LoadedTable:
+    """A table in memory, and what its file looked like when it was read."""
+
+    surrogate: Surrogate
+    stamp: tuple[int, int, int]
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """Read, check and warm up one table.
+
+        Raises
+        ------
+        TableError
+            The file is missing or damaged, or its known answer is wrong.
+        """
+        try:
+            stamp = _stamp(path)
+        except OSError as error:
+            raise TableError(path, error.strerror or "unreadable") from error
+        surrogate = Surrogate.open(path)
+        surrogate.warm_up()
+        surrogate.self_check()
+        return cls(surrogate, stamp)
+
+    @property
+    def label(self) -> dict[str, object]:
+        """What every reply says about the table that it came from."""
+        return {"id": self.surrogate.id, "tolerance": self.surrogate.tolerance}
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of the file when it was read."""
+        return self.stamp[0]
+
+    def check(self) -> None:
+        """Ask the known answer again, and look whether the file is still the one that was read.
+
+        Raises
+        ------
+        TableError
+            Otherwise.  A file that was replaced would no longer be the source of the answers.
+        """
+        self.surrogate.self_check()
+        path = self.surrogate.path
+        try:
+            same = _stamp(path) == self.stamp
+        except OSError as error:
+            raise TableError(path, "the file is gone") from error
+        if not same:
+            raise TableError(path, "the file was changed after it was loaded; restart the service")
+
+
+class Shelf:
+    """All tables of the service, tightest first; or the reason why there are none."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = tuple(paths)
+        self.tables: tuple[LoadedTable, ...] = ()
+        self.fault: str | None = "the tables are not loaded yet"
+
+    def load(self) -> None:
+        """Load everything.  A table that is refused makes the service not ready; it never stops the process."""
+        try:
+            tables = [LoadedTable.open(path) for path in table_files(self.paths)]
+            names = [table.surrogate.id for table in tables]
+            for table in tables:
+                if names.count(table.surrogate.id) > 1:
+                    raise TableError(table.surrogate.path, "another table has the same name")
+        except TableError as error:
+            self.fault = f"table {error.path.name}: {error.reason}"
+            _log.error("no tables: %s", error)
+        except Exception:
+            self.fault = "the tables could not be loaded; the log has the reason"
+            _log.exception("no tables")
+        else:
+            self.tables = tuple(sorted(tables, key=lambda table: (table.surrogate.tolerance, table.surrogate.id)))
+            self.fault = None
+            _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in self.tables]}})
+
+    def check(self) -> None:
+        """Raise NotReadyError unless every table would answer rightly now."""
+        self._loaded()
+        try:
+            for table in self.tables:
+                table.check()
+        except TableError as error:
+            raise NotReadyError(f"table {error.path.name}: {error.reason}") from error
+
+    def pick(self, tolerance: float | None = None, place: str = "pointer") -> LoadedTable:
+        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-]).
+
+        Raises
+        ------
+        NotReadyError, InvalidFieldsError
+            No table is loaded; none is tight enough.
+        """
+        tables = self._loaded()
+        if tolerance is None:
+            return tables[0]
+        fit = [table for table in tables if table.surrogate.tolerance <= tolerance]
+        if not fit:
+            tightest = tables[0].surrogate.tolerance
+            reason = f"no loaded table is that tight; the tightest has {tightest:g}"
+            fault = FieldFault("tolerance", reason, tolerance, f">= {tightest:g}", place)
+            raise InvalidFieldsError(f"tolerance: {reason}", [fault], tightest_available=tightest)
+        return min(fit, key=lambda table: (table.size_bytes, -table.surrogate.tolerance))
+
+    def named(self, identity: str) -> LoadedTable:
+        """The table of that name.
+
+        Raises
+        ------
+        NotReadyError, InvalidFieldsError
+            No table is loaded; none has that name.
+        """
+        tables = self._loaded()
+        for table in tables:
+            if table.surrogate.id == identity:
+                return table
+        reason = "must be one of " + ", ".join(table.surrogate.id for table in tables)
+        raise InvalidFieldsError(f"id: {reason}", [FieldFault("id", reason, identity, place="parameter")])
+
+    def _loaded(self) -> tuple[LoadedTable, ...]:
+        if self.fault is not None:
+            raise NotReadyError(self.fault)
+        return self.tables
+
+
+def shelf_of(request: Request) -> Shelf:
+    """The shelf of the application that the request came to."""
+    shelf: Shelf = request.app.state.shelf
+    return shelf
