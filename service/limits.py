@@ -1,0 +1,68 @@
+"""What ``include`` adds to an answer: dimensionless groups, and the marks on the friction law.
+
+Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse
+oscillations" (Friction, 2018).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from friction import Answer, Surrogate
+
+__all__ = ["groups", "limits"]
+
+Values = Mapping[str, Any]
+
+
+def groups(answer: Answer) -> dict[str, Any]:
+    """v~ = v0/(l0 omega) [-], y~ = y0/l0 [-] and l0 = mu0 Fz/k [m], as the answer has them."""
+    return {"v_tilde": answer.v_tilde, "y_tilde": answer.y_tilde, "l0": answer.length_scale}
+
+
+def limits(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, NDArray[np.float64]]:
+    """Static limit (38), border velocity, and the coefficient at the border.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        Source of v~crit(y~) and of mu_macro/mu0 there.
+    case : mapping
+        The inputs, SI, scalars or arrays of one shape; ``k`` is None for rigid contact.
+    answer : Answer
+        The answer to the same case.
+
+    Returns
+    -------
+    dict
+        ``mu_static`` [-], ``v0_crit`` [m/s], ``mu_crit`` [-].  NaN where a number is beyond double range.
+
+    Notes
+    -----
+    Without oscillation (y0 = 0 or omega = 0) both coefficients are mu0 and the border lies at v0 = 0.
+    Rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0, with mu_crit -> 0.
+    """
+    mu0 = np.asarray(case["mu0"], dtype=np.float64)
+    omega = np.asarray(case["omega"], dtype=np.float64)
+    at_rest = (np.asarray(case["y0"]) == 0.0) | (omega == 0.0)
+    if case["k"] is None:
+        mu = np.where(at_rest, mu0, 0.0)
+        return {"mu_static": mu, "v0_crit": np.zeros_like(mu), "mu_crit": mu.copy()}
+
+    y_tilde = np.asarray(answer.y_tilde, dtype=np.float64)
+    usable = np.isfinite(y_tilde) & ~at_rest
+    y = np.where(usable, y_tilde, 1.0)  # placeholders: their results are replaced below
+    v = np.asarray(surrogate.v_tilde_crit(y), dtype=np.float64)
+    ratio = np.asarray(surrogate.mu_ratio(v, y), dtype=np.float64)
+    below = np.minimum(y_tilde, 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        # (1 - y)(1 + y) keeps the digits that 1 - y^2 loses near y~ = 1.
+        mu_static = mu0 * np.sqrt((1.0 - below) * (1.0 + below))
+        v0_crit = np.asarray(answer.length_scale, dtype=np.float64) * v * omega
+    return {
+        "mu_static": np.where(at_rest, mu0, mu_static),
+        "v0_crit": np.where(at_rest, 0.0, np.where(usable, v0_crit, np.nan)),
+        "mu_crit": np.where(at_rest, mu0, np.where(usable, mu0 * ratio, np.nan)),
+    }
