@@ -1,0 +1,103 @@
+"""The application: ``create_app(settings)`` puts settings, tables, middleware, handlers and routes together.
+
+Nothing happens at import.  ``uvicorn --factory service.app:create_app`` works: without an argument the settings
+come from the environment.
+"""
+
+import logging
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import anyio
+import anyio.to_thread
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import Response
+
+from friction.errors import MumacroError
+from service import __version__
+from service.errors import answer_problem
+from service.middleware import ApiKeyGate, BodyLimit, RequestRecord
+from service.openapi import install
+from service.routes import batch, docs, health, mu_macro, table
+from service.settings import Settings, load_settings, unknown_variables
+from service.shelf import Shelf
+
+__all__ = ["create_app"]
+
+_ROUTERS = (mu_macro.router, batch.router, table.router, health.router, docs.router)
+_log = logging.getLogger("mumacro.app")
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    for name in unknown_variables():
+        _log.warning("%s is no setting and has no effect", name)
+    app.state.batch_limiter = anyio.CapacityLimiter(os.cpu_count() or 1)
+    await anyio.to_thread.run_sync(app.state.shelf.load)
+    yield
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """Return the application.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Left out: read from the environment.
+
+    Raises
+    ------
+    SettingsError
+        The environment holds a bad setting.
+    """
+    if settings is None:
+        settings = load_settings()
+    key = None if settings.api_key is None else settings.api_key.get_secret_value()
+    app = FastAPI(
+        title="mumacro",
+        version=__version__,
+        lifespan=_lifespan,
+        docs_url=None,  # FastAPI's own pages load their assets from a CDN; routes/docs.py has ours
+        redoc_url=None,
+        redirect_slashes=False,
+        middleware=[
+            Middleware(RequestRecord),
+            Middleware(ApiKeyGate, key=key),
+            Middleware(BodyLimit, max_bytes=settings.max_body_bytes),
+        ],
+    )
+    app.state.settings = settings
+    app.state.shelf = Shelf(settings.tables)
+    app.add_exception_handler(MumacroError, answer_problem)
+    app.add_exception_handler(HTTPException, _answer_http)
+    for router in _ROUTERS:
+        app.include_router(router)
+    install(app)
+    return app
+
+
+async def _answer_http(request: Request, error: Exception) -> Response:
+    """Answer 404 and 405.  The framework's Allow names the methods of the first route of a path only."""
+    path = request.url.path
+    if isinstance(error, HTTPException) and error.status_code == 405:
+        allowed = _allowed_methods(path)
+        error = HTTPException(
+            405, f"{request.method} is not allowed here; allowed: {allowed}", headers={"Allow": allowed}
+        )
+    elif isinstance(error, HTTPException) and error.status_code == 404:
+        error = HTTPException(404, "There is nothing at this path.")
+    return await answer_problem(request, error)
+
+
+def _allowed_methods(path: str) -> str:
+    methods: set[str] = {"GET", "HEAD"} if path == "/openapi.json" else set()
+    for router in _ROUTERS:
+        for route in router.routes:
+            if isinstance(route, APIRoute) and route.path == path:
+                methods |= route.methods or set()
+    return ", ".join(sorted(methods))

@@ -1,0 +1,106 @@
+"""The description of the interface, from the same models that check requests."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic.json_schema import models_json_schema
+
+from service import __version__
+from service import schemas as models
+
+__all__ = ["case_parameters", "describe_json", "install", "option_parameters", "table_parameters"]
+
+_REF = "#/components/schemas/{model}"
+_DESCRIPTION = (
+    "Macroscopic coefficient of friction of a spring-loaded contact whose base slides at v0 and oscillates "
+    "across the sliding direction. Inputs in SI units; answers come from a table verified against the full model. "
+    "Errors are problem details (RFC 9457)."
+)
+_WHY = {
+    400: "The body is empty or not JSON",
+    401: "An API key is in force, and none or a wrong one was sent",
+    413: "The body or the batch is too large",
+    415: "The body is not application/json",
+    422: "Invalid, missing or unknown fields",
+    503: "Not ready or overloaded; see Retry-After",
+}
+_REQUESTS: tuple[Any, ...] = (models.Case, models.CaseRequest, models.BatchColumns)
+_ANSWERS: tuple[Any, ...] = (
+    models.CaseAnswer,
+    models.ColumnsAnswer,
+    models.RowsAnswer,
+    models.TableAnswer,
+    models.Health,
+    models.Problem,
+)
+_PARAMETER_SCHEMAS = models.CaseRequest.model_json_schema()["properties"]
+_EXAMPLE = models.Case.model_json_schema()["examples"][0]
+
+
+def describe_json(answer: str | Sequence[str], *statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Describe the answer (one model or several) and the problems that an endpoint can give."""
+    names = (answer,) if isinstance(answer, str) else tuple(answer)
+    refs = [{"$ref": _REF.format(model=name)} for name in names]
+    schema = refs[0] if len(refs) == 1 else {"oneOf": refs}
+    problem = {"schema": {"$ref": _REF.format(model="Problem")}}
+    described: dict[int | str, dict[str, Any]] = {
+        200: {"description": "The answer", "content": {"application/json": {"schema": schema}}}
+    }
+    for status in statuses:
+        described[status] = {"description": _WHY[status], "content": {"application/problem+json": problem}}
+    return described
+
+
+def case_parameters() -> list[dict[str, Any]]:
+    """Query parameters of one case, from the model of its JSON form."""
+    return [_parameter(name, name in models.Case.model_fields and name != "k") for name in _PARAMETER_SCHEMAS]
+
+
+def option_parameters() -> list[dict[str, Any]]:
+    """Query parameters of a batch."""
+    return [_parameter(name, False) for name in ("include", "tolerance")]
+
+
+def table_parameters() -> list[dict[str, Any]]:
+    """Query parameters that choose a table."""
+    identity = {
+        "name": "id", "in": "query", "required": False, "schema": {"type": "string"}, "description": "Name of the table"
+    }  # fmt: skip
+    return [identity, _parameter("tolerance", False)]
+
+
+def _parameter(name: str, required: bool) -> dict[str, Any]:
+    # A query has no null: leaving a parameter out says it.
+    schema = dict(_PARAMETER_SCHEMAS[name])
+    description = schema.pop("description", "")
+    for choice in schema.pop("anyOf", ()):
+        if choice.get("type") != "null":
+            schema.update(choice)
+    schema.pop("default", None)
+    schema.pop("title", None)
+    parameter: dict[str, Any] = {
+        "name": name, "in": "query", "required": required, "description": description, "schema": schema
+    }  # fmt: skip
+    if name in _EXAMPLE:
+        parameter["example"] = _EXAMPLE[name]
+    if name == "include":
+        parameter.update(style="form", explode=False)
+    return parameter
+
+
+def install(app: FastAPI) -> None:
+    """Make ``app.openapi()`` return the description with the models of ``service.schemas`` in it."""
+
+    def describe() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            description = get_openapi(title="mumacro", version=__version__, description=_DESCRIPTION, routes=app.routes)
+            wanted = [(model, "validation") for model in _REQUESTS] + [(model, "serialization") for model in _ANSWERS]
+            _, definitions = models_json_schema(wanted, ref_template=_REF)  # type: ignore[arg-type]
+            schemas = description.setdefault("components", {}).setdefault("schemas", {})
+            schemas.update(definitions["$defs"])
+            app.openapi_schema = description
+        return app.openapi_schema
+
+    app.openapi = describe  # type: ignore[method-assign]

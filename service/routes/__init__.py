@@ -1,0 +1,1 @@
+"""Thin endpoints: read the request, ask, write the answer."""

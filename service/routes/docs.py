@@ -1,0 +1,38 @@
+"""``/docs``: the interface's description in a browser, with assets of this package only."""
+
+from pathlib import Path
+
+from fastapi import APIRouter
+from starlette.responses import FileResponse, Response
+
+__all__ = ["ASSETS", "router"]
+
+router = APIRouter(include_in_schema=False)
+
+_FOLDER = Path(__file__).resolve().parent.parent / "static" / "swagger-ui"
+ASSETS = {"swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css", "start.js": "text/javascript"}
+
+# Styles inline: the interface sets some on its elements.  Scripts, and all else, from this host alone.
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+@router.head("/docs")
+@router.get("/docs")
+async def docs() -> Response:
+    """Return the page."""
+    headers = {"Content-Security-Policy": _POLICY, "Referrer-Policy": "no-referrer", "Cache-Control": "no-cache"}
+    return FileResponse(_FOLDER / "index.html", media_type="text/html", headers=headers)
+
+
+def _add_asset(name: str, media_type: str) -> None:
+    async def asset() -> Response:
+        return FileResponse(_FOLDER / name, media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})
+
+    router.add_api_route(f"/static/swagger-ui/{name}", asset, methods=["GET", "HEAD"], name=name)
+
+
+for _name, _media_type in ASSETS.items():
+    _add_asset(_name, _media_type)
