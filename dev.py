@@ -39,7 +39,10 @@ MARKER = VENV / "mumacro-installed.json"
 OLDEST = (3, 11)
 NEWER_NAMES = ("python3.13", "python3.12", "python3.11")
 
-SETS = ("service", "dev")  # "dev" holds all of "service" at the same versions, so it can stand in for it
+# An environment is made from these locks.  dev.txt holds all of the other two at the same versions, so that an
+# environment for "dev" can stand in for one for "service".
+SETS = {"service": ("build", "service"), "dev": ("dev",)}
+LOCKS = ("dev", "service", "build")  # in the order of making: the first constrains the others
 UV = "uv==0.13.8"  # pins the resolver too: two people who lock on one day get one file
 
 CASE = {"mu0": "0.3", "Fz": "10", "k": "1e6", "y0": "2e-6", "omega": "1.3e5", "v0": "0.01"}
@@ -82,12 +85,12 @@ def lock_path(name: str) -> Path:
     return ROOT / "requirements" / f"{name}.txt"
 
 
-def digest(name: str) -> str:
-    return hashlib.sha256(lock_path(name).read_bytes()).hexdigest()
+def digest(set_name: str) -> str:
+    return hashlib.sha256(b"".join(lock_path(name).read_bytes() for name in SETS[set_name])).hexdigest()
 
 
 def installed() -> dict[str, str]:
-    """Lock digests of what ``.venv`` holds; empty when it is absent, broken or half made."""
+    """Digests of the sets that ``.venv`` holds; empty when it is absent, broken or half made."""
     try:
         marker = json.loads(MARKER.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -96,30 +99,32 @@ def installed() -> dict[str, str]:
     return marker if works and isinstance(marker, dict) else {}
 
 
-def ensure(name: str) -> None:
-    """Make ``.venv`` hold the locked set `name`, at the least cost that is still exact."""
+def ensure(set_name: str) -> None:
+    """Make ``.venv`` hold the locked set, at the least cost that is still exact."""
     have = installed()
-    wanted = SETS[SETS.index(name) :]
-    if any(have.get(one) == digest(one) for one in wanted):
+    current = [name for name in SETS if have.get(name) == digest(name)]
+    if set_name in current or "dev" in current:
         return
-    env = environment()
-    if not have or any(have[one] != digest(one) for one in have if one in SETS):
+    if not current:  # absent, or made from locks that have changed since: what they dropped must go too
         print(f"Making {VENV} with Python {sys.version.split()[0]}", flush=True)
         if run(sys.executable, "-m", "venv", "--clear", VENV, quiet=True):
             raise FailedError(
                 "Python could not make a virtual environment (see above).\n"
                 "Debian and Ubuntu keep that in a package of its own: apt-get install python3-venv"
             )
-        have = {}
     MARKER.unlink(missing_ok=True)
-    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install")
+    locks = [lock_path(name) for name in SETS[set_name]]
+    titles = " and ".join(path.relative_to(ROOT).as_posix() for path in locks)
+    print(f"Installing {titles} (a minute or two)", flush=True)
     started = time.monotonic()
-    print(f"Installing {lock_path(name).relative_to(ROOT)} (a minute or two)", flush=True)
-    if run(*pip, "--require-hashes", "-r", lock_path(name), env=env, quiet=True):
-        raise FailedError(f"pip could not install {lock_path(name)} (see above)")
-    if name == "dev" and run(*pip, "--no-deps", "--no-build-isolation", "-e", ".", env=env, quiet=True):
+    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install")
+    files = [word for path in locks for word in ("-r", path)]
+    if run(*pip, "--require-hashes", *files, env=environment(), quiet=True):
+        raise FailedError(f"pip could not install {titles} (see above)")
+    # In place and without isolation: the build backend is among the pins, so nothing unpinned is downloaded.
+    if run(*pip, "--no-deps", "--no-build-isolation", "-e", ".", env=environment(), quiet=True):
         raise FailedError("pip could not install the project itself in place (see above)")
-    MARKER.write_text(json.dumps({**have, name: digest(name)}), encoding="utf-8")
+    MARKER.write_text(json.dumps({name: digest(name) for name in (*current, set_name)}), encoding="utf-8")
     print(f"Installed in {time.monotonic() - started:.0f} s", flush=True)
 
 
@@ -220,7 +225,7 @@ def serve(arguments: list[str]) -> int:
 
 def stale_locks() -> list[str]:
     """The lock files that were made from other requirements than pyproject.toml now has."""
-    return [name for name in SETS if f"# inputs: {inputs_digest()}" not in lock_path(name).read_text("utf-8")]
+    return [name for name in LOCKS if f"# inputs: {inputs_digest()}" not in lock_path(name).read_text("utf-8")]
 
 
 def check() -> list[str]:
@@ -280,7 +285,7 @@ def inputs_digest() -> str:
 
 
 def lock(arguments: list[str]) -> int:
-    """Write requirements/dev.txt, then requirements/service.txt as a part of it.
+    """Write requirements/dev.txt, then the other two as parts of it.
 
     ``--universal`` keeps one file right for every platform and every Python from 3.11 on.  No index is
     named in the result: where packages come from is the installing machine's business.
@@ -292,20 +297,23 @@ def lock(arguments: list[str]) -> int:
             raise FailedError("Python could not make a virtual environment (see above)")
         if run(bin_ / PYTHON.name, "-m", "pip", "--disable-pip-version-check", "install", UV, quiet=True):
             raise FailedError(f"pip could not install {UV} (see above)")
-        for name in reversed(SETS):
-            # With the build backend among the pins, installing the project in place downloads nothing unpinned.
-            backend = Path(folder) / "backend.in"
-            backend.write_text("\n".join(project_table()["build-system"]["requires"]), encoding="utf-8")
+        build = Path(folder) / "build.in"
+        # editables is what hatchling asks for when it installs in place.
+        build.write_text("\n".join([*project_table()["build-system"]["requires"], "editables"]), "utf-8")
+        sources: dict[str, list[str | Path]] = {
+            "dev": ["pyproject.toml", "--extra", "dev", build],
+            "service": ["pyproject.toml", "--extra", "service", "--constraint", lock_path("dev")],
+            "build": [build, "--constraint", lock_path("dev")],
+        }
+        for name in LOCKS:
             out = Path(folder) / f"{name}.txt"
             if lock_path(name).exists():
                 shutil.copyfile(lock_path(name), out)  # uv keeps the pins it finds there
-            scope: list[str | Path] = ["pyproject.toml"]
-            scope += [backend] if name == "dev" else ["--constraint", lock_path("dev")]
             command: list[str | Path] = [
                 *(bin_ / "uv", "pip", "compile", "--universal", "--python-version", ".".join(map(str, OLDEST))),
                 *("--generate-hashes", "--no-annotate", "--no-header", "--quiet"),
                 *("--no-emit-index-url", "--no-emit-find-links"),
-                *("--extra", name, "--output-file", out, *arguments, *scope),
+                *("--output-file", out, *arguments, *sources[name]),
             ]
             if run(*command):
                 raise FailedError(f"uv could not resolve {name} (see above)")

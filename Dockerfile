@@ -1,0 +1,69 @@
+# The service and what it needs to answer, nothing else: no solver, no tests, no compiler, no pip.
+#
+#   docker build -t mumacro .
+#   docker run --read-only --cap-drop=all -p 127.0.0.1:8000:8000 mumacro
+#
+# BASE may be any image whose `python3` is 3.11 or newer and can make a virtual environment.  Both stages must
+# share it: the environment made in the first one points at its interpreter.
+ARG BASE=python:3.11-slim
+
+FROM ${BASE} AS build
+WORKDIR /app
+# A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and because it
+# moves into the next stage as one folder.
+RUN python3 -m venv venv
+COPY requirements/service.txt requirements/
+# A network with its own certificate authority or package index passes them as the two secrets; they are
+# optional, and neither ends up in a layer.
+RUN --mount=type=secret,id=pip.conf,target=/etc/pip.conf \
+    --mount=type=secret,id=ca.pem,target=/etc/pip-ca.pem \
+    venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes \
+        -r requirements/service.txt
+# Other projects' tests are a tenth of the environment, and pip has no business in a running image.
+RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' -prune -exec rm -rf {} + \
+    && venv/bin/python -m pip uninstall --quiet --yes pip setuptools
+COPY LICENSE pyproject.toml deploy/read_only_cache.py ./
+# The project is copied, not installed (a wheel would bring the solver), so its version is written down here.
+RUN venv/bin/python -c "import pathlib, tomllib; \
+project = tomllib.loads(pathlib.Path('pyproject.toml').read_text())['project']; \
+folder = pathlib.Path('{name}-{version}.dist-info'.format(**project)); folder.mkdir(); \
+(folder / 'METADATA').write_text('Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n'.format(**project))"
+COPY friction friction
+COPY service service
+COPY tables tables
+# The kernels are compiled here, once.  The key under which numba keeps them holds the processor, so they are
+# compiled for the baseline of the architecture: an image runs on machines other than the one that built it.
+ENV NUMBA_CPU_NAME=generic \
+    NUMBA_CACHE_DIR=/app/cache \
+    NUMBA_CACHE_LOCATOR_CLASSES=read_only_cache.ReadOnlyCacheLocator \
+    PYTHONPATH=/app
+RUN venv/bin/python -m compileall -q friction service read_only_cache.py \
+    && venv/bin/python -c "from pathlib import Path; from friction import Surrogate; \
+tables = sorted(Path('tables').glob('*.nc')); assert tables, 'no table'; \
+[Surrogate.open(table).warm_up() for table in tables]" \
+    && ls cache/*/*.nbc
+
+FROM ${BASE}
+LABEL org.opencontainers.image.title="mumacro" \
+      org.opencontainers.image.description="Macroscopic friction under transverse oscillation: REST service on a verified table" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="0.1.0" \
+      org.opencontainers.image.vendor="The mumacro developers"
+COPY --from=build /app /app
+WORKDIR /app
+ENV PATH=/app/venv/bin:$PATH \
+    PYTHONPATH=/app \
+    PYTHONUNBUFFERED=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    HOME=/nonexistent \
+    NUMBA_CPU_NAME=generic \
+    NUMBA_CACHE_DIR=/app/cache \
+    NUMBA_CACHE_LOCATOR_CLASSES=read_only_cache.ReadOnlyCacheLocator \
+    MUMACRO_HOST=0.0.0.0
+# A number, not a name: Kubernetes can then check runAsNonRoot, and no entry in /etc/passwd is needed.
+USER 10001:10001
+EXPOSE 8000
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=30s --timeout=5s --start-period=30s --retries=3 \
+    CMD ["python", "-m", "service", "healthcheck"]
+CMD ["python", "-m", "service"]
