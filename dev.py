@@ -73,6 +73,15 @@ def run(*command: str | Path, env: dict[str, str] | None = None, quiet: bool = F
     return done.returncode
 
 
+def works(python: str | Path) -> bool:
+    """Whether that interpreter starts; a name on the PATH or a file in ``.venv`` may lead nowhere."""
+    try:
+        done = subprocess.run([str(python), "-c", ""], capture_output=True, check=False)  # noqa: S603 - fixed words
+    except OSError:
+        return False
+    return done.returncode == 0
+
+
 def environment() -> dict[str, str]:
     """The caller's variables with ``.venv`` in front; what would leak other packages in is left out."""
     env = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
@@ -95,8 +104,7 @@ def installed() -> dict[str, str]:
         marker = json.loads(MARKER.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    works = PYTHON.exists() and run(PYTHON, "-c", "", quiet=True) == 0
-    return marker if works and isinstance(marker, dict) else {}
+    return marker if isinstance(marker, dict) and works(PYTHON) else {}
 
 
 def ensure(set_name: str) -> None:
@@ -335,7 +343,7 @@ def use_a_newer_python() -> None:
     """On an interpreter that is too old, go on in a newer one if the machine has it."""
     for name in NEWER_NAMES:
         other = shutil.which(name)
-        if other and run(other, "-c", "", quiet=True) == 0:
+        if other and works(other):
             raise SystemExit(run(other, Path(__file__).resolve(), *sys.argv[1:]))
     version = ".".join(map(str, sys.version_info[:3]))
     raise FailedError(f"Python 3.11 or newer is needed; this is {version}, and no newer one is on the PATH")
