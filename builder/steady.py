@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from builder import model
-from builder.model import NO_SLIP, NO_STICK, OK, ORDER, rechart, slip
+from builder.model import FORGOTTEN, NO_SLIP, NO_STICK, OK, ORDER, rechart, slip
 
 CONTINUOUS, STICK_SLIP = 0, 1
 REGIMES = ("continuous", "stick_slip")
@@ -33,13 +33,14 @@ ADVICE = {
     OK: "solved",
     NO_SLIP: "the stick phase never reaches the friction limit: v~ is too small for double precision here; use the limit v~ -> 0",
     NO_STICK: "slip does not end within a period although the continuous orbit is not admissible",
-    model.TOO_MANY_STEPS: "more than 200,000 Taylor steps in one half period: use the tail for large v~ or y~",
+    model.TOO_MANY_STEPS: "more than 10,000 Taylor steps in one half period: use the tail for large v~ or y~",
     model.DIVERGED: "the stiff step did not converge: use the tail for large v~ or y~",
     NOT_CONVERGED: "the section's root was not found to rounding: take the error estimate seriously",
     BAD_INPUT: "v~ must be finite and > 0, y~ must be finite and > 0",
 }
 
 BORDER_SLOPE = 0.4765728  # v~crit / sqrt(y~) for y~ -> infinity
+BELOW_LINEAR = 1e-15  # of v~ at SMALLEST_Y, 2,000 times the border: below it 1 - mu~ no longer depends on v~ beyond v~^2
 SMALLEST_Y = 1e-9  # below, 1 - mu~ = y~^2 h(v~/y~^2) holds to rounding and the problem is solved at this amplitude
 
 
@@ -72,10 +73,10 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
             return OK
         step = res / (1.0 + math.exp(-out[6]))
         th -= step
-        scale = max(abs(th), 1e-300)
-        if abs(step) < 1e-8 * min(scale, 1.0) or (out[6] > 38.0 and abs(step) < 0.05):
+        scale = min(max(abs(th), y / math.sqrt(1.0 + v * v)), 1.0)
+        if abs(step) < 1e-8 * scale or (out[6] > FORGOTTEN and abs(step) < 0.05):
             done = True
-        if out[6] > 38.0:  # the start is forgotten within half a period: one more pass starts on the orbit
+        if out[6] > FORGOTTEN:  # the start is forgotten within half a period: one more pass starts on the orbit
             th = -(x_end + chart_end * half)
     return NOT_CONVERGED
 
@@ -370,7 +371,7 @@ def stick_slip(
             lo = z
         if f == 0.0 or spread < 1e-9:
             # the last secant step was below 1e-9 of z: its error is its square, this evaluation is the answer
-            return OK, max(spread * spread, 2e-16)
+            return OK, max(min(spread * spread, 1e-9), 2e-16) if f != 0.0 else 2e-16
         if f_old == math.inf:
             # where the map contracts well its own image is the next trial, elsewhere a small step towards the root
             new = z - f if kind == 0 and abs(f) > 1e-3 * z else z * (0.98 if f > 0.0 else 1.02)
@@ -389,6 +390,41 @@ def stick_slip(
 
 
 @njit(cache=True, error_model="numpy")
+def _unshrink(res: np.ndarray, shrink: float) -> None:
+    if shrink != 1.0:
+        for i in (1, 4, 5, 6):
+            res[i] *= shrink * shrink
+        res[0] = 1.0 - res[1]
+
+
+@njit(cache=True, error_model="numpy")
+def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, int]:
+    """(v~crit, mu~ there, status): where the smallest slip speed of the continuous orbit reaches zero."""
+    guess = border_guess(y)
+    lo, hi = 0.7 * guess, 1.4 * guess
+    z, z_old, f_old = 1.02 * guess, 0.0, math.inf
+    for _ in range(100):
+        status = continuous(z, y, w, out)
+        if status != OK:
+            return math.nan, math.nan, status
+        f = out[8]
+        if f > 0.0:
+            hi = z
+        else:
+            lo = z
+        if f == 0.0 or (f_old < math.inf and abs(z - z_old) <= 1e-9 * z):
+            if f != 0.0:
+                z -= f * (z - z_old) / (f - f_old)
+            mu = out[4] / math.pi
+            return z, (1.0 - out[5] / math.pi if mu > 0.5 else mu), OK
+        new = z - f * (z - z_old) / (f - f_old) if f_old < math.inf else z * (0.99 if f > 0.0 else 1.01)
+        if not (lo < new < hi):
+            new = 0.5 * (lo + hi)
+        z_old, f_old, z = z, f, new
+    return z, out[4] / math.pi, NOT_CONVERGED
+
+
+@njit(cache=True, error_model="numpy")
 def solve_raw(v: float, y: float, eta: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray, res: np.ndarray) -> int:
     """Steady state; ``res`` (8,) receives mu~, 1 - mu~, regime, stick fraction, oscillation power <y~ cos tau u_y>,
     mean slip path per radian <lam>, smallest lam of the continuous orbit (NaN if not followed), error estimate."""
@@ -398,12 +434,9 @@ def solve_raw(v: float, y: float, eta: float, w: np.ndarray, out: np.ndarray, or
     shrink = 1.0
     if y < SMALLEST_Y:
         shrink = y / SMALLEST_Y
-        vs = v
-        if v < 1e3 * y * y or v / shrink / shrink < 1e-3:
-            vs = (v / shrink) / shrink
-        else:
-            vs = v
-        v = vs
+        # in stick-slip v~ scales with y~^2; in continuous sliding the response is linear at any v~
+        scaled = (v / shrink) / shrink
+        v = scaled if scaled < BELOW_LINEAR else v
         y = SMALLEST_Y
         eta = y - 1.0
     guess = border_guess(y)
@@ -424,31 +457,27 @@ def solve_raw(v: float, y: float, eta: float, w: np.ndarray, out: np.ndarray, or
             res[7] = 4e-16
             if res[1] < 0.5:
                 res[0] = 1.0 - res[1]
-            res[1] *= shrink * shrink
-            if shrink != 1.0:
-                res[0] = 1.0 - res[1]
+            _unshrink(res, shrink)
             return OK
         hint = out[9]
     status, spread = stick_slip(v, y, eta, hint, w, out, orbit)
     if status != OK and status != NOT_CONVERGED:
         return status
-    d, cth, deficit, sth, s0 = orbit[0], orbit[1], orbit[2], orbit[3], orbit[4]
+    d, cth, deficit = orbit[0], orbit[1], orbit[2]
     mean = 1.0 / math.pi
-    rise = -2.0 * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d)
     res[0] = (d * (cth + 0.5 * v * d) + out[4]) * mean
     res[1] = (d * (deficit - 0.5 * v * d) + out[5]) * mean
     res[2] = 1.0
     res[3] = d * mean
-    res[4] = (y * rise * (sth + 0.5 * y * rise) + out[7]) * mean
+    # during stick the spring takes up and returns the same energy, so the shaker's work is minus the drive's
+    res[4] = (out[7] - v * d * (cth + 0.5 * v * d)) * mean
     res[5] = out[6] * mean
     res[7] = 4e-16 + spread * res[0]
     if res[1] < 0.5:
         res[0] = 1.0 - res[1]
     else:
         res[1] = 1.0 - res[0]
-    if shrink != 1.0:
-        res[1] *= shrink * shrink
-        res[0] = 1.0 - res[1]
+    _unshrink(res, shrink)
     return status
 
 
@@ -522,3 +551,18 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
         float(res[0]), float(res[1]), regime, float(res[3]), float(res[4]), float(res[5]), float(res[6]),
         float(res[7]), status, ADVICE[status],
     )  # fmt: skip
+
+
+def border(y: float) -> tuple[float, float]:
+    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-], 1e-8 < y < 1e8.
+
+    Raises
+    ------
+    ArithmeticError
+        When the root-finder fails.
+    """
+    w, out, _, _ = workspace()
+    v, mu, status = border_raw(float(y), w, out)
+    if status != OK:
+        raise ArithmeticError(f"border at y~ = {y!r}: {ADVICE[int(status)]}")
+    return float(v), float(mu)
