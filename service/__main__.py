@@ -1,7 +1,6 @@
 """``python -m service``: serve.  ``python -m service healthcheck``: ask a running service whether it is ready.
 
-Exit codes: 0 stopped on request (or ready), 1 could not run (or not ready), 2 bad setting or argument,
-3 the server could not start.
+Exit codes: 0 stopped on request (or ready), 1 could not run (or not ready), 2 bad setting or argument.
 """
 
 import argparse
@@ -64,19 +63,22 @@ def _serve(settings: Settings) -> int:
     # The server shuts down gracefully, then raises the signal once more, which by default would end the process
     # with the signal's own exit status.  A stop that was asked for is a success.
     signal.signal(signal.SIGTERM, _stop)
-    uvicorn.run(
-        create_app(settings) if settings.workers == 1 else "service.app:create_app",
-        factory=settings.workers > 1,
-        host=settings.host,
-        port=settings.port,
-        workers=settings.workers,
-        log_config=log_config(settings.log_level),
-        log_level=settings.log_level,
-        access_log=False,
-        server_header=False,
-        ws="none",
-        timeout_graceful_shutdown=settings.shutdown_grace_s,
-    )
+    try:
+        uvicorn.run(
+            create_app(settings) if settings.workers == 1 else "service.app:create_app",
+            factory=settings.workers > 1,
+            host=settings.host,
+            port=settings.port,
+            workers=settings.workers,
+            log_config=log_config(settings.log_level),
+            log_level=settings.log_level,
+            access_log=False,
+            server_header=False,
+            ws="none",
+            timeout_graceful_shutdown=settings.shutdown_grace_s,
+        )
+    except SystemExit as stop:
+        return 1 if stop.code else 0
     return 0
 
 
