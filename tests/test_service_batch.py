@@ -1,0 +1,220 @@
+"""Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, limits of size."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from starlette.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+
+PATH = "/v1/mu-macro/batch"
+VALUES = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+END = {"errors", "n_errors", "table", "api_version"}
+FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
+
+positive = st.floats(min_value=1e-30, max_value=1e30)
+rows_of_cases = st.lists(
+    st.fixed_dictionaries(
+        {
+            "mu0": positive,
+            "Fz": positive,
+            "y0": st.just(0.0) | positive,
+            "omega": positive,
+            "v0": st.just(0.0) | positive,
+        },
+        optional={"k": positive | st.none()},
+    ),
+    max_size=12,
+)
+
+
+def columns_of(rows):
+    return {name: [row.get(name) for row in rows] for name in FIELDS}
+
+
+@settings(max_examples=100, deadline=None)
+@given(rows=rows_of_cases)
+def test_rows_and_columns_answer_like_the_surrogate(client, surrogate, rows):
+    by_rows = client.post(PATH, json=rows).json()
+    by_columns = client.post(PATH, json=columns_of(rows)).json()
+    assert by_rows["n_errors"] == by_columns["n_errors"] == 0
+    for name in VALUES:
+        assert [result[name] for result in by_rows["results"]] == by_columns[name]
+    for row, result in zip(rows, by_rows["results"], strict=True):
+        expected = surrogate.evaluate(**{"k": None, **row})
+        assert result["mu_macro"] == pytest.approx(expected.mu_macro, rel=1e-12)
+        assert (result["regime"], result["source"]) == (expected.regime, expected.source)
+
+
+def test_a_column_is_evaluated_at_once_and_scalars_hold_for_every_case(client, case, surrogate):
+    v0 = np.geomspace(1e-6, 1e3, 1000)
+    answer = client.post(PATH, json={**case, "v0": v0.tolist()}).json()
+    assert answer.keys() == {*VALUES, *END}
+    expected = surrogate.evaluate(**{**case, "v0": v0})
+    for name in VALUES:
+        assert answer[name] == getattr(expected, name).tolist()
+    assert (answer["errors"], answer["n_errors"]) == ([], 0)
+    assert answer["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
+
+
+def test_a_batch_agrees_with_its_cases_one_by_one(client, case):
+    rows = [{**case, "v0": v0, "k": k} for v0 in (0, 1e-3, 0.1, 10) for k in (1e5, 1e7, None)]
+    results = client.post(PATH, params={"include": "groups,limits"}, json=rows).json()["results"]
+    for row, result in zip(rows, results, strict=True):
+        single = client.post("/v1/mu-macro", json={**row, "include": ["groups", "limits"]}).json()
+        for name in ("mu_macro", "mu_ratio", "error_bound"):
+            assert result[name] == pytest.approx(single[name], rel=1e-13)
+        assert (result["groups"], result["regime"]) == (single["groups"], single["regime"])
+        assert result["limits"] == pytest.approx(single["limits"], rel=1e-13)
+
+
+def test_a_bad_case_spoils_only_itself_in_columns(client, case):
+    body = {**case, "v0": [0.1, -1, 0.2, 0.3, None], "Fz": [10, 10, "10", 20, 10], "k": [1e6, 1e6, 1e6, None, 1e6]}
+    answer = client.post(PATH, json={**body, "include": ["groups", "limits"]}).json()
+    for name in VALUES:
+        assert [value is None for value in answer[name]] == [False, True, True, False, True]
+    for name in ("groups", "limits"):
+        for column in answer[name].values():
+            assert [column[index] for index in (1, 2, 4)] == [None] * 3
+    assert [(error["index"], error["field"]) for error in answer["errors"]] == [(1, "v0"), (2, "Fz"), (4, "v0")]
+    assert answer["n_errors"] == 3
+    assert all(error.keys() == {"index", "field", "reason"} for error in answer["errors"])
+    rigid = client.post("/v1/mu-macro", json={**case, "Fz": 20, "v0": 0.3, "k": None}).json()
+    assert answer["mu_macro"][3] == pytest.approx(rigid["mu_macro"], rel=1e-13)
+
+
+def test_a_bad_case_spoils_only_itself_in_rows(client, case):
+    rows = [
+        case,
+        {**case, "mu0": 0},
+        17,
+        {"mu0": 0.3},
+        {**case, "speed": 1},
+        {**case, "v0": True},
+        None,
+        {**case, "include": []},
+        {name: value for name, value in case.items() if name != "k"},
+    ]
+    answer = client.post(PATH, json=rows).json()
+    assert answer.keys() == {"results", *END}
+    assert [result is None for result in answer["results"]] == [False, *[True] * 7, False]
+    found = [(error["index"], error["field"]) for error in answer["errors"]]
+    assert found == [(1, "mu0"), (2, None), (3, "Fz"), (4, "speed"), (5, "v0"), (6, None), (7, "include")]
+    single = client.post("/v1/mu-macro", json=case).json()
+    assert answer["results"][0]["mu_macro"] == pytest.approx(single["mu_macro"], rel=1e-13)
+
+
+@pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999", "1" + "0" * 400])
+def test_numbers_beyond_double_range_are_bad_cases_and_bad_scalars(client, case, problem, text):
+    body = json.dumps({**case, "v0": [0.1, "@", 0.2]}).replace('"@"', text)
+    answer = client.post(PATH, content=body)
+    assert answer.status_code == 200, answer.text
+    assert [value is None for value in answer.json()["mu_macro"]] == [False, True, False]
+    assert [(error["index"], error["field"]) for error in answer.json()["errors"]] == [(1, "v0")]
+    answer = client.post(PATH, content=json.dumps([case, {**case, "k": "@"}]).replace('"@"', text)).json()
+    assert (answer["results"][1], answer["n_errors"]) == (None, 1)
+    body = json.dumps({**case, "v0": "@", "mu0": [0.3, 0.4]}).replace('"@"', text)
+    (fault,) = problem(client.post(PATH, content=body), 422)["errors"]
+    assert (fault["pointer"], fault["bound"]) == ("#/v0", "finite and >= 0")
+
+
+def test_nothing_but_bad_cases_is_still_an_answer(client, case):
+    answer = client.post(PATH, json={**case, "v0": [-1, -2], "include": ["groups"]}).json()
+    assert answer["mu_macro"] == [None, None]
+    assert answer["groups"] == {"v_tilde": [None, None], "y_tilde": [None, None], "l0": [None, None]}
+    assert answer["n_errors"] == 2
+
+
+def test_the_list_of_errors_is_bounded_and_their_number_is_told(client, case):
+    answer = client.post(PATH, json={**case, "v0": [-1.0] * 5000 + [1.0]}).json()
+    assert [error["index"] for error in answer["errors"]] == list(range(1000))
+    assert answer["n_errors"] == 5000
+    assert [value is None for value in answer["mu_macro"]] == [True] * 5000 + [False]
+
+
+def test_lists_of_different_lengths_are_refused(client, case, problem):
+    faults = problem(client.post(PATH, json={**case, "v0": [0.1, 0.2, 0.3], "y0": [1e-6, 2e-6]}), 422)["errors"]
+    assert "y0: 2, v0: 3" in faults[0]["reason"]
+    problem(client.post(PATH, json={**case, "v0": [0.1, 0.2], "y0": [1e-6]}), 422)
+    problem(client.post(PATH, json={**case, "v0": [0.1, 0.2], "y0": []}), 422)
+
+
+def test_columns_that_no_case_can_do_without_or_with_are_refused(client, case, problem):
+    del case["Fz"]
+    faults = problem(client.post(PATH, json={**case, "speed": [1], "mu0": "0.3", "y0": {}}), 422)["errors"]
+    assert {fault["field"] for fault in faults} == {"Fz", "speed", "mu0", "y0"}
+
+
+@pytest.mark.parametrize("body", ["3", "null", '"text"', "true"])
+def test_json_that_is_neither_columns_nor_rows_is_refused(client, problem, body):
+    (fault,) = problem(client.post(PATH, content=body), 422)["errors"]
+    assert fault["pointer"] == "#"
+
+
+@pytest.mark.parametrize("body", [b"", b"[", b"{", b"[1,]", b"\xff" * 100_000])
+def test_what_is_no_json_is_malformed(client, problem, body):
+    problem(client.post(PATH, content=body), 400)
+
+
+def test_other_media_types_are_refused(client, problem):
+    problem(client.post(PATH, content="mu0,Fz", headers={"Content-Type": "text/csv"}), 415)
+
+
+def test_an_empty_batch_has_an_empty_answer(client, case):
+    rows = client.post(PATH, json=[]).json()
+    assert (rows["results"], rows["errors"], rows["n_errors"]) == ([], [], 0)
+    columns = client.post(PATH, json={**case, "v0": [], "k": [], "include": ["limits"]}).json()
+    assert all(columns[name] == [] for name in VALUES)
+    assert columns["limits"] == {"mu_static": [], "v0_crit": [], "mu_crit": []}
+
+
+def test_columns_of_scalars_only_are_one_case(client, case):
+    assert len(client.post(PATH, json=case).json()["mu_macro"]) == 1
+
+
+def test_options_come_with_the_query_or_with_the_columns_but_not_twice(client, case, problem, surrogate):
+    body = {**case, "v0": [0.1, 0.2]}
+    by_query = client.post(PATH, params={"include": "groups", "tolerance": 0.1}, json=body).json()
+    by_body = client.post(PATH, json={**body, "include": ["groups"], "tolerance": 0.1}).json()
+    assert by_query == by_body
+    assert "groups" in by_query
+    assert "limits" not in by_query
+    problem(client.post(PATH, params={"include": "limits"}, json={**body, "include": ["groups"]}), 422)
+    problem(client.post(PATH, params={"include": "std"}, json=[case]), 422)
+    problem(client.post(PATH, params={"mu0": 1}, json=[case]), 422)
+    problem(client.post(PATH, json={**body, "include": ["std"]}), 422)
+    (fault,) = problem(client.post(PATH, params={"tolerance": 1e-30}, json=[case]), 422)["errors"]
+    assert fault["parameter"] == "tolerance"
+    document = problem(client.post(PATH, json={**body, "tolerance": 1e-30}), 422)
+    assert document["errors"][0]["pointer"] == "#/tolerance"
+    assert document["tightest_available"] == surrogate.tolerance
+
+
+def test_a_large_batch_keeps_its_order(client, case, surrogate):
+    v0 = np.geomspace(1e-9, 1e9, 100_000)
+    answer = client.post(PATH, json={**case, "v0": v0.tolist()}).json()
+    assert answer["mu_macro"] == surrogate.evaluate(**{**case, "v0": v0}).mu_macro.tolist()
+    rows = client.post(PATH, json=[{**case, "v0": value} for value in v0[::10].tolist()]).json()
+    assert [result["mu_macro"] for result in rows["results"]] == pytest.approx(answer["mu_macro"][::10], rel=1e-13)
+
+
+def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3))) as client:
+        assert client.post(PATH, json={**case, "v0": [0.1] * 3}).status_code == 200
+        for body in ({**case, "v0": [0.1] * 4}, [case] * 4, [None] * 400):
+            assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
+
+
+def test_too_many_waiting_batches_are_turned_away(tables_dir, case, problem):
+    app = create_app(Settings(tables=(tables_dir,)))
+    with TestClient(app) as client:
+        app.state.batch_limiter = SimpleNamespace(statistics=lambda: SimpleNamespace(tasks_waiting=1000))
+        response = client.post(PATH, json={**case, "v0": [0.1] * 10_000})
+        problem(response, 503)
+        assert response.headers["retry-after"] == "1"
+        assert client.post(PATH, json=[case]).status_code == 200

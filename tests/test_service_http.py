@@ -1,0 +1,212 @@
+"""What every request has in common: errors, identities, keys, body limits, the interface's description."""
+
+import json
+import logging
+
+import pytest
+from starlette.testclient import TestClient
+
+from service.app import create_app
+from service.logs import JsonFormatter
+from service.middleware import HEALTH_PATHS
+from service.routes.docs import ASSETS
+from service.settings import Settings
+
+PATHS = {
+    "/v1/mu-macro": "GET, HEAD, POST",
+    "/v1/mu-macro/batch": "POST",
+    "/v1/table": "GET, HEAD",
+    "/v1/table.nc": "GET, HEAD",
+    "/livez": "GET, HEAD",
+    "/readyz": "GET, HEAD",
+    "/healthz": "GET, HEAD",
+    "/docs": "GET, HEAD",
+    "/openapi.json": "GET, HEAD",
+}
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/nowhere", "/v1", "/v1/mu-macro/", "/v2/mu-macro", "/static/../settings.py", "/%00"]
+)
+def test_an_unknown_path_is_not_found(client, problem, path):
+    problem(client.get(path), 404)
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
+def test_a_wrong_method_is_told_the_right_ones(client, problem, path, method):
+    response = client.request(method, path)
+    problem(response, 405)
+    assert response.headers["allow"] == PATHS[path]
+
+
+def test_every_path_is_in_the_table_above(client):
+    assert set(client.get("/openapi.json").json()["paths"]) <= set(PATHS)
+
+
+@pytest.mark.parametrize("offered", ["abc-123", "A.b_c:9", "x" * 128])
+def test_a_request_id_is_taken_over(client, offered):
+    assert client.get("/livez", headers={"X-Request-ID": offered}).headers["x-request-id"] == offered
+
+
+@pytest.mark.parametrize("offered", ["", "x" * 129, "a b", "a;b", 'a"b', "ä"])
+def test_an_ill_formed_request_id_is_replaced(client, offered):
+    given = client.get("/livez", headers={"X-Request-ID": offered.encode("latin-1")}).headers["x-request-id"]
+    assert len(given) == 32
+    assert int(given, 16) >= 0
+
+
+def test_requests_are_logged_as_json_lines(client, case, caplog):
+    with caplog.at_level(logging.INFO, logger="mumacro"):
+        client.get("/v1/mu-macro", params=case, headers={"X-Request-ID": "mine"})
+        client.get("/livez")
+    (record,) = [record for record in caplog.records if record.name == "mumacro.access"]
+    assert record.fields["status"] == 200
+    assert record.fields["path"] == "/v1/mu-macro"
+    forged = logging.LogRecord("mumacro", logging.INFO, "", 0, 'one\n{"level": "forged"}', (), None)
+    line = JsonFormatter().format(forged)
+    assert "\n" not in line
+    assert json.loads(line)["message"].startswith("one\n")
+
+
+@pytest.fixture
+def broken(tables_dir):
+    """A client of an application whose tables raise what nobody foresaw."""
+    app = create_app(Settings(tables=(tables_dir,)))
+
+    def fail(*_args):
+        raise RuntimeError("secret detail")
+
+    app.state.shelf.pick = fail
+    return TestClient(app)
+
+
+def test_an_unforeseen_error_is_logged_and_not_told(broken, case, problem, caplog):
+    response = broken.post("/v1/mu-macro", json=case)
+    problem(response, 500)
+    assert "secret" not in response.text
+    (record,) = [record for record in caplog.records if record.name == "mumacro.error"]
+    assert "secret detail" in JsonFormatter().format(record)
+
+
+@pytest.fixture
+def closed(tables_dir):
+    """A client of an application with an API key."""
+    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="s3cret-key"))) as started:
+        yield started
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"X-API-Key": "wrong"},
+        {"X-API-Key": ""},
+        {"X-API-Key": b"s3cret-key\xe4"},
+        {"Authorization": "Bearer wrong"},
+        {"Authorization": "Basic s3cret-key"},
+        {"Authorization": "s3cret-key"},
+    ],
+)
+def test_without_the_key_there_is_no_answer(closed, case, problem, headers):
+    for response in (
+        closed.get("/v1/mu-macro", params=case, headers=headers),
+        closed.post("/v1/mu-macro/batch", json=[case], headers=headers),
+        closed.get("/v1/table.nc", headers=headers),
+        closed.get("/openapi.json", headers=headers),
+        closed.get("/nowhere", headers=headers),
+    ):
+        assert "s3cret" not in response.text
+        problem(response, 401)
+        assert response.headers["www-authenticate"] == "Bearer"
+
+
+@pytest.mark.parametrize("headers", [{"X-API-Key": "s3cret-key"}, {"Authorization": "bearer s3cret-key"}])
+def test_the_key_opens(closed, case, headers):
+    response = closed.get("/v1/mu-macro", params=case, headers=headers)
+    assert response.status_code == 200
+    assert response.headers["cache-control"] == "private, max-age=3600"
+
+
+@pytest.mark.parametrize("path", sorted(HEALTH_PATHS))
+def test_health_needs_no_key(closed, path):
+    assert closed.get(path).status_code == 200
+
+
+@pytest.fixture
+def narrow(tables_dir):
+    """A client of an application that reads bodies up to 1024 bytes."""
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_body_bytes=1024))) as started:
+        yield started
+
+
+def test_a_large_body_is_refused_before_reading(narrow, case, problem):
+    body = json.dumps(case).encode()
+    assert narrow.post("/v1/mu-macro", content=body.ljust(1024)).status_code == 200
+    response = narrow.post("/v1/mu-macro", content=body.ljust(1025))
+    assert problem(response, 413)["max_bytes"] == 1024
+    problem(narrow.post("/v1/mu-macro/batch", content=b"x" * 100_000), 413)
+
+
+def test_a_large_body_without_a_length_is_refused_while_reading(narrow, problem):
+    read = []
+
+    def pieces():
+        for index in range(10_000):
+            read.append(index)
+            yield b" " * 100
+
+    response = narrow.post("/v1/mu-macro", content=pieces())
+    problem(response, 413)
+    assert "content-length" not in response.request.headers
+
+
+def references(node):
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key == "$ref":
+                yield value
+            yield from references(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from references(value)
+
+
+def test_the_description_is_whole(client):
+    document = client.get("/openapi.json").json()
+    schemas = document["components"]["schemas"]
+    found = set(references(document))
+    assert {reference.removeprefix("#/components/schemas/") for reference in found} <= set(schemas)
+    assert set(schemas["Case"]["properties"]) == {"mu0", "Fz", "k", "y0", "omega", "v0"}
+    assert set(schemas["Case"]["required"]) == {"mu0", "Fz", "y0", "omega", "v0"}
+    assert set(schemas["BatchColumns"]["properties"]) == set(schemas["CaseRequest"]["properties"])
+    for name, unit in {"mu0": "[-]", "Fz": "[N]", "k": "[N/m]", "y0": "[m]", "omega": "[rad/s]", "v0": "[m/s]"}.items():
+        assert unit in schemas["Case"]["properties"][name]["description"]
+    parameters = document["paths"]["/v1/mu-macro"]["get"]["parameters"]
+    assert {parameter["name"]: parameter["required"] for parameter in parameters} == {
+        "mu0": True, "Fz": True, "k": False, "y0": True, "omega": True, "v0": True, "include": False, "tolerance": False
+    }  # fmt: skip
+
+
+def test_the_described_examples_are_answered(client):
+    schemas = client.get("/openapi.json").json()["components"]["schemas"]
+    for name, path in (("Case", "/v1/mu-macro"), ("BatchColumns", "/v1/mu-macro/batch")):
+        for example in schemas[name]["examples"]:
+            assert client.post(path, json=example).status_code == 200
+
+
+def test_the_page_loads_nothing_from_elsewhere(client):
+    page = client.get("/docs")
+    assert page.headers["content-type"].startswith("text/html")
+    assert "default-src 'none'" in page.headers["content-security-policy"]
+    assert "//" not in page.text
+    for name, media_type in ASSETS.items():
+        assert f"static/swagger-ui/{name}" in page.text
+        asset = client.get(f"/static/swagger-ui/{name}")
+        assert asset.status_code == 200
+        assert asset.headers["content-type"].startswith(media_type)
+
+
+def test_every_answer_forbids_guessing_its_type(client):
+    for path in ("/livez", "/nowhere", "/docs", "/v1/table"):
+        assert client.get(path).headers["x-content-type-options"] == "nosniff"

@@ -1,0 +1,206 @@
+"""The service as a process: a real server on a loopback port, real sockets, real signals."""
+
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from queue import Empty, Queue
+
+import pytest
+
+START_S = 180  # a first start compiles the kernels
+
+
+class Server:
+    """A service process of this test's own, and what it logged."""
+
+    def __init__(self, repository, tables, arguments, environment):
+        command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(tables), *arguments]
+        variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
+        self.process = subprocess.Popen(
+            command,
+            cwd=repository,
+            env={**variables, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.lines = []
+        self._ports = Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        try:
+            self.port = self._ports.get(timeout=START_S)
+        except Empty:
+            self.port = None
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line)
+            found = re.search(r"running on http://[^ ]+:(\d+) ", line)
+            if found:
+                self._ports.put(int(found[1]))
+        self._ports.put(None)
+
+    def ask(self, method, path, body=None, headers=None, **options):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        try:
+            connection.request(method, path, body, headers or {}, **options)
+            response = connection.getresponse()
+            return response.status, dict(response.getheaders()), response.read()
+        finally:
+            connection.close()
+
+    def wait_for_workers(self):
+        """Wait until somebody listens: with several workers the port is known before that."""
+        deadline = time.monotonic() + START_S
+        while True:
+            try:
+                return self.ask("GET", "/livez")
+            except ConnectionRefusedError:
+                assert time.monotonic() < deadline, "".join(self.lines)
+                time.sleep(0.1)
+
+    def stop(self, number=signal.SIGTERM):
+        self.process.send_signal(number)
+        code = self.process.wait(timeout=60)
+        self._reader.join(timeout=60)
+        self.process.stdout.close()
+        return code
+
+
+@contextmanager
+def serving(repository, tables, *arguments, **environment):
+    server = Server(repository, tables, arguments, environment)
+    try:
+        assert server.port, "".join(server.lines)
+        yield server
+    finally:
+        if server.process.poll() is None:
+            server.stop(signal.SIGKILL)
+
+
+@pytest.fixture(scope="module")
+def server(repository, surrogate):
+    """One server for all tests that do not stop it."""
+    with serving(repository, surrogate.path, MUMACRO_MAX_BODY_BYTES="4096") as started:
+        yield started
+
+
+def test_it_answers(server, case, client):
+    query = "&".join(f"{name}={value}" for name, value in case.items())
+    status, headers, body = server.ask("GET", f"/v1/mu-macro?{query}", headers={"X-Request-ID": "live-1"})
+    assert (status, headers["x-request-id"]) == (200, "live-1")
+    assert json.loads(body)["mu_macro"] == client.get("/v1/mu-macro", params=case).json()["mu_macro"]
+    assert "server" not in headers
+
+
+def test_it_is_checked_by_its_own_command(server, repository):
+    def check(port):
+        command = [sys.executable, "-m", "service", "healthcheck", "--port", str(port)]
+        return subprocess.run(
+            command, cwd=repository, check=False, env={**os.environ, "http_proxy": "http://[::1]:9"}
+        ).returncode
+
+    assert check(server.port) == 0
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        assert check(unused.getsockname()[1]) == 1
+
+
+def test_the_file_arrives_whole(server, surrogate):
+    status, headers, body = server.ask("GET", "/v1/table.nc")
+    assert (status, body) == (200, surrogate.path.read_bytes())
+    assert headers["content-length"] == str(len(body))
+
+
+def test_a_body_over_the_limit_is_refused_with_and_without_a_length(server):
+    kinds = {"Content-Type": "application/json"}
+    status, headers, body = server.ask("POST", "/v1/mu-macro/batch", b" " * 5000, kinds)
+    assert (status, headers["content-type"]) == (413, "application/problem+json")
+    chunks = iter([b" " * 1000] * 5)
+    status, headers, body = server.ask("POST", "/v1/mu-macro/batch", chunks, kinds, encode_chunked=True)
+    assert (status, json.loads(body)["max_bytes"]) == (413, 4096)
+    assert headers["connection"] == "close"
+
+
+def test_a_chunked_body_within_the_limit_is_read(server, case):
+    text = json.dumps(case).encode()
+    chunks = iter([text[:20], text[20:]])
+    status, _, _ = server.ask("POST", "/v1/mu-macro", chunks, {"Content-Type": "application/json"}, encode_chunked=True)
+    assert status == 200
+
+
+def test_a_connection_is_kept_over_errors(server, case):
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    statuses = []
+    for method, path, body in (("GET", "/nowhere", None), ("POST", "/v1/mu-macro", b"{"), ("PUT", "/livez", b"x")):
+        connection.request(method, path, body)
+        response = connection.getresponse()
+        response.read()
+        statuses.append(response.status)
+    connection.request("POST", "/v1/mu-macro", json.dumps(case))
+    assert connection.getresponse().status == 200
+    connection.close()
+    assert statuses == [404, 400, 405]
+
+
+def test_head_has_no_body(server):
+    assert server.ask("HEAD", "/readyz")[::2] == (200, b"")
+
+
+def test_what_is_no_http_does_not_hurt(server):
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as raw:
+        raw.sendall(b"nonsense\r\n\r\n")
+        assert raw.recv(100).startswith(b"HTTP/1.1 400")
+    assert server.ask("GET", "/livez")[0] == 200
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stop_that_was_asked_for_is_a_success(repository, surrogate, number):
+    with serving(repository, surrogate.path) as server:
+        assert server.ask("GET", "/readyz")[0] == 200
+        server.ask("GET", "/nowhere", headers={"X-Request-ID": "the-last"})
+        assert server.stop(number) == 0
+    lines = [json.loads(line) for line in server.lines]
+    assert all({"time", "level", "logger", "message"} <= line.keys() for line in lines)
+    (access,) = [line for line in lines if line["logger"] == "mumacro.access"]
+    assert (access["request_id"], access["status"], access["path"]) == ("the-last", 404, "/nowhere")
+
+
+def test_several_workers_serve_and_stop(repository, surrogate):
+    with serving(repository, surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
+        server.wait_for_workers()
+        assert server.ask("GET", "/readyz")[0] == 200
+        assert server.ask("GET", "/v1/table")[0] == 401
+        assert server.ask("GET", "/v1/table", headers={"X-API-Key": "k3y"})[0] == 200
+        assert server.stop() == 0
+    assert all(json.loads(line) for line in server.lines)
+
+
+def test_a_damaged_table_starts_alive_and_not_ready(repository, tmp_path):
+    (tmp_path / "damaged.nc").write_bytes(b"damaged")
+    with serving(repository, tmp_path) as server:
+        assert server.ask("GET", "/livez")[0] == 200
+        status, headers, body = server.ask("GET", "/readyz")
+        assert (status, headers["retry-after"]) == (503, "5")
+        assert "damaged.nc" in json.loads(body)["detail"]
+        assert server.stop() == 0
+
+
+def test_a_port_that_is_taken_is_a_failure(repository, surrogate):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        command = [sys.executable, "-m", "service", "--tables", str(surrogate.path), "--port", port]
+        process = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False, timeout=START_S)
+    assert process.returncode == 1
+    assert "Traceback" not in process.stdout + process.stderr

@@ -1,0 +1,135 @@
+"""Settings: their sources, their bounds, what is said of a bad one, and that the manual has them all."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.__main__ import main
+from service.healthcheck import loopback_url
+from service.settings import Settings, SettingsError, load_settings, unknown_variables
+
+BAD = {
+    "MUMACRO_TABLES": ("", os.pathsep),
+    "MUMACRO_HOST": ("",),
+    "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"),
+    "MUMACRO_WORKERS": ("0", "257", "two"),
+    "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)),
+    "MUMACRO_MAX_BATCH": ("0", "10000001"),
+    "MUMACRO_API_KEY": ("", "two words", "schlüssel", "x" * 513, "line\nbreak"),
+    "MUMACRO_LOG_LEVEL": ("", "loud"),
+    "MUMACRO_SHUTDOWN_GRACE_S": ("-1", "3601", "soon"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _clean_environment(monkeypatch):
+    for name in list(os.environ):
+        if name.startswith("MUMACRO_"):
+            monkeypatch.delenv(name)
+
+
+def names():
+    return {f"MUMACRO_{name.upper()}" for name in Settings.model_fields}
+
+
+def test_every_setting_has_its_bad_values_above():
+    assert set(BAD) == names()
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in BAD.items() for value in values])
+def test_a_bad_setting_is_named_in_one_line(monkeypatch, capsys, name, value):
+    monkeypatch.setenv(name, value)
+    assert main([]) == 2
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert message.startswith(f"{name} must be ")
+    if name == "MUMACRO_API_KEY" and value:
+        assert value not in message
+
+
+def test_two_bad_settings_are_both_named(monkeypatch):
+    monkeypatch.setenv("MUMACRO_PORT", "x")
+    monkeypatch.setenv("MUMACRO_WORKERS", "y")
+    with pytest.raises(SettingsError, match=r"MUMACRO_PORT .*; MUMACRO_WORKERS "):
+        load_settings()
+
+
+def test_settings_come_from_the_environment(monkeypatch, tmp_path):
+    monkeypatch.setenv("MUMACRO_TABLES", f"{tmp_path}{os.pathsep}other.nc")
+    monkeypatch.setenv("MUMACRO_PORT", "81")
+    monkeypatch.setenv("MUMACRO_LOG_LEVEL", "WARNING")
+    settings = load_settings(host="::1")
+    assert settings.tables == (tmp_path, Path("other.nc"))
+    assert (settings.host, settings.port, settings.log_level) == ("::1", 81, "warning")
+
+
+def test_the_defaults_suit_a_laptop(repository):
+    settings = load_settings()
+    assert (settings.host, settings.port, settings.workers, settings.api_key) == ("127.0.0.1", 8000, 1, None)
+    assert settings.tables == (repository / "tables",)
+
+
+def test_a_misspelt_variable_is_noticed(monkeypatch):
+    monkeypatch.setenv("MUMACRO_TABLE", "x")
+    assert unknown_variables() == ["MUMACRO_TABLE"]
+
+
+def test_the_key_is_never_shown(monkeypatch):
+    monkeypatch.setenv("MUMACRO_API_KEY", "s3cret")
+    assert "s3cret" not in repr(load_settings())
+
+
+@pytest.mark.parametrize(
+    ("host", "url"),
+    [
+        ("0.0.0.0", "http://127.0.0.1:8000/readyz"),  # noqa: S104
+        ("::", "http://[::1]:8000/readyz"),
+        ("127.0.0.1", "http://127.0.0.1:8000/readyz"),
+        ("10.1.2.3", "http://10.1.2.3:8000/readyz"),
+    ],
+)
+def test_the_health_check_asks_this_machine(host, url):
+    assert loopback_url(Settings(host=host)) == url
+
+
+def test_the_manual_and_the_settings_agree(repository):
+    text = (repository / "docs" / "operations.md").read_text()
+    assert set(re.findall(r"^### (MUMACRO_\w+)$", text, re.MULTILINE)) == names()
+    for name, field in Settings.model_fields.items():
+        section = text.split(f"### MUMACRO_{name.upper()}\n")[1].split("\n#")[0]
+        if field.default is None:
+            assert "Default: none" in section
+        elif field.default_factory is None:
+            assert f"Default: `{field.default}`" in section
+        else:
+            assert "Default: " in section
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (["--port", "70000"], "MUMACRO_PORT"),
+        (["--workers=0"], "MUMACRO_WORKERS"),
+        (["--log-level", "x"], "MUMACRO_LOG_LEVEL"),
+    ],
+)
+def test_a_bad_option_ends_the_process_without_a_traceback(repository, arguments, name):
+    process = subprocess.run(
+        [sys.executable, "-m", "service", *arguments], cwd=repository, capture_output=True, text=True, check=False
+    )
+    assert process.returncode == 2
+    assert process.stderr.startswith(name)
+    assert process.stderr.count("\n") == 1
+    assert process.stdout == ""
+
+
+@pytest.mark.parametrize("arguments", [["--nonsense"], ["fly"]])
+def test_a_bad_argument_is_refused(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert "usage" in capsys.readouterr().err
