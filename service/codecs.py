@@ -16,7 +16,15 @@ from service.answers import DEFAULT_KEYS, Batch, CaseFault
 from service.errors import BatchTooLargeError, FieldFault, InvalidFieldsError, safe_value
 from service.intake import KNOWN_FIELDS
 
-__all__ = ["MAX_ERRORS", "columns_from_json", "encode", "encode_columns", "encode_rows", "rows_from_json"]
+__all__ = [
+    "MAX_ERRORS",
+    "columns_from_json",
+    "encode",
+    "encode_case",
+    "encode_columns",
+    "encode_rows",
+    "rows_from_json",
+]
 
 MAX_ERRORS = 1000
 _REQUIRED = tuple(name for name in FIELDS if name != "k")
@@ -103,6 +111,11 @@ def encode_rows(answers: Mapping[str, Any], batch: Batch, signature: Mapping[str
     for index in batch.faults:
         results[index] = None
     return encode({"results": results, **_errors(batch), **signature})
+
+
+def encode_case(values: Mapping[str, Any]) -> bytes:
+    """Write one short answer; numbers that are not finite become null."""
+    return to_json(values, inf_nan_mode="null")
 
 
 def encode(values: Mapping[str, Any]) -> bytes:

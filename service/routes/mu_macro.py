@@ -5,7 +5,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from service.answers import answer_case, case_etag
-from service.codecs import encode
+from service.codecs import encode_case
 from service.intake import canonical, case_from_body, case_from_query, read_body, refuse_query
 from service.openapi import case_parameters, describe_json
 from service.shelf import shelf_of
@@ -45,7 +45,7 @@ async def get_mu_macro(request: Request) -> Response:
     headers = {"ETag": etag, "Cache-Control": f"{scope}, max-age={_MAX_AGE_S}"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
-    return Response(encode(answer_case(table, case, include)), headers=headers, media_type="application/json")
+    return Response(encode_case(answer_case(table, case, include)), headers=headers, media_type="application/json")
 
 
 @router.post(
@@ -66,4 +66,4 @@ async def post_mu_macro(request: Request) -> Response:
     refuse_query(request)
     case = case_from_body(await read_body(request))
     table = shelf_of(request).pick(case.tolerance)
-    return Response(encode(answer_case(table, case, canonical(case.include))), media_type="application/json")
+    return Response(encode_case(answer_case(table, case, canonical(case.include))), media_type="application/json")
