@@ -54,15 +54,17 @@ def _stop(_signal: int, _frame: FrameType | None) -> None:
 
 
 def _serve(settings: Settings) -> int:
+    # The server shuts down gracefully, then raises the signal once more, which by default would end the process
+    # with the signal's own exit status.  A stop that was asked for is a success.
+    # Set before the slow imports: as a container's first process this one would ignore the signal until then.
+    signal.signal(signal.SIGTERM, _stop)
+
     # Imported here: a health check must not pay for the server and the kernels.
     import uvicorn
 
     from service.app import create_app
     from service.logs import log_config
 
-    # The server shuts down gracefully, then raises the signal once more, which by default would end the process
-    # with the signal's own exit status.  A stop that was asked for is a success.
-    signal.signal(signal.SIGTERM, _stop)
     try:
         uvicorn.run(
             create_app(settings) if settings.workers == 1 else "service.app:create_app",
