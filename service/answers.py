@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,10 @@ from service.shelf import LoadedTable
 __all__ = ["DEFAULT_KEYS", "Batch", "CaseFault", "answer_batch", "answer_case", "case_etag", "signature"]
 
 DEFAULT_KEYS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+# Array kernels may run in parallel, and numba's threading layer of last resort (no OpenMP, no TBB: small images)
+# ends the process when two threads enter such kernels at once.  An evaluation takes milliseconds, so they queue.
+_ARRAY_KERNELS = Lock()
+
 INCLUDE_KEYS = {"groups": tuple(Groups.model_fields), "limits": tuple(Limits.model_fields)}
 
 
@@ -116,7 +121,8 @@ def answer_batch(surrogate: Surrogate, batch: Batch, include: Sequence[str]) -> 
             case = {name: _take(column, where, batch.size) for name, column in batch.columns.items()}
             if rigid:
                 case["k"] = None
-            parts.append((where, compute(surrogate, case, include)))
+            with _ARRAY_KERNELS:
+                parts.append((where, compute(surrogate, case, include)))
     answers: dict[str, Any] = {key: _gather(parts, (key,), batch.size) for key in DEFAULT_KEYS}
     for name in include:
         answers[name] = {key: _gather(parts, (name, key), batch.size) for key in INCLUDE_KEYS[name]}

@@ -53,8 +53,8 @@ def limits(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, NDAr
 
     y_tilde = np.asarray(answer.y_tilde, dtype=np.float64)
     usable = np.isfinite(y_tilde) & ~at_rest
-    y = np.where(usable, y_tilde, 1.0)  # placeholders: their results are replaced below
-    v = np.asarray(surrogate.v_tilde_crit(y), dtype=np.float64)
+    y = np.where(usable, y_tilde, 1.0)[()]  # placeholders, replaced below; [()] makes a scalar of one case
+    v = surrogate.v_tilde_crit(y)
     ratio = np.asarray(surrogate.mu_ratio(v, y), dtype=np.float64)
     below = np.minimum(y_tilde, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -156,8 +156,8 @@ class TableAnswer(BaseModel):
     checksum: str = Field(description="SHA-256 of the table's content")
     file: str
     size_bytes: int
-    max_abs_error: float = Field(description="Largest verified absolute error of mu_macro/mu0 [-]")
-    max_rel_error: float = Field(description="Largest verified relative error of mu_macro [-]")
+    max_abs_error: float | None = Field(description="Largest verified absolute error of mu_macro/mu0 [-]")
+    max_rel_error: float | None = Field(description="Largest verified relative error of mu_macro [-]")
     attributes: dict[str, Any] = Field(description="Root attributes of the file")
     blocks: list[dict[str, Any]]
     table: TableLabel

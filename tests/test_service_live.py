@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from queue import Empty, Queue
 
@@ -183,6 +184,17 @@ def test_several_workers_serve_and_stop(repository, surrogate):
         assert server.ask("GET", "/v1/table", headers={"X-API-Key": "k3y"})[0] == 200
         assert server.stop() == 0
     assert all(json.loads(line) for line in server.lines)
+
+
+def test_batches_at_once_are_all_answered(repository, surrogate, case):
+    # The layer that numba falls back on without OpenMP ends the process when two threads use it at once.
+    body = json.dumps([{**case, "v0": 1e-4 * index} for index in range(2000)])
+    with serving(repository, surrogate.path, NUMBA_THREADING_LAYER="workqueue") as server:
+        with ThreadPoolExecutor(8) as pool:
+            answers = list(pool.map(lambda _: server.ask("POST", "/v1/mu-macro/batch", body), range(60)))
+        assert {status for status, _, _ in answers} == {200}
+        assert len({body for _, _, body in answers}) == 1
+        assert server.stop() == 0
 
 
 def test_a_damaged_table_starts_alive_and_not_ready(repository, tmp_path):
