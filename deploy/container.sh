@@ -189,13 +189,32 @@ if inside python -c 'import builder' 2>/dev/null; then fail "the solver is in th
 if inside python -c 'import pip' 2>/dev/null; then fail "pip is in the image's environment"; fi
 say "ok  no solver, no pip"
 
-# Every kernel must come from the image: a miss could not be saved, and would stop the process with an error.
-loaded=$("$engine" exec --env NUMBA_DEBUG_CACHE=1 "$container" python -c "
+# Every kernel must come from the image, for whatever mix of numbers and columns a caller sends.
+batch() {  # JSON -> fails unless the status is 200
+    python3 - "$port" "$1" <<'PYTHON'
+import http.client, sys
+
+connection = http.client.HTTPConnection("127.0.0.1", int(sys.argv[1]), timeout=60)
+connection.request("POST", "/v1/mu-macro/batch", sys.argv[2], {"Content-Type": "application/json"})
+reply = connection.getresponse()
+body = reply.read().decode()
+if reply.status != 200:
+    sys.exit(body)
+PYTHON
+}
+case='"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5'
+batch "{$case, \"v0\": [0.01]}" && batch "{$case, \"v0\": [0.01, 0.1, 1.0]}" && batch "[{$case, \"v0\": 0.01}, {$case, \"v0\": 0}]" \
+    && batch '{"mu0": [0.3, 0.2], "Fz": [10, 9], "k": [1e6, 2e6], "y0": [2e-6, 0], "omega": [1e5, 2e5], "v0": [0.01, 0.1]}' \
+    || fail "a batch was refused"
+loads=$("$engine" exec --env NUMBA_DEBUG_CACHE=1 "$container" python -c "
 from pathlib import Path
 from friction import Surrogate
-[Surrogate.open(table).warm_up() for table in sorted(Path('tables').glob('*.nc'))]" | grep -c 'data loaded' || true)
-((loaded > 0)) || fail "no kernel was loaded from the image's cache"
-say "ok  $loaded kernels loaded from the image, none compiled"
+[Surrogate.open(table).warm_up() for table in sorted(Path('tables').glob('*.nc'))]" 2>&1)
+if late=$({ "$engine" logs "$container" 2>&1; echo "$loads"; } | grep 'compiled while serving'); then
+    fail "not every kernel is in the image: $late"
+fi
+loaded=$(grep -c 'data loaded' <<<"$loads") || fail "no kernel was loaded from the image's cache"
+say "ok  $loaded kernels loaded from the image, none compiled while serving"
 
 memory=$(inside python -c '
 import os, pathlib
@@ -203,7 +222,7 @@ own = str(os.getpid())
 pages = [p.read_text() for p in pathlib.Path("/proc").glob("[0-9]*/status") if p.parent.name != own]
 print(sum(int(line.split()[1]) for text in pages for line in text.splitlines() if line.startswith("VmRSS")) // 1024)')
 
-"$engine" stop --time 30 "$container" >/dev/null
+"$engine" stop --time 30 "$container" >"$work/stop.log" 2>&1 || { cat "$work/stop.log" >&2; fail "it does not stop"; }
 code=$("$engine" inspect --format '{{.State.ExitCode}}' "$container")
 [[ $code == 0 ]] || { "$engine" logs --tail 20 "$container" >&2; fail "SIGTERM ended it with exit code $code"; }
 say "ok  SIGTERM stops it with exit code 0"
