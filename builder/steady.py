@@ -40,7 +40,9 @@ ADVICE = {
 }
 
 BORDER_SLOPE = 0.4765728  # v~crit / sqrt(y~) for y~ -> infinity
-BELOW_LINEAR = 1e-15  # of v~ at SMALLEST_Y, 2,000 times the border: below it 1 - mu~ no longer depends on v~ beyond v~^2
+BELOW_LINEAR = (
+    1e-15  # of v~ at SMALLEST_Y, 2,000 times the border: below it 1 - mu~ no longer depends on v~ beyond v~^2
+)
 SMALLEST_Y = 1e-9  # below, 1 - mu~ = y~^2 h(v~/y~^2) holds to rounding and the problem is solved at this amplitude
 
 
@@ -425,7 +427,9 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
 
 
 @njit(cache=True, error_model="numpy")
-def solve_raw(v: float, y: float, eta: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray, res: np.ndarray) -> int:
+def solve_raw(
+    v: float, y: float, eta: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray, res: np.ndarray
+) -> int:
     """Steady state; ``res`` (8,) receives mu~, 1 - mu~, regime, stick fraction, oscillation power <y~ cos tau u_y>,
     mean slip path per radian <lam>, smallest lam of the continuous orbit (NaN if not followed), error estimate."""
     res[:] = math.nan

@@ -1,0 +1,137 @@
+"""``python -m builder``: build, verify and query tables offline."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from builder.assemble import MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
+from builder.steady import solve as solve_one
+from builder.sweep import SolveError, Sweep
+from builder.verify import verify as verify_table
+from friction import MumacroError, Surrogate
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
+
+
+def _fail(message: str, code: int = 1) -> typer.Exit:
+    print(f"error: {message}", file=sys.stderr)
+    return typer.Exit(code)
+
+
+def _number(name: str, value: float, low: float, high: float, bound: str) -> float:
+    if not low < value < high:
+        raise typer.BadParameter(f"must be {bound}, got {value!r}", param_hint=name)
+    return value
+
+
+def _json(value: object) -> str:
+    """JSON without NaN: what is not defined is null."""
+
+    def clean(item: Any) -> Any:
+        if isinstance(item, dict):
+            return {key: clean(entry) for key, entry in item.items()}
+        return None if isinstance(item, float) and not math.isfinite(item) else item
+
+    return json.dumps(clean(value), indent=2)
+
+
+@app.command()
+def build(
+    out: Annotated[Path, typer.Option(help="The netCDF file to write.")],
+    tolerance: Annotated[
+        float, typer.Option(help="Largest absolute error of mu_macro/mu0; the relative one may be 10 times it.")
+    ] = 1e-8,
+    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = os.cpu_count() or 1,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler, tcp://host:port.")] = None,
+) -> None:
+    """Build a table; a killed build resumes from OUT.checkpoint and gives the same data."""
+    if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
+        raise typer.BadParameter(
+            f"must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}", param_hint="--tolerance"
+        )
+    if not out.parent.is_dir():
+        raise typer.BadParameter(f"folder {str(out.parent)!r} does not exist", param_hint="--out")
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:<32}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    try:
+        with (
+            Sweep(workers, scheduler, out.with_name(out.name + ".checkpoint")) as sweep,
+            Progress(*columns, console=console) as bar,
+        ):
+            task = bar.add_task("border", total=stages())
+
+            def progress(text: str, done: bool) -> None:
+                bar.update(task, description=text, advance=1 if done else 0)
+
+            surrogate = build_table(out, tolerance, sweep, progress)
+            solves = sweep.n_solves
+    except ImportError as error:
+        raise _fail(f"--scheduler needs the extra 'dask': {error}", 2) from error
+    except (MumacroError, BuildError, SolveError, OSError) as error:
+        raise _fail(str(error)) from error
+    print(
+        _json(
+            {
+                "table": str(out),
+                "tolerance": tolerance,
+                "verified_max_abs_error": surrogate.max_abs_error,
+                "verified_max_rel_error": surrogate.max_rel_error,
+                "n_solves": solves,
+                "bytes": out.stat().st_size,
+                "content_sha256": surrogate.checksum,
+            }
+        )
+    )
+
+
+@app.command()
+def solve(
+    v: Annotated[float, typer.Option("--v", help="Dimensionless speed v~, > 0.")],
+    y: Annotated[float, typer.Option("--y", help="Dimensionless amplitude y~, > 0.")],
+) -> None:
+    """Solve the full model once and print the steady cycle as JSON."""
+    for name, value in (("--v", v), ("--y", y)):
+        _number(name, value, 0.0, math.inf, "finite and > 0")
+    steady = solve_one(v, y)
+    print(_json({"v_tilde": v, "y_tilde": y, **asdict(steady)}))
+    if not steady.ok:
+        raise typer.Exit(1)
+
+
+@app.command()
+def verify(
+    table: Annotated[Path, typer.Argument(help="A table file.")],
+    points: Annotated[int, typer.Option(min=100, max=10_000_000, help="Fresh solves to compare with.")] = 20_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the drawn points.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = os.cpu_count() or 1,
+) -> None:
+    """Compare a table with fresh solves; exit code 1 when it misses its own tolerance."""
+    try:
+        surrogate = Surrogate.open(table)
+        with Sweep(workers) as sweep:
+            report = verify_table(surrogate, sweep, points, seed)
+    except (MumacroError, SolveError, OSError) as error:
+        raise _fail(str(error)) from error
+    report["tolerance"] = surrogate.tolerance
+    report["holds"] = (
+        report["max_abs_error"] <= surrogate.tolerance
+        and report["max_rel_error"] <= 10.0 * surrogate.tolerance
+        and report["not_covered"] == 0
+    )
+    print(_json(report))
+    if not report["holds"]:
+        raise _fail(f"{table} misses its tolerance of {surrogate.tolerance:g}")
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,178 @@
+"""Nodes to solved values: in parallel, resumable, on this machine or on a Dask cluster.
+
+Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not depend on how many
+workers there are or on whether a build was interrupted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from builder import steady
+from builder.model import OK, ORDER
+
+__all__ = ["COLUMNS", "SolveError", "Sweep"]
+
+Array = NDArray[np.float64]
+CHUNK = 128  # points; about 10 ms of work
+COLUMNS = ("mu_ratio", "deficit", "stick_fraction", "power", "error_estimate", "status")
+
+
+class SolveError(ArithmeticError):
+    """A node could not be solved; the message says which and what to do."""
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _full(v: Array, y: Array, eta: Array, out: Array) -> None:
+    w, orbit_out, orbit, res = np.zeros((8, ORDER + 2)), np.zeros(11), np.zeros(6), np.zeros(8)
+    for i in range(v.size):
+        status = steady.solve_raw(v[i], y[i], eta[i], w, orbit_out, orbit, res)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4] = res[0], res[1], res[3], res[4], res[7]
+        out[i, 5] = status
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _continuous(v: Array, y: Array, eta: Array, out: Array) -> None:
+    """The continuous orbit whether or not lam stays positive: it is analytic across the border."""
+    w, orbit_out = np.zeros((8, ORDER + 2)), np.zeros(11)
+    for i in range(v.size):
+        status = steady.continuous(v[i], y[i], w, orbit_out)
+        mu, deficit = orbit_out[4] / np.pi, orbit_out[5] / np.pi
+        out[i, 0] = 1.0 - deficit if deficit < 0.5 else mu
+        out[i, 1] = deficit if deficit < 0.5 else 1.0 - mu
+        out[i, 2], out[i, 3], out[i, 4] = 0.0, orbit_out[7] / np.pi, 4e-16
+        out[i, 5] = status
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _border(v: Array, y: Array, eta: Array, out: Array) -> None:
+    w, orbit_out = np.zeros((8, ORDER + 2)), np.zeros(11)
+    for i in range(v.size):
+        crit, mu, status = steady.border_raw(y[i], w, orbit_out)
+        out[i, 0], out[i, 1] = mu, crit
+        out[i, 2], out[i, 3], out[i, 4] = 0.0, 0.0, 4e-16
+        out[i, 5] = status
+
+
+_KINDS: dict[str, Callable[[Array, Array, Array, Array], None]] = {
+    "full": _full,
+    "continuous": _continuous,
+    "border": _border,
+}
+
+
+def solve_chunk(kind: str, points: Array) -> Array:
+    """Solve ``points`` (n, 3) of v~, y~, y~ - 1; rows of :data:`COLUMNS` (for kind "border" v~crit is column 1)."""
+    out = np.empty((points.shape[0], len(COLUMNS)))
+    v, y, eta = (np.ascontiguousarray(points[:, i]) for i in range(3))
+    _KINDS[kind](v, y, eta, out)
+    return out
+
+
+class Sweep:
+    """Solves arrays of points and counts them.
+
+    Parameters
+    ----------
+    workers : int
+        Threads on this machine (the solver releases the interpreter lock).
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://host:port``; replaces the threads.  Needs the extra ``dask``.
+    checkpoint : Path, optional
+        Folder that keeps finished sweeps; a later build with the same nodes reads them instead of solving again.
+    """
+
+    def __init__(self, workers: int = 1, scheduler: str | None = None, checkpoint: Path | None = None) -> None:
+        self.n_solves = 0
+        self.checkpoint = checkpoint
+        self._client: Any = None
+        self._pool: ThreadPoolExecutor | None = None
+        if scheduler is None:
+            self._pool = ThreadPoolExecutor(max_workers=workers)
+        else:
+            from distributed import Client
+
+            self._client = Client(scheduler, timeout="10s")
+
+    def __enter__(self) -> Sweep:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+        if self._client is not None:
+            self._client.close()
+
+    def solve(self, kind: str, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
+        """Solve at every (v~, y~); returns arrays of the broadcast shape by name of :data:`COLUMNS`.
+
+        ``eta`` = y~ - 1 may be given where it is known better than ``y``.
+
+        Raises
+        ------
+        SolveError
+            When any point fails: a table with a hole would be worse than no table.
+        """
+        v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        eta = y - 1.0 if eta is None else np.broadcast_to(eta, y.shape)
+        points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
+        out = self._load(kind, points)
+        if out is None:
+            out = self._run(kind, points)
+            self._save(kind, points, out)
+        self.n_solves += points.shape[0]
+        failed = np.flatnonzero(out[:, 5] != OK)
+        if failed.size:
+            i = failed[0]
+            raise SolveError(
+                f"{failed.size} of {points.shape[0]} points failed, first v~={points[i, 0]!r}, y~={points[i, 1]!r}: "
+                + steady.ADVICE[int(out[i, 5])]
+            )
+        return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
+
+    def _run(self, kind: str, points: Array) -> Array:
+        chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
+        if self._client is not None:
+            done = self._client.gather(self._client.map(lambda c: solve_chunk(kind, c), chunks, pure=False))
+        else:
+            assert self._pool is not None  # noqa: S101 (one of the two is always there)
+            done = list(self._pool.map(lambda c: solve_chunk(kind, c), chunks))
+        return np.concatenate(done)
+
+    def _file(self, kind: str, points: Array) -> Path | None:
+        if self.checkpoint is None:
+            return None
+        digest = hashlib.sha256(kind.encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()).hexdigest()
+        return self.checkpoint / f"{kind}-{digest[:32]}.npy"
+
+    def _load(self, kind: str, points: Array) -> Array | None:
+        file = self._file(kind, points)
+        if file is None or not file.exists():
+            return None
+        try:
+            out: Array = np.load(file, allow_pickle=False)
+        except (OSError, ValueError, EOFError):
+            return None  # a damaged checkpoint is solved again
+        return out if out.shape == (points.shape[0], len(COLUMNS)) else None
+
+    def _save(self, kind: str, points: Array, out: Array) -> None:
+        file = self._file(kind, points)
+        if file is None:
+            return
+        file.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=file.parent, suffix=".tmp")
+        with os.fdopen(handle, "wb") as stream:
+            np.save(stream, out)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(name, file)

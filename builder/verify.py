@@ -1,0 +1,224 @@
+"""The table against fresh solves: error off the nodes, coverage of the error bound, seams, monotony."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from builder.blocks import points_of, slope_of
+from builder.sweep import Sweep
+from friction import Surrogate
+from friction.regions import (
+    BLOCKS,
+    L_MAX,
+    S_CUT,
+    SOURCES,
+    Y_CONT,
+    Y_HIGH,
+    Y_MID_C,
+    Y_MID_S,
+    Y_STICK_HI,
+    Y_STICK_LO,
+    Y_TAIL,
+)  # fmt: skip
+
+__all__ = ["CASES", "block_errors", "draw", "monotony", "seam_jumps", "verify"]
+
+Array = NDArray[np.float64]
+#: what a fresh solve itself may be wrong by, relative to mu~: rounding, and the input's last digit next to the corner
+SOLVER_NOISE = 2e-14
+SEAMS = (Y_CONT, Y_MID_C, Y_MID_S, Y_HIGH, Y_TAIL, Y_STICK_LO, Y_STICK_HI)
+
+
+def _log(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
+    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
+
+
+def _random(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
+    return _log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n)
+
+
+def _wide(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
+    return _log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e6, n)
+
+
+def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
+    y = _log(rng, 1e-4, 1e6, n)
+    return s.v_tilde_crit(y) * (1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 0.1, n)), y
+
+
+def _corner(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
+    radius, psi = _log(rng, 1e-6, 1.3, n), rng.uniform(0.0, 0.5 * math.pi, n)
+    phi, s0 = radius * np.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * np.cos(psi)
+    return phi * s0 * s0 / (2.0 * math.pi), 1.0 + 0.25 * s0 * s0 - 0.5 * phi * phi
+
+
+def _creep(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
+    return _log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n)
+
+
+def _seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
+    """Beside the lines where two blocks or a block and a tail meet."""
+    y, v = _log(rng, 1e-3, 1e6, n), _log(rng, 1e-6, 1e4, n)
+    off = 1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 1e-3, n)
+    which = rng.integers(0, 4, n)
+    y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
+    cut = which == 2
+    y[cut] = rng.uniform(Y_STICK_LO, Y_STICK_HI, int(cut.sum()))
+    v[cut] = s.v_tilde_crit(y[cut]) * np.sin(0.5 * math.pi * S_CUT) ** 2 * off[cut]
+    fast = which == 3
+    y[fast] = _log(rng, Y_CONT, 1e6, int(fast.sum()))
+    v[fast] = math.exp(L_MAX) * np.sqrt(y[fast]) * off[fast]
+    return v, y
+
+
+def _tails(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
+    """Both tails: large amplitude at every speed, large speed at every amplitude, small amplitude."""
+    which = rng.integers(0, 3, n)
+    v, y = _log(rng, 1e-6, 1e8, n), _log(rng, 1e5, 1e7, n)
+    v = np.where(which == 1, _log(rng, 1e3, 1e8, n), v)
+    y = np.where(which == 1, _log(rng, 1e-3, 1e8, n), y)
+    # stick-slip above 1e7 is beyond what a fresh solve resolves: its layers are narrower than 1e-3.5 of a radian
+    y = np.where((which == 1) & (v < 0.5 * np.sqrt(y)), np.minimum(y, 1e7), y)
+    return v, np.where(which == 2, _log(rng, 1e-9, 1e-3, n), y)
+
+
+#: name of the kind of case, share of the points, how they are drawn
+CASES: tuple[tuple[str, float, Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]], ...] = (
+    ("random", 0.30, _random),
+    ("wide", 0.20, _wide),
+    ("border", 0.12, _border),
+    ("corner", 0.12, _corner),
+    ("seams", 0.10, _seams),
+    ("creep", 0.08, _creep),
+    ("tails", 0.08, _tails),
+)
+
+
+def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
+    """``n`` points (v~, y~) of one kind of :data:`CASES`."""
+    for name, _, how in CASES:
+        if name == case:
+            return how(np.random.default_rng(seed), n, surrogate)
+    raise ValueError(f"case must be one of {', '.join(name for name, _, _ in CASES)}, got {case!r}")
+
+
+def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[tuple[float, float, float]]:
+    """Largest error of the tabulated quantity, of mu~, and relative error of mu~, block by block, on ``n`` points each.
+
+    Points crowd towards the edges of the block, where polynomials err most; those which the dispatch sends to a
+    neighbour are left out.
+    """
+    found = []
+    for index, spec in enumerate(BLOCKS):
+        rng = np.random.default_rng([seed, index])
+        a = _crowded(rng, spec.a, n, radial=spec.a_name == "radius")
+        b = _crowded(rng, spec.b, n, radial=False)
+        p = points_of(spec, a, b, surrogate.border)
+        mu, _, source = surrogate.ratio_with_bound(p.v, p.y)
+        keep = source == index
+        v, y, eta = p.v[keep], p.y[keep], p.y[keep] - 1.0
+        truth = sweep.solve("full", v, y, eta)["mu_ratio"]
+        kept = type(p)(v, y, eta)
+        error = np.abs(mu[keep] - truth)
+        # a solve's own rounding is not the table's error
+        quantity = np.maximum(error - SOLVER_NOISE * truth, 0.0) / slope_of(spec, kept)
+        found.append((float(quantity.max()), float(error.max()), float((error / truth).max())))
+    return found
+
+
+def _crowded(rng: np.random.Generator, span: tuple[float, float], n: int, radial: bool) -> Array:
+    low, high = span
+    if radial:
+        half = n // 2
+        return np.concatenate([10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)])
+    t = rng.beta(0.5, 0.5, n)
+    edge = 10.0 ** rng.uniform(-6.0, -1.0, n // 4)
+    t[: edge.size] = np.where(rng.random(edge.size) < 0.5, edge, 1.0 - edge)
+    return low + (high - low) * np.clip(t, 1e-7, 1.0 - 1e-7)
+
+
+def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
+    """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 1e-13 apart."""
+    rng = np.random.default_rng(seed)
+    worst = 0.0
+    for seam in SEAMS:
+        v = _log(rng, 1e-9, 1e5, n)
+        worst = max(worst, _jump(surrogate, v, v, np.full(n, seam * (1 - 1e-13)), np.full(n, seam * (1 + 1e-13))))
+    y = _log(rng, 1e-3, 1e7, n)
+    edges = [(surrogate.v_tilde_crit(y), y)]
+    y = rng.uniform(Y_STICK_LO, Y_STICK_HI, n)
+    edges.append((surrogate.v_tilde_crit(y) * math.sin(0.5 * math.pi * S_CUT) ** 2, y))
+    y = _log(rng, Y_CONT, 1e8, n)
+    edges.append((math.exp(L_MAX) * np.sqrt(y), y))
+    for v, y in edges:
+        worst = max(worst, _jump(surrogate, v * (1 - 1e-13), v * (1 + 1e-13), y, y))
+    return worst
+
+
+def _jump(s: Surrogate, v1: Array, v2: Array, y1: Array, y2: Array) -> float:
+    one, two = s.mu_ratio(v1, y1), s.mu_ratio(v2, y2)
+    return float((np.abs(one - two) / np.maximum(one, two)).max())
+
+
+def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11) -> float:
+    """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across all seams [-]."""
+    rng = np.random.default_rng(seed)
+    worst = 0.0
+    rise = np.geomspace(1e-9, 1e7, n)
+    for fixed in _log(rng, 1e-4, 1e6, lines):
+        worst = max(worst, float(-np.diff(surrogate.mu_ratio(rise, fixed)).min()))
+        worst = max(worst, float(np.diff(surrogate.mu_ratio(fixed, rise)).max()))
+    return max(worst, 0.0)
+
+
+def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
+    """Compare the table with ``points`` fresh solves drawn as :data:`CASES` say.
+
+    Returns
+    -------
+    dict
+        ``points``, ``max_abs_error``, ``max_rel_error``, ``not_covered`` (answers whose error exceeds their bound),
+        ``cases`` and ``sources`` (the same, by kind of case and by block or tail), ``seam_jump``, ``monotony``.
+    """
+    report: dict[str, Any] = {"points": 0, "max_abs_error": 0.0, "max_rel_error": 0.0, "not_covered": 0}
+    cases: dict[str, dict[str, Any]] = {}
+    by_source: dict[str, list[tuple[Array, Array, Array]]] = {}
+    for i, (name, share, how) in enumerate(CASES):
+        n = max(1, math.ceil(share * points))
+        v, y = how(np.random.default_rng([seed, i]), n, surrogate)
+        keep = (v > 0.0) & (y > 0.0)
+        v, y = v[keep], y[keep]
+        mu, bound, source = surrogate.ratio_with_bound(v, y)
+        truth = sweep.solve("full", v, y)["mu_ratio"]
+        error = np.abs(mu - truth)
+        relative = error / truth
+        missed = int(np.count_nonzero(error > bound + SOLVER_NOISE * truth))
+        cases[name] = {
+            "points": int(v.size), "max_abs_error": float(error.max()), "max_rel_error": float(relative.max()),
+            "not_covered": missed,
+        }  # fmt: skip
+        report["points"] += int(v.size)
+        report["not_covered"] += missed
+        for key in ("max_abs_error", "max_rel_error"):
+            report[key] = max(report[key], cases[name][key])
+        for code in np.unique(source):
+            at = source == code
+            by_source.setdefault(SOURCES[code], []).append((error[at], relative[at], bound[at]))
+    report["cases"] = cases
+    report["sources"] = {
+        name: {
+            "points": int(sum(e.size for e, _, _ in parts)),
+            "max_abs_error": float(max(e.max() for e, _, _ in parts)),
+            "max_rel_error": float(max(r.max() for _, r, _ in parts)),
+            "max_bound": float(max(b.max() for _, _, b in parts)),
+        }
+        for name, parts in sorted(by_source.items())
+    }
+    report["seam_jump"] = seam_jumps(surrogate)
+    report["monotony"] = monotony(surrogate)
+    return report

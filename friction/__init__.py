@@ -1,0 +1,6 @@
+"""What builder and service agree on: dimensionless groups, tails, the border, the table file, the surrogate."""
+
+from friction.errors import InputError, MumacroError, TableError
+from friction.surrogate import Answer, Surrogate
+
+__all__ = ["Answer", "InputError", "MumacroError", "Surrogate", "TableError"]

@@ -1,0 +1,177 @@
+"""Dimensional inputs: what is legal, the dimensionless groups, and products that would overflow.
+
+y~ = y0 k / (mu0 Fz), v~ = v0 k / (mu0 Fz omega), l0 = mu0 Fz / k (eq. (5)); SI units throughout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from friction.errors import InputError
+from friction.kernels import NO_OSCILLATION, ROUNDING, STATIC_LIMIT, outer_expansion, ratio
+from friction.regions import RIGID
+
+__all__ = ["BOUNDS", "FIELDS", "POSITIVE", "UNITS", "Fault", "check_inputs", "evaluate_array", "find_faults", "groups"]
+
+FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
+UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
+POSITIVE = ("mu0", "Fz", "k")
+BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in FIELDS}
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One bad value of a batch: where, which field, what was given, why it is refused."""
+
+    index: int
+    field: str
+    value: float
+    reason: str
+
+
+def _bad(name: str, values: Array) -> NDArray[np.bool_]:
+    legal = np.isfinite(values) & ((values > 0.0) if name in POSITIVE else (values >= 0.0))
+    out: NDArray[np.bool_] = ~legal
+    return out
+
+
+def find_faults(columns: Mapping[str, ArrayLike]) -> list[Fault]:
+    """Every bad case of a batch, one fault (its first bad field) a case, in order.
+
+    ``columns`` maps field names to scalars or arrays that broadcast together; a missing ``k`` means rigid contact.
+    """
+    names = [name for name in FIELDS if columns.get(name) is not None]
+    arrays = dict(
+        zip(names, np.broadcast_arrays(*(np.asarray(columns[n], dtype=np.float64) for n in names)), strict=True)
+    )
+    first: dict[int, Fault] = {}
+    for name in names:
+        values = arrays[name].ravel()
+        for i in np.flatnonzero(_bad(name, values)):
+            first.setdefault(int(i), Fault(int(i), name, float(values[i]), f"must be {BOUNDS[name]}"))
+    return [first[i] for i in sorted(first)]
+
+
+def check_inputs(columns: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    """The columns as broadcast, flat float64 arrays.
+
+    Raises
+    ------
+    InputError
+        At the first value out of bounds, naming field, value, bound and index; or when a value is no number.
+    """
+    converted: dict[str, Array] = {}
+    for name in FIELDS:
+        value = columns.get(name)
+        if value is None:
+            continue
+        try:
+            converted[name] = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InputError(name, value, "a real number or an array of them") from error
+        bad = _bad(name, converted[name])
+        if bad.any():
+            i = int(np.flatnonzero(bad.ravel())[0])
+            where = i if converted[name].ndim else None
+            raise InputError(name, float(converted[name].ravel()[i]), BOUNDS[name], where)
+    return converted
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _scaled(a: float, b: float, c: float, d: float, e: float) -> float:
+    """a b / (c d e) for finite positive numbers whose partial products may overflow or underflow."""
+    ma, ea = math.frexp(a)
+    mb, eb = math.frexp(b)
+    mc, ec = math.frexp(c)
+    md, ed = math.frexp(d)
+    me, ee = math.frexp(e)
+    return math.ldexp(ma * mb / (mc * md * me), ea + eb - ec - ed - ee)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float, float]:
+    """(v~, y~, r): the two dimensionless groups and r = y~/v~ = y0 omega/v0 [-]; 0 and inf where they leave double range.
+
+    ``y0``, ``omega``, ``v0`` must be > 0.
+    """
+    d = mu0 * Fz
+    y = y0 * k / d
+    v = v0 * k / (d * omega)
+    r = y0 * omega / v0
+    # the plain products are right unless one of them came near the ends of the double range
+    if not (1e-290 < d < 1e290 and 1e-290 < y0 * k < 1e290 and 1e-290 < v0 * k < 1e290 and 1e-290 < d * omega < 1e290):
+        y = _scaled(y0, k, mu0, Fz, 1.0)
+        v = _scaled(v0, k, mu0, Fz, omega)
+    if not 1e-290 < y0 * omega < 1e290:
+        r = _scaled(y0, omega, v0, 1.0, 1.0)
+    return v, y, r
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def dimensional(
+    mu0: float,
+    Fz: float,
+    k: float,
+    y0: float,
+    omega: float,
+    v0: float,
+    coef: Array,
+    meta: Array,
+    bcoef: Array,
+    bmeta: Array,
+) -> tuple[float, float, int, float, float]:
+    """(mu~, bound, source, v~, y~) of one legal case; k = inf is rigid contact, eq. (37)."""
+    if y0 == 0.0 or omega == 0.0:
+        y = 0.0 if y0 == 0.0 else (math.inf if k == math.inf else _scaled(y0, k, mu0, Fz, 1.0))
+        return 1.0, 0.0, NO_OSCILLATION, math.inf if v0 > 0.0 else 0.0, y
+    if k == math.inf:
+        if v0 == 0.0:
+            return 0.0, 0.0, STATIC_LIMIT, 0.0, math.inf
+        r = y0 * omega / v0
+        if not 1e-290 < y0 * omega < 1e290:
+            r = _scaled(y0, omega, v0, 1.0, 1.0)
+        mu, _ = outer_expansion(r)
+        return mu, ROUNDING * mu, RIGID, math.inf, math.inf
+    if v0 == 0.0:
+        y = _scaled(y0, k, mu0, Fz, 1.0)
+        mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
+        return mu, bound, source, 0.0, y
+    v, y, r = groups(mu0, Fz, k, y0, omega, v0)
+    if 0.0 < y < math.inf and 0.0 < v < math.inf:
+        mu, bound, source = ratio(v, y, coef, meta, bcoef, bmeta)
+        return mu, bound, source, v, y
+    if y == 0.0 or r == 0.0:
+        return 1.0, ROUNDING, NO_OSCILLATION if y == 0.0 else RIGID, v, y
+    if v == 0.0:
+        # v~ below 5e-324: the static limit holds to rounding, mu~ itself underflows for y~ > 1
+        mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
+        return mu, bound, source, v, y
+    # y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large
+    mu, _ = outer_expansion(r)
+    bound = ROUNDING * mu
+    if v < 1e150:
+        bound += mu
+    return mu, bound, RIGID, v, y
+
+
+@njit(cache=True, error_model="numpy", nogil=True, parallel=True)
+def evaluate_array(
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+    mu: Array, bound: Array, source: NDArray[np.int8], v: Array, y: Array,
+) -> None:  # fmt: skip
+    """Fill mu~, its bound, source, v~, y~ (n,) from six legal columns (n,); columns of stride 0 broadcast."""
+    for i in prange(mu.size):
+        a, b, c, d, e = dimensional(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], coef, meta, bcoef, bmeta)
+        mu[i] = a
+        bound[i] = b
+        source[i] = c
+        v[i] = d
+        y[i] = e

@@ -1,0 +1,290 @@
+"""The table file: netCDF-4 with CF-1.11 conventions; written atomically, read with suspicion.
+
+Layout (all quantities dimensionless, units "1"):
+
+* root: the plain log-spaced grid a person plots first, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
+  ``error_estimate`` and ``v_tilde_crit(y_tilde)``, and the provenance as attributes;
+* group ``border``: one sub-group a piece of v~crit (:data:`friction.regions.BORDER_PIECES`);
+* group ``blocks``: one sub-group a block (:data:`friction.regions.BLOCKS`): node coordinates, node values, the
+  coordinate map by name, the number of cells for evaluation, the verified error.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from friction import regions
+from friction.errors import TableError
+
+__all__ = ["FORMAT_VERSION", "Block", "BorderPiece", "Table", "read_table", "write_table"]
+
+FORMAT_VERSION = 1
+Array = NDArray[np.float64]
+
+_LONG = {
+    "mu_ratio": "macroscopic friction coefficient over Coulomb friction coefficient, mu_macro/mu0",
+    "stick_fraction": "share of the period during which the contact sticks",
+    "error_estimate": "estimated absolute error of mu_ratio",
+    "v_tilde_crit": "border of continuous sliding: smallest dimensionless speed without stick",
+    "v_tilde": "dimensionless sliding speed, v0 k/(mu0 Fz omega)",
+    "y_tilde": "dimensionless oscillation amplitude, y0 k/(mu0 Fz)",
+}
+_COORDINATES = {
+    "y_squared": "square of the dimensionless amplitude",
+    "v_squared_share": "v_tilde^2/(1 + v_tilde^2)",
+    "ln_y": "natural logarithm of y_tilde",
+    "ln_kappa": "natural logarithm of v_tilde/sqrt(y_tilde)",
+    "inverse_y": "1/y_tilde",
+    "s": "s with v_tilde = v_tilde_crit sin^2(pi s/2)",
+    "y": "dimensionless amplitude y_tilde",
+    "radius": "distance R from the corner y_tilde = 1, v_tilde = 0 in normal-form coordinates",
+    "angle": "polar angle of the normal form, 2 psi/pi",
+}
+_QUANTITIES = {
+    "deficit_low": "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2",
+    "hypotenuse": "mu_ratio sqrt(1 + y_tilde^2/v_tilde^2)",
+    "layer": "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))",
+    "layer_log": "(mu_ratio - outer) y_tilde/v_tilde - (2/pi) ln(v_tilde/sqrt(y_tilde))",
+    "deficit": "(1 - mu_ratio)/y_tilde^2",
+    "mu_ratio": "mu_ratio",
+    "normal_form": "mu_ratio/phi, phi^3 + 2 (y_tilde - 1) phi = pi v_tilde",
+    "slope": "mu_ratio y_tilde/v_tilde",
+}
+
+
+@dataclass
+class BorderPiece:
+    """One piece of v~crit: Chebyshev ``nodes`` (n,) of its coordinate, ``values`` (n,), cells for evaluation."""
+
+    nodes: Array
+    values: Array
+    cells: int
+    max_rel_error: float = 0.0
+
+
+@dataclass
+class Block:
+    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), ``values`` (m, n), cells for evaluation, verified errors.
+
+    ``quantity_error`` bounds the error of the tabulated quantity; ``max_abs_error`` and ``max_rel_error`` are those of
+    mu~ over the block.
+    """
+
+    a: Array
+    b: Array
+    values: Array
+    cells: tuple[int, int]
+    quantity_error: float = 0.0
+    max_abs_error: float = 0.0
+    max_rel_error: float = 0.0
+
+
+@dataclass
+class Table:
+    """Everything that a table file holds."""
+
+    border: list[BorderPiece]
+    blocks: list[Block]
+    v_tilde: Array
+    y_tilde: Array
+    mu_ratio: Array
+    stick_fraction: Array
+    error_estimate: Array
+    v_tilde_crit: Array
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+def _digest(table: Table) -> str:
+    """SHA-256 over every number that takes part in an answer, and over the names and the tolerance they belong to."""
+    h = hashlib.sha256()
+    h.update(f"mumacro {FORMAT_VERSION} {float(table.attributes['tolerance'])!r}".encode())
+    for array in (
+        table.v_tilde, table.y_tilde, table.mu_ratio, table.stick_fraction, table.error_estimate, table.v_tilde_crit,
+    ):  # fmt: skip
+        h.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    for (name, *_), piece in zip(regions.BORDER_PIECES, table.border, strict=True):
+        h.update(f"{name} {piece.cells} {piece.max_rel_error!r}".encode())
+        h.update(np.ascontiguousarray(piece.nodes, dtype="<f8").tobytes())
+        h.update(np.ascontiguousarray(piece.values, dtype="<f8").tobytes())
+    for name, block in zip(regions.NAMES, table.blocks, strict=True):
+        errors = (block.quantity_error, block.max_abs_error, block.max_rel_error)
+        h.update(f"{name} {tuple(block.cells)} {errors!r}".encode())
+        for array in (block.a, block.b, block.values):
+            h.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return h.hexdigest()
+
+
+def _put(group: Any, name: str, dims: tuple[str, ...], data: Array, long_name: str, **attributes: object) -> None:
+    small = data.size <= 64  # a chunked, filtered variable costs more than it saves on a handful of numbers
+    extra = {} if small else {"zlib": True, "shuffle": True, "complevel": 9, "chunksizes": data.shape}
+    variable = group.createVariable(name, "f8", dims, fill_value=False, **extra)
+    variable.long_name = long_name
+    variable.units = "1"
+    for key, value in attributes.items():
+        variable.setncattr(key, value)
+    variable[...] = data
+
+
+def _fill(root: Any, table: Table) -> None:
+    for key, value in table.attributes.items():
+        root.setncattr(key, value)
+    for name, values in (("v_tilde", table.v_tilde), ("y_tilde", table.y_tilde)):
+        root.createDimension(name, values.size)
+        _put(root, name, (name,), values, _LONG[name])
+    plane = ("v_tilde", "y_tilde")
+    _put(root, "mu_ratio", plane, table.mu_ratio, _LONG["mu_ratio"], ancillary_variables="error_estimate")
+    _put(root, "stick_fraction", plane, table.stick_fraction, _LONG["stick_fraction"])
+    _put(root, "error_estimate", plane, table.error_estimate, _LONG["error_estimate"])
+    _put(root, "v_tilde_crit", ("y_tilde",), table.v_tilde_crit, _LONG["v_tilde_crit"])
+    border = root.createGroup("border")
+    for (name, coordinate, span, quantity), piece in zip(regions.BORDER_PIECES, table.border, strict=True):
+        group = border.createGroup(name)
+        group.createDimension(coordinate, piece.nodes.size)
+        _put(group, coordinate, (coordinate,), piece.nodes, _COORDINATES[coordinate])
+        _put(group, "value", (coordinate,), piece.values, quantity)
+        group.setncatts({"range": np.array(span), "cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error})
+    blocks = root.createGroup("blocks")
+    for spec, block in zip(regions.BLOCKS, table.blocks, strict=True):
+        group = blocks.createGroup(spec.name)
+        for axis, values in ((spec.a_name, block.a), (spec.b_name, block.b)):
+            group.createDimension(axis, values.size)
+            _put(group, axis, (axis,), values, _COORDINATES[axis])
+        _put(group, "value", (spec.a_name, spec.b_name), block.values, _QUANTITIES[spec.quantity])
+        group.setncatts(
+            {
+                "regime": regions.REGIMES[spec.regime],
+                "quantity": spec.quantity,
+                "a_range": np.array(spec.a),
+                "b_range": np.array(spec.b),
+                "cells": np.array(block.cells, dtype=np.int32),
+                "quantity_error": block.quantity_error,
+                "verified_max_abs_error": block.max_abs_error,
+                "verified_max_rel_error": block.max_rel_error,
+            }
+        )
+
+
+def write_table(table: Table, path: str | Path) -> str:
+    """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
+
+    Raises
+    ------
+    TableError
+        When the folder does not exist or cannot be written; nothing is left behind.
+    """
+    path = Path(path)
+    table.attributes["format_version"] = np.int32(FORMAT_VERSION)
+    table.attributes["content_sha256"] = _digest(table)
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".partial")
+    except OSError as error:
+        raise TableError(path, f"cannot write here: {error.strerror or error}") from error
+    os.close(handle)
+    try:
+        with netCDF4.Dataset(name, "w", format="NETCDF4") as root:
+            _fill(root, table)
+        with open(name, "rb+") as written:
+            os.fsync(written.fileno())
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except OSError as error:
+        raise TableError(path, f"cannot write: {error.strerror or error}") from error
+    finally:
+        Path(name).unlink(missing_ok=True)
+    return str(table.attributes["content_sha256"])
+
+
+def _group(parent: Any, name: str, path: Path) -> Any:
+    if name not in parent.groups:
+        raise TableError(path, f"group {name!r} is missing")
+    return parent.groups[name]
+
+
+def _array(group: Any, name: str, path: Path) -> Array:
+    if name not in group.variables:
+        raise TableError(path, f"variable {name!r} is missing in {group.path}")
+    variable = group.variables[name]
+    variable.set_auto_mask(False)
+    values: Array = np.ascontiguousarray(variable[...], dtype=np.float64)
+    if not np.all(np.isfinite(values)):
+        raise TableError(path, f"variable {name!r} in {group.path} holds non-finite values")
+    return values
+
+
+def _read(root: Any, path: Path) -> Table:
+    attributes = {key: root.getncattr(key) for key in root.ncattrs()}
+    if "format_version" not in attributes or "content_sha256" not in attributes or "tolerance" not in attributes:
+        raise TableError(path, "not a mumacro table: format_version, tolerance or content_sha256 is missing")
+    version = attributes["format_version"]
+    if int(version) != FORMAT_VERSION:
+        raise TableError(path, f"format version {version}, this program reads {FORMAT_VERSION}")
+    border_group, blocks_group = _group(root, "border", path), _group(root, "blocks", path)
+    border, blocks = [], []
+    for name, coordinate, _, _ in regions.BORDER_PIECES:
+        group = _group(border_group, name, path)
+        piece = BorderPiece(
+            _array(group, coordinate, path), _array(group, "value", path), int(group.cells), float(group.max_rel_error)
+        )
+        if piece.values.shape != piece.nodes.shape or piece.cells < 1:
+            raise TableError(path, f"{group.path}: shapes of nodes and values disagree")
+        border.append(piece)
+    for spec in regions.BLOCKS:
+        group = _group(blocks_group, spec.name, path)
+        block = Block(
+            _array(group, spec.a_name, path),
+            _array(group, spec.b_name, path),
+            _array(group, "value", path),
+            (int(group.cells[0]), int(group.cells[1])),
+            float(group.quantity_error),
+            float(group.verified_max_abs_error),
+            float(group.verified_max_rel_error),
+        )
+        if block.values.shape != (block.a.size, block.b.size) or min(block.cells) < 1:
+            raise TableError(path, f"{group.path}: shapes of nodes and values disagree")
+        blocks.append(block)
+    names = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
+    return Table(border, blocks, *(_array(root, name, path) for name in names), attributes)
+
+
+def read_table(path: str | Path) -> Table:
+    """Read and check a table file.
+
+    Raises
+    ------
+    TableError
+        Missing, truncated or foreign file, another format version, a missing group or variable, non-finite values, a
+        checksum that does not fit; the message names the file and the reason.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise TableError(path, "no such file")
+    try:
+        with netCDF4.Dataset(str(path), "r") as root:
+            table = _read(root, path)
+    except TableError:
+        raise
+    except (OSError, RuntimeError, ValueError, AttributeError, IndexError, TypeError, KeyError) as error:
+        raise TableError(path, f"not a readable netCDF-4 table ({error})") from error
+    if _digest(table) != table.attributes["content_sha256"]:
+        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
+    return table
+
+
+def json_attributes(table: Table) -> dict[str, object]:
+    """Root attributes as plain Python scalars and strings; ``builder_options`` parsed."""
+    out: dict[str, object] = {}
+    for key, value in table.attributes.items():
+        out[key] = value.item() if isinstance(value, np.generic) else value
+    if isinstance(out.get("builder_options"), str):
+        out["builder_options"] = json.loads(str(out["builder_options"]))
+    return out

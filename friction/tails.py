@@ -1,0 +1,79 @@
+"""Closed-form limits, each with its equation, range and order of error.  All dimensionless, arrays welcome."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from friction.kernels import normal_form_root, outer_expansion
+
+__all__ = [
+    "agm",
+    "border_large_amplitude",
+    "border_small_amplitude",
+    "corner_root",
+    "outer",
+    "second_order",
+    "small_amplitude",
+    "static_limit",
+]
+
+BORDER_CONSTANT = 4.402914  # lim y~ / v~crit^2; the paper rounds it to 4.5 in eq. (26)
+
+
+def agm(b: ArrayLike) -> Any:
+    """Arithmetic-geometric mean of 1 and ``b`` >= 1 [-], to rounding."""
+    g = np.asarray(b, dtype=np.float64)
+    a: Any = np.ones_like(g)
+    for _ in range(64):
+        if np.all(np.abs(a - g) <= 1e-8 * a):
+            break
+        a, g = 0.5 * (a + g), np.sqrt(a) * np.sqrt(g)
+    return 0.5 * (a + g)
+
+
+def outer(r: ArrayLike) -> Any:
+    """(2/pi) K(i r), r = y~/v~ [-]: rigid contact, eqs. (35), (37); the limit v~ -> infinity at fixed r."""
+    r = np.asarray(r, dtype=np.float64)
+    return 1.0 / agm(np.hypot(1.0, r))
+
+
+def second_order(r: ArrayLike) -> Any:
+    """Coefficient of 1/v~^2 at fixed r = y~/v~ [-], the first correction to eq. (35).
+
+    With D = 1 + r^2 cos^2 tau it is r^2 <sin^2 tau (1/2 - r^2 cos^2 tau) D^(-7/2)>, from the slow manifold of eq. (11)
+    to second order, reduced to complete elliptic integrals.  The error of (35) with this term is O(v~^-4).
+    Absolute accuracy is rounding; for r << 1 the value tends to r^2/4 and its relative accuracy is 1e-16/r^2.
+    """
+    return np.vectorize(lambda x: outer_expansion(x)[1], otypes=[np.float64])(r)
+
+
+def static_limit(y: ArrayLike) -> Any:
+    """mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eq. (16).  Error O(v~) for y~ != 1."""
+    y = np.asarray(y, dtype=np.float64)
+    inside = np.minimum(y, 1.0)
+    return np.sqrt((1.0 - inside) * (1.0 + inside))
+
+
+def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
+    """mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31).  Error O(y~^4)."""
+    v, y = np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    return 1.0 - y * y / (4.0 * (1.0 + v * v))
+
+
+def border_small_amplitude(y: ArrayLike) -> Any:
+    """v~crit for y~ -> 0 [-]: (y~^2 / 2)(1 - 5 y~^2 / 12).  Relative error O(y~^4)."""
+    y = np.asarray(y, dtype=np.float64)
+    return 0.5 * y * y * (1.0 - 5.0 / 12.0 * y * y)
+
+
+def border_large_amplitude(y: ArrayLike) -> Any:
+    """v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.  Relative error 0.07/y~."""
+    return np.sqrt(np.asarray(y, dtype=np.float64) / BORDER_CONSTANT)
+
+
+def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
+    """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).  eta = y~ - 1."""
+    return np.vectorize(normal_form_root, otypes=[np.float64])(v, eta)
