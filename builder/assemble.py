@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def stages() -> int:
     return 1 + len(BLOCKS) + 3
 
 
-def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, np.ndarray]:
+def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
     """The log-spaced grid that a person plots; finer for finer tables, nodes solved, not interpolated."""
     n = 31 if tolerance > 1e-5 else (61 if tolerance > 1e-9 else 121)
     v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)

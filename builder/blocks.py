@@ -75,7 +75,8 @@ def quantity_of(spec: BlockSpec, p: Points, mu: Array, deficit: Array) -> Array:
     if spec.quantity == "mu_ratio":
         return mu
     if spec.quantity == "normal_form":
-        return mu / tails.corner_root(p.v, p.eta)
+        corner: Array = mu / tails.corner_root(p.v, p.eta)
+        return corner
     r = p.y / p.v
     if spec.quantity == "slope":
         return mu * r

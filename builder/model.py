@@ -86,7 +86,7 @@ def series(v: float, y: float, sigma: float, x: float, chart: int, w: np.ndarray
 
 @njit(cache=True, error_model="numpy")
 def _value(p: np.ndarray, t: float) -> float:
-    r = p[ORDER]
+    r: float = p[ORDER]
     for k in range(ORDER - 1, -1, -1):
         r = r * t + p[k]
     return r
@@ -94,7 +94,7 @@ def _value(p: np.ndarray, t: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _slope(p: np.ndarray, t: float) -> float:
-    r = ORDER * p[ORDER]
+    r: float = ORDER * p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + k * p[k]
     return r
@@ -102,7 +102,7 @@ def _slope(p: np.ndarray, t: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _integral(p: np.ndarray, t: float) -> float:
-    r = p[ORDER] * _INV[ORDER + 1]
+    r: float = p[ORDER] * _INV[ORDER + 1]
     for k in range(ORDER - 1, -1, -1):
         r = r * t + p[k] * _INV[k + 1]
     return r * t
@@ -111,7 +111,7 @@ def _integral(p: np.ndarray, t: float) -> float:
 @njit(cache=True, error_model="numpy")
 def _increment(p: np.ndarray, t: float) -> float:
     """p(t) - p(0) without forming the difference."""
-    r = p[ORDER]
+    r: float = p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + p[k]
     return r * t

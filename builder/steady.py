@@ -31,7 +31,7 @@ BAD_INPUT = 11
 
 ADVICE = {
     OK: "solved",
-    NO_SLIP: "the stick phase never reaches the friction limit: v~ is too small for double precision here; use the limit v~ -> 0",
+    NO_SLIP: "the stick phase never reaches the friction limit: v~ is too small for doubles; use its limit 0",
     NO_STICK: "slip does not end within a period although the continuous orbit is not admissible",
     model.TOO_MANY_STEPS: "more than 10,000 Taylor steps in one half period: use the tail for large v~ or y~",
     model.DIVERGED: "the stiff step did not converge: use the tail for large v~ or y~",
@@ -306,7 +306,10 @@ def _section(
 def stick_slip(
     v: float, y: float, eta: float, hint: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> tuple[int, float]:
-    """Steady stick-slip orbit, ``hint`` = th0 if something is known of it, else NaN; returns (status, relative uncertainty of the section's unknown)."""
+    """Steady stick-slip orbit; ``hint`` = th0 if something is known of it, else NaN.
+
+    Returns the status and the relative uncertainty of the section's unknown.
+    """
     guess = border_guess(y)
     ratio = v / guess
     # phi: the positive root of phi^3 - (1 - y^2) phi = pi v, the normal form of the corner and exact for v -> 0, y < 1
@@ -355,7 +358,7 @@ def stick_slip(
     spread = math.inf
     for it in range(200):
         f, status = _section(kind, v, y, eta, z, chart, w, out, orbit)
-        if status == NO_SLIP or status == NO_STICK:
+        if status in (NO_SLIP, NO_STICK):
             # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border slip misses lam = 0
             # when th0 is too large, since the half-period map turns the order of orbits round there
             if kind == 0 and chart == 0:

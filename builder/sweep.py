@@ -42,7 +42,7 @@ def _full(v: Array, y: Array, eta: Array, out: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _continuous(v: Array, y: Array, eta: Array, out: Array) -> None:
+def _continuous(v: Array, y: Array, _eta: Array, out: Array) -> None:
     """The continuous orbit whether or not lam stays positive: it is analytic across the border."""
     w, orbit_out = np.zeros((8, ORDER + 2)), np.zeros(11)
     for i in range(v.size):
@@ -55,9 +55,9 @@ def _continuous(v: Array, y: Array, eta: Array, out: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _border(v: Array, y: Array, eta: Array, out: Array) -> None:
+def _border(_v: Array, y: Array, _eta: Array, out: Array) -> None:
     w, orbit_out = np.zeros((8, ORDER + 2)), np.zeros(11)
-    for i in range(v.size):
+    for i in range(y.size):
         crit, mu, status = steady.border_raw(y[i], w, orbit_out)
         out[i, 0], out[i, 1] = mu, crit
         out[i, 2], out[i, 3], out[i, 4] = 0.0, 0.0, 4e-16

@@ -54,7 +54,7 @@ def outer_expansion(r: float) -> tuple[float, float]:
 def normal_form_root(v: float, eta: float) -> float:
     """Positive root phi of phi^3 + 2 eta phi = pi v: Newton from above, where the cubic is convex."""
     c = math.pi * v
-    phi = c ** (1.0 / 3.0)
+    phi: float = c ** (1.0 / 3.0)
     if eta > 0.0:
         phi = min(phi, c / (2.0 * eta))
     else:
@@ -75,7 +75,7 @@ def _line(coef: NDArray[np.float64], first: int, cells: int, a: float, start: fl
     i = min(max(int(x), 0), cells - 1)
     u = 2.0 * (x - i) - 1.0
     i += first
-    r = coef[i, 0]
+    r: float = coef[i, 0]
     for k in range(1, WIDTH):
         r = r * u + coef[i, k]
     return r
@@ -107,7 +107,8 @@ def _patch(coef: NDArray[np.float64], meta: NDArray[np.float64], block: int, a: 
         c5 = c5 * w + coef[p, k, 5]
         c6 = c6 * w + coef[p, k, 6]
         c7 = c7 * w + coef[p, k, 7]
-    return ((((((c0 * u + c1) * u + c2) * u + c3) * u + c4) * u + c5) * u + c6) * u + c7
+    out: float = ((((((c0 * u + c1) * u + c2) * u + c3) * u + c4) * u + c5) * u + c6) * u + c7
+    return out
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -148,7 +149,7 @@ def ratio(
     bcoef: NDArray[np.float64],
     bmeta: NDArray[np.float64],
 ) -> tuple[float, float, int]:
-    """(mu~, bound of its absolute error, source) at v~ = ``v`` >= 0, y~ = ``y`` >= 0; infinite v~ only with finite y~."""
+    """(mu~, bound of its absolute error, source) at v~ = ``v`` >= 0, y~ = ``y`` >= 0; v~ may be infinite, y~ not."""
     if y == 0.0 or v == math.inf:
         return 1.0, 0.0, NO_OSCILLATION if y == 0.0 else FAST
     if v == 0.0:

@@ -97,7 +97,7 @@ def _scaled(a: float, b: float, c: float, d: float, e: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float, float]:
-    """(v~, y~, r): the two dimensionless groups and r = y~/v~ = y0 omega/v0 [-]; 0 and inf where they leave double range.
+    """(v~, y~, r), r = y~/v~ = y0 omega/v0 [-]; 0 and inf where they leave the range of double precision.
 
     ``y0``, ``omega``, ``v0`` must be > 0.
     """

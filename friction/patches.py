@@ -24,7 +24,7 @@ _TO_POWERS: Array = np.linalg.inv(np.vander(_LOCAL, WIDTH))
 def nodes(n: int, low: float, high: float) -> Array:
     """Chebyshev points of the first kind on [low, high], ascending, shape (n,)."""
     x = -np.cos((np.arange(n) + 0.5) * np.pi / n)
-    return 0.5 * (low + high) + 0.5 * (high - low) * x
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * x, dtype=np.float64)
 
 
 def chebyshev_coefficients(values: Array) -> Array:

@@ -85,12 +85,15 @@ class BlockSpec:
 
 
 _LN = math.log
+_LOW, _MID_C1, _MID_C2 = (0.0, Y_CONT**2), (_LN(Y_CONT), _LN(Y_MID_C)), (_LN(Y_MID_C), _LN(Y_HIGH))
+_HIGH, _TAIL, _UNIT = (_LN(Y_HIGH), _LN(Y_TAIL)), (0.0, 1.0 / Y_TAIL), (0.0, 1.0)
+_K_MID, _K_HIGH = (L_LOW, L_MAX), (L_HIGH, L_MAX)
 BLOCKS = (
-    BlockSpec("continuous_low", CONTINUOUS, "y_squared", "v_squared_share", (0.0, Y_CONT**2), (0.0, 1.0), "deficit_low"),
-    BlockSpec("continuous_mid_1", CONTINUOUS, "ln_y", "ln_kappa", (_LN(Y_CONT), _LN(Y_MID_C)), (L_LOW, L_MAX), "hypotenuse"),
-    BlockSpec("continuous_mid_2", CONTINUOUS, "ln_y", "ln_kappa", (_LN(Y_MID_C), _LN(Y_HIGH)), (L_LOW, L_MAX), "hypotenuse"),
-    BlockSpec("continuous_high", CONTINUOUS, "ln_y", "ln_kappa", (_LN(Y_HIGH), _LN(Y_TAIL)), (L_HIGH, L_MAX), "hypotenuse"),
-    BlockSpec("continuous_tail", CONTINUOUS, "inverse_y", "ln_kappa", (0.0, 1.0 / Y_TAIL), (L_HIGH, L_MAX), "layer"),
+    BlockSpec("continuous_low", CONTINUOUS, "y_squared", "v_squared_share", _LOW, _UNIT, "deficit_low"),
+    BlockSpec("continuous_mid_1", CONTINUOUS, "ln_y", "ln_kappa", _MID_C1, _K_MID, "hypotenuse"),
+    BlockSpec("continuous_mid_2", CONTINUOUS, "ln_y", "ln_kappa", _MID_C2, _K_MID, "hypotenuse"),
+    BlockSpec("continuous_high", CONTINUOUS, "ln_y", "ln_kappa", _HIGH, _K_HIGH, "hypotenuse"),
+    BlockSpec("continuous_tail", CONTINUOUS, "inverse_y", "ln_kappa", _TAIL, _K_HIGH, "layer"),
     BlockSpec("stick_slip_low", STICK_SLIP, "y_squared", "s", (0.0, Y_STICK_LO**2), (0.0, 1.0), "deficit"),
     BlockSpec("stick_slip_mid", STICK_SLIP, "y", "s", (Y_STICK_LO, Y_STICK_HI), (S_CUT, 1.0), "mu_ratio"),
     BlockSpec("corner", STICK_SLIP, "radius", "angle", (0.0, R_MAX), (0.0, 1.0), "normal_form"),

@@ -218,7 +218,8 @@ class Surrogate:
         -----
         y0 = 0 or omega = 0 gives mu0.  v0 = 0 with y0, omega > 0 gives the static limit, eq. (16).
         """
-        columns = nondim.check_inputs({"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0})
+        given: dict[str, Any] = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
+        columns = nondim.check_inputs(given)
         columns.setdefault("k", np.asarray(math.inf))
         ordered = [columns[name] for name in nondim.FIELDS]
         try:
@@ -233,15 +234,16 @@ class Surrogate:
         mu, bound, v, y = (np.empty(n) for _ in range(4))
         source = np.empty(n, dtype=np.int8)
         with _ONE_LOOP:
-            nondim.evaluate_array(*flat, *self._data, mu, bound, source, v, y)
+            a, b, c, d, e, f = flat
+            nondim.evaluate_array(a, b, c, d, e, f, *self._data, mu, bound, source, v, y)
         scale = np.broadcast_to(ordered[0], shape)
-        mu = mu.reshape(shape)
+        ratio: Array = mu.reshape(shape)
         with np.errstate(over="ignore", under="ignore"):
             length = np.broadcast_to(ordered[0] * (ordered[1] / ordered[2]), shape)
         code = source.reshape(shape)
         return Answer(
-            mu_macro=mu * scale,
-            mu_ratio=mu,
+            mu_macro=ratio * scale,
+            mu_ratio=ratio,
             error_bound=bound.reshape(shape) * scale,
             regime=_REGIMES[REGIME_OF_SOURCE[code]],
             source=_SOURCES[code],

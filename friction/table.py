@@ -253,7 +253,8 @@ def _read(root: Any, path: Path) -> Table:
             raise TableError(path, f"{group.path}: shapes of nodes and values disagree")
         blocks.append(block)
     names = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
-    return Table(border, blocks, *(_array(root, name, path) for name in names), attributes)
+    plain = {name: _array(root, name, path) for name in names}
+    return Table(border=border, blocks=blocks, attributes=attributes, **plain)
 
 
 def read_table(path: str | Path) -> Table:
