@@ -222,7 +222,7 @@ own = str(os.getpid())
 pages = [p.read_text() for p in pathlib.Path("/proc").glob("[0-9]*/status") if p.parent.name != own]
 print(sum(int(line.split()[1]) for text in pages for line in text.splitlines() if line.startswith("VmRSS")) // 1024)')
 
-"$engine" stop --time 30 "$container" >"$work/stop.log" 2>&1 || { cat "$work/stop.log" >&2; fail "it does not stop"; }
+"$engine" stop -t 30 "$container" >"$work/stop.log" 2>&1 || { cat "$work/stop.log" >&2; fail "it does not stop"; }
 code=$("$engine" inspect --format '{{.State.ExitCode}}' "$container")
 [[ $code == 0 ]] || { "$engine" logs --tail 20 "$container" >&2; fail "SIGTERM ended it with exit code $code"; }
 say "ok  SIGTERM stops it with exit code 0"
