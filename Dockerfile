@@ -43,7 +43,7 @@ RUN venv/bin/python -m compileall -q friction service read_only_cache.py \
     && venv/bin/python -c "from pathlib import Path; from friction import Surrogate; \
 tables = sorted(Path('tables').glob('*.nc')); assert tables, 'no table'; \
 [Surrogate.open(table).warm_up() for table in tables]" \
-    && ls cache/*/*.nbc
+    && find cache -name '*.nbc' | grep .
 
 FROM ${BASE}
 LABEL org.opencontainers.image.title="mumacro" \
