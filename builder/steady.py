@@ -418,7 +418,7 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
         else:
             lo = z
         if f == 0.0 or (f_old < math.inf and abs(z - z_old) <= 1e-9 * z):
-            if f != 0.0:
+            if f not in (0.0, f_old):  # both at rounding level: z is the answer
                 z -= f * (z - z_old) / (f - f_old)
             mu = out[4] / math.pi
             return z, (1.0 - out[5] / math.pi if mu > 0.5 else mu), OK
