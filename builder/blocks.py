@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from builder.sweep import Sweep
 from friction import tails
 from friction.border import Border
-from friction.kernels import WIDTH
-from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes
+from friction.kernels import SQRT2, WIDTH
+from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes, s_of_sigma
 from friction.regions import BORDER_PIECES, CONTINUOUS, BlockSpec
 from friction.table import Block, BorderPiece
 
@@ -110,27 +110,35 @@ def _tail(coefficients: Array, axis: int) -> float:
     return float(c[-2:].sum(axis=1).max())
 
 
-def _cells(values: Array, axis: int, tolerance: float) -> int:
+def _cells(values: Array, axis: int, tolerance: float, spec: BlockSpec | None = None) -> int:
     """Fewest cells along ``axis`` for which polynomials of the kernel's degree follow the interpolant."""
     c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
     c = c.reshape(c.shape[0], -1)
     n = c.shape[0]
-    if n <= WIDTH:
+    along_s = spec is not None and (spec.a_name, spec.b_name)[axis] == "s"
+    if n <= WIDTH and not along_s:
         return 1
-    for cells in range(1, MAX_CELLS + 1):
-        t = np.linspace(-1.0, 1.0, 24 * cells + 1)
-        exact = interpolation_matrix(n, t) @ c
-        x = 0.5 * (t + 1.0) * cells
-        i = np.clip(x.astype(int), 0, cells - 1)
-        u = 2.0 * (x - i) - 1.0
-        local = -np.cos((np.arange(WIDTH) + 0.5) * np.pi / WIDTH)
-        points = (-1.0 + (2.0 * np.arange(cells)[:, None] + 1.0 + local[None, :]) / cells).ravel()
-        at = (interpolation_matrix(n, points) @ c).reshape(cells, WIDTH, -1)
-        inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(local, WIDTH - 1))
-        local_c = np.einsum("kw,cwm->ckm", inverse, at)
-        approx = np.einsum("tk,tkm->tm", np.polynomial.chebyshev.chebvander(u, WIDTH - 1), local_c[i])
+    local = -np.cos((np.arange(WIDTH) + 0.5) * np.pi / WIDTH)
+    check = np.linspace(-1.0, 1.0, 25)
+    follow = np.polynomial.chebyshev.chebvander(check, WIDTH - 1) @ np.linalg.inv(
+        np.polynomial.chebyshev.chebvander(local, WIDTH - 1)
+    )
+    for cells in range(2 if along_s else 1, MAX_CELLS + 1, 2 if along_s else 1):
+        centre = (2.0 * np.arange(cells)[:, None] + 1.0) / cells - 1.0
+        at, exact = centre + local / cells, centre + check / cells
+        if along_s and spec is not None:
+            low, high = spec.b
+            at, exact = (s_of_sigma(0.5 * SQRT2 * (x + 1.0)) for x in (at, exact))
+            live = exact[:, -1] > low
+            at, exact = ((2.0 * x[live] - low - high) / (high - low) for x in (at, exact))
+            inside = exact >= -1.0
+        else:
+            inside = np.ones(exact.shape, dtype=bool)
+        rows = interpolation_matrix(n, at.ravel()).reshape(*at.shape, n)
+        truth = interpolation_matrix(n, np.maximum(exact, -1.0).ravel()).reshape(*exact.shape, n)
         # the other axis enters through its Chebyshev coefficients, each of which multiplies a function <= 1
-        if np.abs(exact - approx).sum(axis=1).max() <= tolerance:
+        off = np.abs((truth - follow @ rows) @ c).sum(axis=-1)
+        if off[inside].max() <= tolerance:
             return cells
     return MAX_CELLS
 
@@ -187,4 +195,4 @@ def build_block(
     follow = [max(wanted, min(best[axis], 1.0)) for axis in (0, 1)]
     if spec.a_name == "inverse_y":
         follow[0] = wanted
-    return Block(a, b, values, (_cells(values, 0, follow[0]), _cells(values, 1, follow[1])))
+    return Block(a, b, values, (_cells(values, 0, follow[0], spec), _cells(values, 1, follow[1], spec)))

@@ -40,8 +40,8 @@ def rechart(x: float, chart: int, target: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def series(v: float, y: float, sigma: float, x: float, chart: int, w: np.ndarray) -> None:
-    """Taylor coefficients at one point of the slip orbit, eqs. (11), (12).
+def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np.ndarray) -> None:
+    """Taylor coefficients at one point of the slip orbit, eqs. (11), (12); c0, c1 = cos tau and its derivative there.
 
     ``w`` has shape (8, ORDER + 2) and receives rows x, sin x, 1 - cos x, x', C = cos tau, C sin x, C cos x, lam.
     """
@@ -50,8 +50,8 @@ def series(v: float, y: float, sigma: float, x: float, chart: int, w: np.ndarray
     S[0] = math.sin(x)
     half = math.sin(0.5 * x)
     D[0] = 2.0 * half * half
-    C[0] = -math.sin(sigma)
-    C[1] = -math.cos(sigma)
+    C[0] = c0
+    C[1] = c1
     for k in range(ORDER - 1):
         C[k + 2] = -C[k] * _INV[k + 1] * _INV[k + 2]
     for k in range(ORDER + 1):
@@ -160,8 +160,12 @@ def _step_length(w: np.ndarray, lam: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _collocate(v: float, y: float, sigma: float, x0: float, chart: int, length: float, out: np.ndarray) -> bool:
+def _collocate(
+    v: float, y: float, sign: float, sigma: float, x0: float, chart: int, length: float, out: np.ndarray
+) -> bool:
     """One stiff step: Radau IIA collocation, started on the slow manifold th = atan2(y cos tau, v).
+
+    cos tau = sign sin sigma.
 
     ``out`` (5,) receives x_end and the integrals of u_x, 1 - u_x, lam and y cos tau u_y.
     """
@@ -169,13 +173,13 @@ def _collocate(v: float, y: float, sigma: float, x0: float, chart: int, length: 
     base = chart * (0.5 * math.pi)
     for i in range(_N):
         s = sigma + RADAU_NODES[i] * length
-        xs[i] = math.atan2(-y * math.sin(s), v) - base
+        xs[i] = math.atan2(sign * y * math.sin(s), v) - base
     jac = np.empty((_N, _N))
     res = np.empty(_N)
     for it in range(12):
         for i in range(_N):
             s = sigma + RADAU_NODES[i] * length
-            c = -math.sin(s)
+            c = sign * math.sin(s)
             sx = math.sin(xs[i])
             cx = math.cos(xs[i])
             if chart == 0:
@@ -205,7 +209,7 @@ def _collocate(v: float, y: float, sigma: float, x0: float, chart: int, length: 
     out[:] = 0.0
     for i in range(_N):
         s = sigma + RADAU_NODES[i] * length
-        c = -math.sin(s)
+        c = sign * math.sin(s)
         sx = math.sin(xs[i])
         cx = math.cos(xs[i])
         wt = RADAU_WEIGHTS[i] * length
@@ -225,9 +229,20 @@ def _collocate(v: float, y: float, sigma: float, x0: float, chart: int, length: 
 
 @njit(cache=True, error_model="numpy")
 def slip(
-    v: float, y: float, sigma: float, x: float, chart: int, end: float, to_stick: bool, w: np.ndarray, out: np.ndarray
+    v: float,
+    y: float,
+    sigma: float,
+    turn: int,
+    x: float,
+    chart: int,
+    end: float,
+    to_stick: bool,
+    w: np.ndarray,
+    out: np.ndarray,
 ) -> int:
-    """Follow the slip orbit from (sigma, chart base + x) to ``end``, or to the first lam = 0 if ``to_stick``.
+    """Slip orbit from (sigma + turn pi, chart base + x) to ``end``, or to the first lam = 0 if ``to_stick``.
+
+    ``turn`` is 0 or -1: time counts from the nearer turn of the shaker, whose layers are as thin as 1/sqrt(y~).
 
     ``w`` is workspace of shape (8, ORDER + 2).  ``out`` (11,) receives: 0 sigma at the end, 1 local angle, 2 chart,
     3 increment of the angle, 4-7 the integrals of u_x, 1 - u_x, lam and y cos tau u_y, 8 smallest lam on the way,
@@ -246,20 +261,25 @@ def slip(
             # a quarter turn back from chart +-1 leads to 0; further than that leaves the half plane u_x > 0
             x = rechart(x, chart, target)
             chart = target
-        series(v, y, sigma, x, chart, w)
+        if turn < 0 and sigma > 0.5 * math.pi:
+            sigma -= math.pi
+            turn = 0
+        sign = -1.0 if turn == 0 else 1.0
+        series(v, y, sign * math.sin(sigma), sign * math.cos(sigma), x, chart, w)
         L = w[7]
         h = _step_length(w, L[0])
-        left = end - sigma
-        nearest = sigma - math.pi * math.floor(sigma / math.pi + 0.5)
-        gap = math.hypot(nearest, ratio) if ratio < 1.0 else 1.0
-        jump = min(gap if nearest > 0.0 else 0.5 * gap, left, 0.8)
+        left = end - (sigma + turn * math.pi)
+        gap = math.hypot(sigma, ratio) if ratio < 1.0 else 1.0
+        # away from the turn behind a step may be as long as the way back to it; towards the next one half the way to it
+        ahead = 0.5 * (math.pi - sigma) if sigma > 0.0 else 0.5 * gap
+        jump = min(gap, max(ahead, 0.5 * gap) if sigma > 0.0 else ahead, left, 0.8)
         if L[0] * jump > STIFF and out[6] > FORGOTTEN:
-            if not _collocate(v, y, sigma, x, chart, jump, stiff):
+            if not _collocate(v, y, sign, sigma, x, chart, jump, stiff):
                 return DIVERGED
             out[3] += stiff[0] - x
             for i in range(4):
                 out[4 + i] += stiff[1 + i]
-            sigma = end if jump == left else sigma + jump
+            sigma = end - turn * math.pi if jump == left else sigma + jump
             x = stiff[0]
             steps += 1
             if jump == left:
@@ -311,14 +331,14 @@ def slip(
         if stop >= 0.0:
             sigma += h
             break
-        sigma = end if last else sigma + h
+        sigma = end - turn * math.pi if last else sigma + h
         if last:
             if to_stick:
                 return NO_STICK
             break
         if steps > MAX_STEPS:
             return TOO_MANY_STEPS
-    out[0] = sigma
+    out[0] = sigma + turn * math.pi
     out[1] = x
     out[2] = chart
     out[10] = steps

@@ -64,7 +64,7 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
         if th > 0.75:
             chart = 1
             x = th - half
-        status = slip(v, y, -half, x, chart, half, False, w, out)
+        status = slip(v, y, -half, 0, x, chart, half, False, w, out)
         if status != OK:
             return status
         x_end = out[1]
@@ -105,12 +105,12 @@ def stick_excess(v: float, y: float, eta: float, x0: float, chart: int, s0: floa
     """
     half = _sinc(0.5 * d)
     h2 = half * half
-    if chart == 0:
-        sth, cos0 = math.sin(x0), math.cos(s0)
-        c = math.cos(0.5 * (s0 + s1))
-        m = y * c * c - sth * cos0
+    sth = math.sin(x0) if chart == 0 else math.cos(x0)
+    if chart == 0 or d < 1.0:
+        # a short stick: s1 counts from the far turn and has lost the digits that s0 + d still has
+        c = math.sin(s0 + 0.5 * d) if d < 1.0 else math.cos(0.5 * (s0 + s1))
+        m = y * c * c - sth * math.cos(s0)
     else:
-        sth = math.cos(x0)
         a, b, c = math.sin(0.5 * x0), math.sin(0.5 * s0), math.sin(0.5 * (s0 + s1))
         m = eta - y * c * c + 2.0 * a * a + 2.0 * b * b * (1.0 - 2.0 * a * a)
     return v * v + y * h2 * m + 2.0 * y * sth * math.sin(s0) * _third(d)
@@ -220,16 +220,19 @@ def _angle_section(
     if d < 0.0:
         return -1.0, NO_SLIP
     orbit[0], orbit[1], orbit[2], orbit[3], orbit[4], orbit[5] = d, cth, deficit, sth, s0, s1
+    # sigma1 counted from the nearer turn: after a short stick that is the one which slip came from
+    turn = -1 if d < 0.5 * math.pi else 0
+    near = s0 + d if turn < 0 else s1
     ux = cth + v * d
     uy = 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth  # mirrored
     if chart == 1 and uy > 0.0:
         d1 = math.asin(min(ux, 1.0))
         # 2 B = delta1 - delta0 from sin delta1 - sin delta0 = v d, free of cancellation
         b = math.asin(min(1.0, 0.5 * v * d / math.cos(0.5 * (x0 + d1))))
-        status = slip(v, y, s1, -(x0 + 2.0 * b), 1, 0.5 * math.pi, True, w, out)
+        status = slip(v, y, near, turn, -(x0 + 2.0 * b), 1, 0.5 * math.pi, True, w, out)
         return out[3] - 2.0 * b, status
     th1 = math.atan2(uy, ux)
-    status = slip(v, y, s1, th1, 0, 0.5 * math.pi, True, w, out)
+    status = slip(v, y, near, turn, th1, 0, 0.5 * math.pi, True, w, out)
     if status != OK:
         return 0.0, status
     if chart == 1:
@@ -285,7 +288,7 @@ def _time_section(
         deficit = 1.0 - cth
         start, base = -(a_ang + b), 1
     orbit[0], orbit[1], orbit[2], orbit[3], orbit[4], orbit[5] = math.pi - s0 + s1, cth, deficit, sth, s0, s1
-    status = slip(v, y, s1, start, base, 0.5 * math.pi, True, w, out)
+    status = slip(v, y, s1, 0, start, base, 0.5 * math.pi, True, w, out)
     return 2.0 * b - out[3], status
 
 
@@ -332,8 +335,9 @@ def stick_slip(
         z = math.atan(v / y) + (phi if eta < 0.5 else v / y)
         z = min(z, 0.7)
         lo, hi = 0.0, 0.5 * math.pi
+    near = kind == 0 and not math.isnan(hint)
     if kind == 0:
-        if not math.isnan(hint):
+        if near:
             z = hint if chart == 0 else 0.5 * math.pi - hint
         # edge of the section: lam = 0 = lam' there, (v / sin th)^2 = y sin th cos sigma0; beyond it no stick starts
         a, b = math.atan(v / y), 0.5 * math.pi
@@ -377,19 +381,25 @@ def stick_slip(
         if f == 0.0 or spread < 1e-9:
             # the last secant step was below 1e-9 of z: its error is its square, this evaluation is the answer
             return OK, max(min(spread * spread, 1e-9), 2e-16) if f != 0.0 else 2e-16
+        secant = False
         if f_old == math.inf:
-            # where the map contracts well its own image is the next trial, elsewhere a small step towards the root
-            new = z - f if kind == 0 and abs(f) > 1e-3 * z else z * (0.98 if f > 0.0 else 1.02)
+            if kind == 0 and (near or abs(f) > 1e-3 * z):
+                # the map contracts: its own image is the next trial; next to the border it also turns orbits round
+                new = z - (0.6 * f if near else f)
+            else:
+                new = z * (0.98 if f > 0.0 else 1.02)
         else:
-            df = f - f_old
-            new = z - f * (z - z_old) / df if df != 0.0 else z
+            secant = f != f_old
+            new = z - f * (z - z_old) / (f - f_old) if secant else z
         if not (lo <= new <= hi):
+            secant = False
             new = 0.5 * (lo + hi)
             if lo == 0.0 and it < 40:
                 new = 0.1 * hi
         if hi - lo <= 4e-16 * hi or new == z:
             return OK, 2e-16
-        spread = abs(new - z) / abs(new)
+        # only a secant step tells how far the root still is
+        spread = abs(new - z) / abs(new) if secant else math.inf
         z_old, f_old, z = z, f, new
     return NOT_CONVERGED, spread
 
@@ -471,6 +481,12 @@ def solve_raw(
     if status != OK and status != NOT_CONVERGED:
         return status
     d, cth, deficit = orbit[0], orbit[1], orbit[2]
+    # Next to the border lam grazes zero and the end of slip is known to 1e-16/sqrt(1 - v~/v~crit) only; the state there
+    # is known far better, so the surplus is taken out and stick and slip together last exactly half a period.
+    surplus = out[0] - orbit[4]
+    out[4] -= surplus * cth
+    out[5] -= surplus * deficit
+    out[7] += surplus * y * math.sin(orbit[4]) * orbit[3]
     mean = 1.0 / math.pi
     res[0] = (d * (cth + 0.5 * v * d) + out[4]) * mean
     res[1] = (d * (deficit - 0.5 * v * d) + out[5]) * mean

@@ -13,26 +13,39 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from friction import regions as _r
+from friction.patch_simd import patch_value
+
+Array = NDArray[np.float64]
 
 DEGREE = 7
 WIDTH = DEGREE + 1
 ROUNDING = 2e-15  # of coordinates, Horner sums and the inputs' last digits, relative to the scale of the answer
 
 Y_CONT, Y_MID_C, Y_MID_S, Y_HIGH, Y_TAIL = _r.Y_CONT, _r.Y_MID_C, _r.Y_MID_S, _r.Y_HIGH, _r.Y_TAIL
-Y_STICK_LO, Y_STICK_HI, S_CUT, L_MAX = _r.Y_STICK_LO, _r.Y_STICK_HI, _r.S_CUT, _r.L_MAX
+Y_STICK_LO, Y_STICK_HI, L_MAX = _r.Y_STICK_LO, _r.Y_STICK_HI, _r.L_MAX
 C_LOW, C_MID_1, C_MID_2, C_HIGH, C_TAIL = 0, 1, 2, 3, 4
 S_LOW, S_MID, CORNER, S_MID_1, S_MID_2, S_HIGH, S_TAIL = 5, 6, 7, 8, 9, 10, 11
 FAST, NO_OSCILLATION, STATIC_LIMIT = _r.FAST, _r.NO_OSCILLATION, _r.STATIC_LIMIT
+FAST_KAPPA = math.exp(L_MAX)
+SIGMA_CUT = _r.SIGMA_CUT
 TWO_OVER_PI = 2.0 / math.pi
+SQRT2 = math.sqrt(2.0)
+NO_PATCH = FAST  # sources from here on are closed forms
+
+# Fused multiply-add changes the last digit and nothing else; no other liberty is taken with the arithmetic.
+FUSE = {"contract"}
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def outer_expansion(r: float) -> tuple[float, float]:
-    """(2/pi) K(i r) of eq. (35) and the coefficient of 1/v~^2 that follows it; r = y~/v~ >= 0 [-]."""
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def outer_expansion(r: float) -> tuple[float, float, float, float]:
+    """Two terms of mu~ = f(r) + g(r)/v~^2 + ... for v~ -> infinity, and their slopes: f, g, r f', r g'; r = y~/v~ >= 0.
+
+    f = (2/pi) K(i r) is eq. (35); g = r^2 <sin^2 (1/2 - r^2 cos^2) (1 + r^2 cos^2)^(-7/2)>.
+    """
     h = math.hypot(1.0, r)
     q = 1.0 / h  # sqrt(1 - m) with m = r^2 / (1 + r^2)
     if q == 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     m = (r * q) * (r * q)
     a, g, power, total = 1.0, q, 0.5, 0.5 * m
     for _ in range(64):
@@ -45,12 +58,21 @@ def outer_expansion(r: float) -> tuple[float, float]:
     k = 1.0 / a  # (2/pi) K(m)
     e = k * (1.0 - total)
     q2 = q * q
+    # q^p <(1 - m sin^2)^(-p/2)> without the powers of q, by the recurrence in p
     i5 = (2.0 * (2.0 - m) * e - q2 * k) / 3.0
     i7 = (4.0 * (2.0 - m) * i5 - 3.0 * q2 * e) / 5.0
-    return k * q, (1.5 * i7 - m * i5) * h + q * (e - 2.5 * i5)
+    i9 = (6.0 * (2.0 - m) * i7 - 5.0 * q2 * i5) / 7.0
+    second = (1.5 * i7 - m * i5) * h + q * (e - 2.5 * i5)
+    # d J_p / d ln r = -p (J_p - J_(p+2)), J_p = <(1 + r^2 cos^2)^(-p/2)>: J3 = q e, J5 = q i5, J7 = q i7, J9 = q i9
+    # with (1 + r^2) = h^2 taken into i7 and i9
+    slope = (
+        3.0 * m * i7 * h - 10.5 * (i7 - i9) * h - 2.0 * m * i5 * h
+        + 5.0 * (m * h + 2.5 * q) * (i5 - i7) - 3.0 * q * (e - i5)
+    )  # fmt: skip
+    return k * q, second, q * (e - k), slope
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def normal_form_root(v: float, eta: float) -> float:
     """Positive root phi of phi^3 + 2 eta phi = pi v: Newton from above, where the cubic is convex."""
     c = math.pi * v
@@ -68,8 +90,8 @@ def normal_form_root(v: float, eta: float) -> float:
     return phi
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _line(coef: NDArray[np.float64], first: int, cells: int, a: float, start: float, scale: float) -> float:
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _line(coef: Array, first: int, cells: int, a: float, start: float, scale: float) -> float:
     """Piecewise polynomial of one variable; ``coef`` (cells in all pieces, WIDTH), highest power first."""
     x = (a - start) * scale
     i = min(max(int(x), 0), cells - 1)
@@ -81,163 +103,158 @@ def _line(coef: NDArray[np.float64], first: int, cells: int, a: float, start: fl
     return r
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _patch(coef: NDArray[np.float64], meta: NDArray[np.float64], block: int, a: float, b: float) -> float:
-    """Tabulated quantity of one block at its coordinates (a, b).
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _cell(meta: Array, block: int, a: float, b: float) -> tuple[int, float, float]:
+    """Patch number and local coordinates u, w in [-1, 1] of the block coordinates (a, b).
 
-    ``coef`` (patches, WIDTH, WIDTH): powers of w by rows, of u along a row, highest first, so that one row is one
-    vector operation.  ``meta`` (blocks, 8): first patch, cells in a, cells in b, start and scale of a and of b, error.
+    ``meta`` (blocks, 8): first patch, cells in a, cells in b, start and scale of a, start and scale of b, error.
     """
     na, nb = int(meta[block, 1]), int(meta[block, 2])
     x = (a - meta[block, 3]) * meta[block, 4]
     z = (b - meta[block, 5]) * meta[block, 6]
     i = min(max(int(x), 0), na - 1)
     j = min(max(int(z), 0), nb - 1)
-    u = 2.0 * (x - i) - 1.0
-    w = 2.0 * (z - j) - 1.0
-    p = int(meta[block, 0]) + i * nb + j
-    c0, c1, c2, c3 = coef[p, 0, 0], coef[p, 0, 1], coef[p, 0, 2], coef[p, 0, 3]
-    c4, c5, c6, c7 = coef[p, 0, 4], coef[p, 0, 5], coef[p, 0, 6], coef[p, 0, 7]
-    for k in range(1, WIDTH):
-        c0 = c0 * w + coef[p, k, 0]
-        c1 = c1 * w + coef[p, k, 1]
-        c2 = c2 * w + coef[p, k, 2]
-        c3 = c3 * w + coef[p, k, 3]
-        c4 = c4 * w + coef[p, k, 4]
-        c5 = c5 * w + coef[p, k, 5]
-        c6 = c6 * w + coef[p, k, 6]
-        c7 = c7 * w + coef[p, k, 7]
-    out: float = ((((((c0 * u + c1) * u + c2) * u + c3) * u + c4) * u + c5) * u + c6) * u + c7
-    return out
+    return int(meta[block, 0]) + i * nb + j, 2.0 * (x - i) - 1.0, 2.0 * (z - j) - 1.0
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def border_scaled(y: float, bcoef: NDArray[np.float64], bmeta: NDArray[np.float64]) -> tuple[float, float]:
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def border_scaled(y: float, bcoef: Array, bmeta: Array) -> tuple[float, float]:
     """v~crit = value * scale, as (value, scale): y~^2/2 or sqrt(y~) is the scale.
 
     ``bmeta`` (3, 4): first cell, cells, start and scale of each piece of the border.
     """
     if y <= Y_CONT:
-        return _line(bcoef, int(bmeta[0, 0]), int(bmeta[0, 1]), y * y, bmeta[0, 2], bmeta[0, 3]), 0.5 * y * y
-    if y <= Y_TAIL:
-        return _line(bcoef, int(bmeta[1, 0]), int(bmeta[1, 1]), math.log(y), bmeta[1, 2], bmeta[1, 3]), math.sqrt(y)
-    return _line(bcoef, int(bmeta[2, 0]), int(bmeta[2, 1]), 1.0 / y, bmeta[2, 2], bmeta[2, 3]), math.sqrt(y)
+        w = y * y
+        return _line(bcoef, int(bmeta[0, 0]), int(bmeta[0, 1]), w, bmeta[0, 2], bmeta[0, 3]), 0.5 * w
+    k, a = (1, math.log(y)) if y <= Y_TAIL else (2, 1.0 / y)
+    return _line(bcoef, int(bmeta[k, 0]), int(bmeta[k, 1]), a, bmeta[k, 2], bmeta[k, 3]), math.sqrt(y)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def angle_of(rho: float) -> float:
-    """s in [0, 1] with v~/v~crit = sin^2(pi s / 2), keeping the digits at both ends."""
-    if rho < 0.5:
-        return TWO_OVER_PI * math.asin(math.sqrt(rho))
-    return 1.0 - TWO_OVER_PI * math.asin(math.sqrt(1.0 - rho))
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def edge_coordinate(rho: float) -> float:
+    """sigma in [0, sqrt 2] for rho = v~/v~crit in [0, 1]: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on.
+
+    Both square-root edges become smooth, as with s = (2/pi) asin sqrt(rho) of the table file, for one square root;
+    sigma is analytic in s on either half, and the knot between them is an edge of cells.
+    """
+    return math.sqrt(rho) if rho < 0.5 else SQRT2 - math.sqrt(1.0 - rho)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def polar(v: float, eta: float) -> tuple[float, float, float]:
-    """Corner coordinates (phi, R, 2 psi / pi): R sin psi = sqrt 2 phi, R cos psi = s0 / sqrt 2, s0^2 = 2 pi v / phi."""
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def polar(v: float, eta: float) -> tuple[float, float, float, float]:
+    """Corner coordinates (phi, s0, R, 2 psi/pi): R sin psi = sqrt 2 phi, R cos psi = s0/sqrt 2, s0^2 = 2 pi v/phi."""
     phi = normal_form_root(v, eta)
     s0 = math.sqrt(2.0 * math.pi * v / phi)
-    return phi, math.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi), TWO_OVER_PI * math.atan2(2.0 * phi, s0)
+    return phi, s0, math.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi), TWO_OVER_PI * math.atan2(2.0 * phi, s0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def ratio(
-    v: float,
-    y: float,
-    coef: NDArray[np.float64],
-    meta: NDArray[np.float64],
-    bcoef: NDArray[np.float64],
-    bmeta: NDArray[np.float64],
-) -> tuple[float, float, int]:
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def locate(v: float, y: float, bcoef: Array, bmeta: Array) -> tuple[int, float, float, float, float, float]:
+    """Where (v~, y~) falls: (source, a, b, base, factor, extra) with mu~ = base + factor q(a, b).
+
+    ``v`` > 0 and 0 < ``y`` < infinity.  ``extra`` is what the answer may be wrong by beyond factor times the error of
+    q: rounding, the last digit of the inputs, and for closed forms the next term.  A source from NO_PATCH on has no q.
+    """
+    if y <= Y_CONT:
+        w = y * y
+        crit = 0.5 * w * _line(bcoef, int(bmeta[0, 0]), int(bmeta[0, 1]), w, bmeta[0, 2], bmeta[0, 3])
+        if v >= crit:
+            if v > 1e150:
+                return C_LOW, w, 1.0, 1.0, 0.0, ROUNDING
+            rest = 1.0 / (1.0 + v * v)
+            return C_LOW, w, v * v * rest, 1.0, -0.25 * w * rest, ROUNDING
+        b = edge_coordinate(v / crit)
+        if y <= Y_STICK_LO:
+            return S_LOW, w, b, 1.0, -w, ROUNDING
+    else:
+        # one logarithm for both signs of v - crit: it is a coordinate on either side
+        root = math.sqrt(y)
+        t = math.log(y)
+        if y > Y_TAIL:
+            return _beyond(v, y, root, bcoef, bmeta)
+        crit = root * _line(bcoef, int(bmeta[1, 0]), int(bmeta[1, 1]), t, bmeta[1, 2], bmeta[1, 3])
+        if v >= crit:
+            if v > FAST_KAPPA * root:
+                return _fast(v, y, root)
+            k = C_MID_1 if y <= Y_MID_C else (C_MID_2 if y <= Y_HIGH else C_HIGH)
+            factor = v / math.sqrt(v * v + y * y)
+            return k, t, math.log(v / root), 0.0, factor, 6.0 * ROUNDING * factor
+        b = edge_coordinate(v / crit)
+        if y > Y_STICK_HI:
+            k = S_MID_1 if y <= Y_MID_S else (S_MID_2 if y <= Y_HIGH else S_HIGH)
+            factor = v / y
+            return k, t, b, 0.0, factor, 16.0 * ROUNDING * factor
+    if b >= SIGMA_CUT:
+        return S_MID, y, b, 0.0, 1.0, ROUNDING
+    eta = y - 1.0
+    phi, _, radius, angle = polar(v, eta)
+    # one ulp of y~ and of v~ next to the corner: d phi / d eta = -2 phi / (3 phi^2 + 2 eta)
+    shaken = ROUNDING * phi * (1.0 + 1.0 / (3.0 * phi * phi + 2.0 * eta))
+    return CORNER, radius, angle, 0.0, phi, shaken
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _fast(v: float, y: float, root: float) -> tuple[int, float, float, float, float, float]:
+    # (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes from the second term is half r f'
+    speed = v * v + 1.0
+    first, second, slope, _ = outer_expansion(y / math.sqrt(speed))
+    correction = (second + 0.5 * slope) / speed
+    # the next term is smaller by (y~/v~^2)^2 where y~ > v~, by 1/v~^2 elsewhere
+    small = max(root / v * (root / v), 1.0 / v)
+    bound = 4.0 * abs(correction) * small * small + ROUNDING * first
+    return FAST, 0.0, 0.0, min(first + correction, 1.0), 0.0, bound
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _beyond(
+    v: float, y: float, root: float, bcoef: Array, bmeta: Array
+) -> tuple[int, float, float, float, float, float]:
+    """:func:`locate` for y~ > Y_TAIL: the outer solution carries the logarithm, the block what the layers add."""
+    a = 1.0 / y
+    crit = root * _line(bcoef, int(bmeta[2, 0]), int(bmeta[2, 1]), a, bmeta[2, 2], bmeta[2, 3])
+    if v > FAST_KAPPA * root:
+        return _fast(v, y, root)
+    factor = v / y
+    if factor == 0.0:
+        return S_TAIL, a, 0.0, 0.0, 0.0, 0.0
+    first, _, _, _ = outer_expansion(1.0 / factor)
+    extra = 8.0 * ROUNDING * first
+    if v >= crit:
+        return C_TAIL, a, math.log(v / root), first, factor, extra
+    base = first + factor * TWO_OVER_PI * math.log(v / root)
+    return S_TAIL, a, edge_coordinate(v / crit), base, factor, extra + 16.0 * ROUNDING * factor
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def at_zero_speed(y: float) -> tuple[float, float]:
+    """Static limit, eq. (16), and the bound of its rounding."""
+    if y >= 1.0:
+        return 0.0, 0.0
+    mu = math.sqrt((1.0 - y) * (1.0 + y))
+    return mu, ROUNDING / mu
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def ratio(v: float, y: float, coef: Array, meta: Array, bcoef: Array, bmeta: Array) -> tuple[float, float, int]:
     """(mu~, bound of its absolute error, source) at v~ = ``v`` >= 0, y~ = ``y`` >= 0; v~ may be infinite, y~ not."""
     if y == 0.0 or v == math.inf:
         return 1.0, 0.0, NO_OSCILLATION if y == 0.0 else FAST
     if v == 0.0:
-        if y >= 1.0:
-            return 0.0, 0.0, STATIC_LIMIT
-        mu = math.sqrt((1.0 - y) * (1.0 + y))
-        return mu, ROUNDING / mu, STATIC_LIMIT
-    if y <= Y_CONT:
-        w = y * y
-        rho = (v / y) / (0.5 * y * _line(bcoef, int(bmeta[0, 0]), int(bmeta[0, 1]), w, bmeta[0, 2], bmeta[0, 3]))
-        if rho >= 1.0:
-            if v < 1.0:
-                rest = 1.0 / (1.0 + v * v)
-                share = v * v * rest
-            else:
-                inv = 1.0 / v
-                share = 1.0 / (1.0 + inv * inv)
-                rest = inv * inv * share
-            scale = 0.25 * w * rest
-            q = _patch(coef, meta, C_LOW, w, share)
-            return 1.0 - scale * q, scale * meta[C_LOW, 7] + ROUNDING, C_LOW
-        s = angle_of(rho)
-        if y <= Y_STICK_LO:
-            q = _patch(coef, meta, S_LOW, w, s)
-            return 1.0 - w * q, w * meta[S_LOW, 7] + ROUNDING, S_LOW
-        t = 0.0
-        kappa = 0.0
-    else:
-        t = math.log(y)
-        kappa = v / math.sqrt(y)
-        if y <= Y_TAIL:
-            d = _line(bcoef, int(bmeta[1, 0]), int(bmeta[1, 1]), t, bmeta[1, 2], bmeta[1, 3])
-        else:
-            d = _line(bcoef, int(bmeta[2, 0]), int(bmeta[2, 1]), 1.0 / y, bmeta[2, 2], bmeta[2, 3])
-        rho = kappa / d
-        if rho >= 1.0:
-            b = math.log(kappa)
-            r = y / v
-            if b > L_MAX:
-                first, second = outer_expansion(r)
-                correction = second / v / v
-                # the next term is smaller by y~^2/v~^4 where r > 1, by 1/v~^2 where r < 1; see docs/model.md
-                small = max(1.0 / (kappa * kappa), 1.0 / v)
-                mu = min(first + correction, 1.0)
-                return mu, 4.0 * abs(correction) * small * small + ROUNDING * mu, FAST
-            if y <= Y_TAIL:
-                k = C_MID_1 if y <= Y_MID_C else (C_MID_2 if y <= Y_HIGH else C_HIGH)
-                scale = 1.0 / math.sqrt(1.0 + r * r)
-                mu = min(scale * _patch(coef, meta, k, t, b), 1.0)
-                return mu, scale * meta[k, 7] + 4.0 * ROUNDING * mu, k
-            first, _ = outer_expansion(r)
-            mu = first + _patch(coef, meta, C_TAIL, 1.0 / y, b) / r
-            return mu, meta[C_TAIL, 7] / r + 4.0 * ROUNDING * mu, C_TAIL
-        s = angle_of(rho)
-    if y <= Y_STICK_HI:
-        if s >= S_CUT:
-            return _patch(coef, meta, S_MID, y, s), meta[S_MID, 7] + ROUNDING, S_MID
-        eta = y - 1.0
-        phi, radius, angle = polar(v, eta)
-        mu = phi * _patch(coef, meta, CORNER, radius, angle)
-        # one ulp of y~ and of v~ next to the corner: d phi / d eta = -2 phi / (3 phi^2 + 2 eta)
-        shaken = ROUNDING * phi * (1.0 + 1.0 / (3.0 * phi * phi + 2.0 * eta))
-        return mu, phi * meta[CORNER, 7] + shaken, CORNER
-    if y <= Y_TAIL:
-        k = S_MID_1 if y <= Y_MID_S else (S_MID_2 if y <= Y_HIGH else S_HIGH)
-        scale = v / y
-        mu = scale * _patch(coef, meta, k, t, s)
-        return mu, scale * meta[k, 7] + 4.0 * ROUNDING * mu, k
-    scale = v / y
-    first, _ = outer_expansion(1.0 / scale)
-    mu = (
-        first + scale * (TWO_OVER_PI * math.log(kappa) + _patch(coef, meta, S_TAIL, 1.0 / y, s)) if scale > 0.0 else 0.0
-    )
-    return mu, scale * meta[S_TAIL, 7] + 4.0 * ROUNDING * mu, S_TAIL
+        mu, bound = at_zero_speed(y)
+        return mu, bound, STATIC_LIMIT
+    source, a, b, base, factor, extra = locate(v, y, bcoef, bmeta)
+    if source >= NO_PATCH:
+        return base, extra, source
+    p, u, w = _cell(meta, source, a, b)
+    mu = base + factor * patch_value(coef, p, u, w)
+    return min(mu, 1.0), abs(factor) * meta[source, 7] + extra, source
 
 
-@njit(cache=True, error_model="numpy", nogil=True, parallel=True)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, parallel=True)
 def ratio_array(
-    v: NDArray[np.float64],
-    y: NDArray[np.float64],
-    coef: NDArray[np.float64],
-    meta: NDArray[np.float64],
-    bcoef: NDArray[np.float64],
-    bmeta: NDArray[np.float64],
-    mu: NDArray[np.float64],
-    bound: NDArray[np.float64],
-    source: NDArray[np.int8],
-) -> None:
+    v: Array, y: Array, coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+    mu: Array, bound: Array, source: NDArray[np.int8],
+) -> None:  # fmt: skip
     """Fill ``mu``, ``bound``, ``source`` (n,) for the points (``v``, ``y``) (n,)."""
     for i in prange(v.size):
         m, e, s = ratio(v[i], y[i], coef, meta, bcoef, bmeta)
@@ -246,19 +263,22 @@ def ratio_array(
         source[i] = s
 
 
-@njit(cache=True, error_model="numpy", nogil=True, parallel=True)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, parallel=True)
 def value_array(
-    v: NDArray[np.float64],
-    y: NDArray[np.float64],
-    coef: NDArray[np.float64],
-    meta: NDArray[np.float64],
-    bcoef: NDArray[np.float64],
-    bmeta: NDArray[np.float64],
-    mu: NDArray[np.float64],
-) -> None:
+    v: Array, y: Array, coef: Array, meta: Array, bcoef: Array, bmeta: Array, mu: Array
+) -> None:  # fmt: skip
     """Fill ``mu`` (n,) alone: the dimensionless fast path.  NaN where the point is outside the quadrant."""
     for i in prange(v.size):
-        if v[i] >= 0.0 and y[i] >= 0.0 and (v[i] < math.inf or y[i] < math.inf):
-            mu[i] = ratio(v[i], y[i], coef, meta, bcoef, bmeta)[0]
+        vi, yi = v[i], y[i]
+        if not (0.0 < vi < math.inf and 0.0 < yi < math.inf):
+            if vi >= 0.0 and yi >= 0.0 and yi < math.inf:
+                mu[i] = ratio(vi, yi, coef, meta, bcoef, bmeta)[0]
+            else:
+                mu[i] = math.nan
+            continue
+        source, a, b, base, factor, _ = locate(vi, yi, bcoef, bmeta)
+        if source >= NO_PATCH:
+            mu[i] = base
         else:
-            mu[i] = math.nan
+            p, u, w = _cell(meta, source, a, b)
+            mu[i] = min(base + factor * patch_value(coef, p, u, w), 1.0)

@@ -137,7 +137,7 @@ def dimensional(
         r = y0 * omega / v0
         if not 1e-290 < y0 * omega < 1e290:
             r = _scaled(y0, omega, v0, 1.0, 1.0)
-        mu, _ = outer_expansion(r)
+        mu, _, _, _ = outer_expansion(r)
         return mu, ROUNDING * mu, RIGID, math.inf, math.inf
     if v0 == 0.0:
         y = _scaled(y0, k, mu0, Fz, 1.0)
@@ -154,7 +154,7 @@ def dimensional(
         mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
         return mu, bound, source, v, y
     # y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large
-    mu, _ = outer_expansion(r)
+    mu, _, _, _ = outer_expansion(r)
     bound = ROUNDING * mu
     if v < 1e150:
         bound += mu

@@ -6,13 +6,24 @@ would be ill conditioned, and the interpolant is the near-best polynomial on the
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from friction.kernels import DEGREE, WIDTH
+from friction.kernels import DEGREE, SQRT2, WIDTH
+from friction.regions import BlockSpec
 
-__all__ = ["cells_1d", "cells_2d", "chebyshev_coefficients", "interpolation_matrix", "nodes"]
+__all__ = [
+    "axis_positions",
+    "cells_1d",
+    "cells_2d",
+    "chebyshev_coefficients",
+    "interpolation_matrix",
+    "nodes",
+    "s_of_sigma",
+]
 
 Array = NDArray[np.float64]
 
@@ -55,17 +66,41 @@ def cells_1d(values: Array, cells: int) -> Array:
     """Power-basis coefficients (cells, WIDTH), highest power first, of node ``values`` (n,)."""
     matrix = interpolation_matrix(values.size, _cell_points(cells))
     local = (matrix @ chebyshev_coefficients(values)).reshape(cells, WIDTH)
-    return np.ascontiguousarray(local @ _TO_POWERS.T)
+    out: Array = np.ascontiguousarray(local @ _TO_POWERS.T)
+    return out
 
 
-def cells_2d(values: Array, cells_a: int, cells_b: int) -> Array:
+def s_of_sigma(sigma: Array) -> Array:
+    """s of the table file for the evaluation's coordinate sigma (:func:`friction.kernels.edge_coordinate`)."""
+    low = np.arcsin(np.minimum(sigma, math.sqrt(0.5)))
+    high = 0.5 * math.pi - np.arcsin(np.clip(SQRT2 - sigma, 0.0, math.sqrt(0.5)))
+    out: Array = 2.0 / math.pi * np.where(sigma <= math.sqrt(0.5), low, high)
+    return out
+
+
+def axis_positions(spec: BlockSpec, axis: int, cells: int) -> Array:
+    """Local Chebyshev points of all cells along one axis, as positions in [-1, 1] on the nodes' axis.
+
+    Along s the cells are uniform in sigma; cells that lie wholly below the block are never visited and repeat its edge.
+    """
+    if (spec.a_name, spec.b_name)[axis] != "s":
+        return _cell_points(cells)
+    low, high = spec.b
+    s = s_of_sigma(0.5 * SQRT2 * (_cell_points(cells) + 1.0))
+    first = s.reshape(cells, WIDTH)
+    dead = s_of_sigma(SQRT2 * (np.arange(cells) + 1.0) / cells) <= low
+    first[dead] = low
+    return (2.0 * first.ravel() - low - high) / (high - low)
+
+
+def cells_2d(spec: BlockSpec, values: Array, cells_a: int, cells_b: int) -> Array:
     """Power-basis coefficients (cells_a * cells_b, WIDTH, WIDTH) of node ``values`` (n_a, n_b).
 
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from DEGREE down to 0.
     """
     c = chebyshev_coefficients(values)
-    left = interpolation_matrix(values.shape[0], _cell_points(cells_a))
-    right = interpolation_matrix(values.shape[1], _cell_points(cells_b))
+    left = interpolation_matrix(values.shape[0], axis_positions(spec, 0, cells_a))
+    right = interpolation_matrix(values.shape[1], axis_positions(spec, 1, cells_b))
     local = (left @ c @ right.T).reshape(cells_a, WIDTH, cells_b, WIDTH)
     power = np.einsum("pi,aibj,qj->abqp", _TO_POWERS, local, _TO_POWERS, optimize=True)
     return np.ascontiguousarray(power.reshape(cells_a * cells_b, DEGREE + 1, DEGREE + 1))

@@ -62,6 +62,7 @@ Y_TAIL = 1e5  # above, what is left beyond the outer solution is linear in 1/y~ 
 Y_STICK_LO = 0.75
 Y_STICK_HI = 1.6
 S_CUT = 0.3
+SIGMA_CUT = math.sin(0.5 * math.pi * S_CUT)  # S_CUT as sqrt(v~/v~crit), the coordinate of the evaluation
 R_MAX = 1.25  # covers s <= S_CUT for every y~ in [Y_STICK_LO, Y_STICK_HI]
 L_MAX = 4.0  # ln(v~ / sqrt y~) from which the two-term expansion for v~ -> infinity holds to 1e-14
 L_LOW = math.log(0.4)  # below the border for y~ >= Y_CONT: ln 0.4066

@@ -85,8 +85,8 @@ class Surrogate:
         self.border = Border(table.border)
         patches, rows, first = [], [], 0
         for spec, block in zip(regions.BLOCKS, table.blocks, strict=True):
-            coefficients = cells_2d(block.values, *block.cells)
-            (a0, a1), (b0, b1) = spec.a, spec.b
+            coefficients = cells_2d(spec, block.values, *block.cells)
+            (a0, a1), (b0, b1) = spec.a, ((0.0, kernels.SQRT2) if spec.b_name == "s" else spec.b)
             na, nb = block.cells
             rows.append([first, na, nb, a0, na / (a1 - a0), b0, nb / (b1 - b0), block.quantity_error])
             patches.append(coefficients)
