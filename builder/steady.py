@@ -359,7 +359,7 @@ def stick_slip(
         z = 0.5 * (lo + hi)
     z_old = z
     f_old = math.inf
-    spread = math.inf
+    spread = before = math.inf
     for it in range(200):
         f, status = _section(kind, v, y, eta, z, chart, w, out, orbit)
         if status in (NO_SLIP, NO_STICK):
@@ -378,9 +378,9 @@ def stick_slip(
             hi = z
         else:
             lo = z
-        if f == 0.0 or spread < 1e-9:
-            # the last secant step was below 1e-9 of z: its error is its square, this evaluation is the answer
-            return OK, max(min(spread * spread, 1e-9), 2e-16) if f != 0.0 else 2e-16
+        if f == 0.0 or spread * before < 1e-17:
+            # the secant method's error is about the product of its last two steps: this evaluation is the answer
+            return OK, 2e-16
         secant = False
         if f_old == math.inf:
             if kind == 0 and (near or abs(f) > 1e-3 * z):
@@ -399,6 +399,7 @@ def stick_slip(
         if hi - lo <= 4e-16 * hi or new == z:
             return OK, 2e-16
         # only a secant step tells how far the root still is
+        before = spread
         spread = abs(new - z) / abs(new) if secant else math.inf
         z_old, f_old, z = z, f, new
     return NOT_CONVERGED, spread
@@ -453,7 +454,7 @@ def solve_raw(
         shrink = y / SMALLEST_Y
         # in stick-slip v~ scales with y~^2; in continuous sliding the response is linear at any v~
         scaled = (v / shrink) / shrink
-        v = scaled if scaled < BELOW_LINEAR else v
+        v = scaled if scaled < BELOW_LINEAR else max(v, BELOW_LINEAR)
         y = SMALLEST_Y
         eta = y - 1.0
     guess = border_guess(y)
