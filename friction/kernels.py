@@ -37,15 +37,15 @@ FUSE = {"contract"}
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
-def outer_expansion(r: float) -> tuple[float, float, float, float]:
-    """Two terms of mu~ = f(r) + g(r)/v~^2 + ... for v~ -> infinity, and their slopes: f, g, r f', r g'; r = y~/v~ >= 0.
+def outer_expansion(r: float) -> tuple[float, float, float, float, float]:
+    """Two terms of mu~ = f(r) + g(r)/v~^2 + ... for v~ -> infinity: f, g, r f', r g', r (r f')'; r = y~/v~ >= 0.
 
     f = (2/pi) K(i r) is eq. (35); g = r^2 <sin^2 (1/2 - r^2 cos^2) (1 + r^2 cos^2)^(-7/2)>.
     """
     h = math.hypot(1.0, r)
     q = 1.0 / h  # sqrt(1 - m) with m = r^2 / (1 + r^2)
     if q == 0.0:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     m = (r * q) * (r * q)
     a, g, power, total = 1.0, q, 0.5, 0.5 * m
     for _ in range(64):
@@ -69,7 +69,7 @@ def outer_expansion(r: float) -> tuple[float, float, float, float]:
         3.0 * m * i7 * h - 10.5 * (i7 - i9) * h - 2.0 * m * i5 * h
         + 5.0 * (m * h + 2.5 * q) * (i5 - i7) - 3.0 * q * (e - i5)
     )  # fmt: skip
-    return k * q, second, q * (e - k), slope
+    return k * q, second, q * (e - k), slope, q * (k - e - 3.0 * (e - i5))
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
@@ -197,7 +197,7 @@ def locate(v: float, y: float, bcoef: Array, bmeta: Array) -> tuple[int, float, 
 def _fast(v: float, y: float, root: float) -> tuple[int, float, float, float, float, float]:
     # (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes from the second term is half r f'
     speed = v * v + 1.0
-    first, second, slope, _ = outer_expansion(y / math.sqrt(speed))
+    first, second, slope, _, _ = outer_expansion(y / math.sqrt(speed))
     correction = (second + 0.5 * slope) / speed
     # the next term is smaller by (y~/v~^2)^2 where y~ > v~, by 1/v~^2 elsewhere
     small = max(root / v * (root / v), 1.0 / v)
@@ -217,7 +217,7 @@ def _beyond(
     factor = v / y
     if factor == 0.0:
         return S_TAIL, a, 0.0, 0.0, 0.0, 0.0
-    first, _, _, _ = outer_expansion(1.0 / factor)
+    first, _, _, _, _ = outer_expansion(1.0 / factor)
     extra = 8.0 * ROUNDING * first
     if v >= crit:
         return C_TAIL, a, math.log(v / root), first, factor, extra

@@ -16,8 +16,21 @@ from numpy.typing import ArrayLike, NDArray
 from friction.errors import InputError
 from friction.kernels import NO_OSCILLATION, ROUNDING, STATIC_LIMIT, outer_expansion, ratio
 from friction.regions import RIGID
+from friction.slopes import ratio_and_slopes, speed_slope_at_zero
 
-__all__ = ["BOUNDS", "FIELDS", "POSITIVE", "UNITS", "Fault", "check_inputs", "evaluate_array", "find_faults", "groups"]
+__all__ = [
+    "BOUNDS",
+    "FIELDS",
+    "POSITIVE",
+    "UNITS",
+    "Fault",
+    "check_inputs",
+    "evaluate_array",
+    "find_faults",
+    "gradient",
+    "gradient_array",
+    "groups",
+]
 
 FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
 UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
@@ -137,7 +150,7 @@ def dimensional(
         r = y0 * omega / v0
         if not 1e-290 < y0 * omega < 1e290:
             r = _scaled(y0, omega, v0, 1.0, 1.0)
-        mu, _, _, _ = outer_expansion(r)
+        mu, _, _, _, _ = outer_expansion(r)
         return mu, ROUNDING * mu, RIGID, math.inf, math.inf
     if v0 == 0.0:
         y = _scaled(y0, k, mu0, Fz, 1.0)
@@ -154,11 +167,62 @@ def dimensional(
         mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
         return mu, bound, source, v, y
     # y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large
-    mu, _, _, _ = outer_expansion(r)
+    mu, _, _, _, _ = outer_expansion(r)
     bound = ROUNDING * mu
     if v < 1e150:
         bound += mu
     return mu, bound, RIGID, v, y
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def gradient(
+    mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float,
+    mu: float, source: int, v: float, y: float, coef: Array, meta: Array, bcoef: Array, bmeta: Array, out: Array,
+) -> None:  # fmt: skip
+    """Fill ``out`` (6,) with d mu_macro / d input in the order of FIELDS, given what :func:`dimensional` found.
+
+    One-sided at the edges: d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0,
+    which is infinite on y~ = 1 and for rigid contact.
+    """
+    out[:] = 0.0
+    out[0] = mu
+    if source == NO_OSCILLATION:
+        return
+    if source == RIGID:
+        if v0 > 0.0:
+            r = y0 * omega / v0
+            if not 1e-290 < y0 * omega < 1e290:
+                r = _scaled(y0, omega, v0, 1.0, 1.0)
+            _, _, slope, _, _ = outer_expansion(r)
+            out[3], out[4], out[5] = mu0 * slope / y0, mu0 * slope / omega, -mu0 * slope / v0
+        return
+    if source == STATIC_LIMIT and y == math.inf:
+        out[5] = math.inf
+        return
+    _, along_v, along_y = ratio_and_slopes(v, y, coef, meta, bcoef, bmeta)
+    both = along_v + along_y
+    out[0] = mu - both
+    out[1] = -mu0 * both / Fz
+    out[2] = mu0 * both / k
+    out[3] = mu0 * along_y / y0
+    out[4] = -mu0 * along_v / omega
+    if v0 > 0.0:
+        out[5] = mu0 * along_v / v0
+    else:
+        out[5] = mu0 * speed_slope_at_zero(y, coef, meta, bcoef, bmeta) * (k / (mu0 * Fz)) / omega
+
+
+@njit(cache=True, error_model="numpy", nogil=True, parallel=True)
+def gradient_array(
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
+    mu: Array, source: NDArray[np.int8], v: Array, y: Array,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array, out: Array,
+) -> None:  # fmt: skip
+    """Fill ``out`` (n, 6), see :func:`gradient`."""
+    for i in prange(mu.size):
+        gradient(
+            mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], mu[i], source[i], v[i], y[i], coef, meta, bcoef, bmeta, out[i]
+        )
 
 
 @njit(cache=True, error_model="numpy", nogil=True, parallel=True)

@@ -15,6 +15,7 @@ from friction import kernels, nondim, regions
 from friction.border import Border
 from friction.errors import InputError, TableError
 from friction.patches import cells_2d
+from friction.slopes import slopes_array
 from friction.table import Table, json_attributes, read_table
 
 __all__ = ["REGIME_OF_SOURCE", "Answer", "Surrogate"]
@@ -54,6 +55,8 @@ class Answer:
         Dimensionless speed and amplitude [-].
     length_scale : float or ndarray
         l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact.
+    gradient : dict of str to float or ndarray, or None
+        d mu_macro / d input by field name, where it was asked for; infinite for v0 at v0 = 0 on y~ = 1.
     """
 
     mu_macro: Any
@@ -64,6 +67,7 @@ class Answer:
     v_tilde: Any
     y_tilde: Any
     length_scale: Any
+    gradient: dict[str, Any] | None = None
 
 
 class Surrogate:
@@ -133,9 +137,10 @@ class Surrogate:
     def warm_up(self) -> None:
         """Load or compile every kernel: scalar and array paths, border and dimensional inputs."""
         self.mu_ratio(0.1, 0.5)
-        self.mu_ratio(np.array([0.1]), 0.5)
-        self.evaluate(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01)
-        self.evaluate(np.array([0.3]), 10.0, 1e6, 2e-6, 1.3e5, 0.01)
+        self.mu_ratio(np.array([0.1, 0.1]), 0.5)
+        self.ratio_with_bound(np.array([0.1, 0.1]), 0.5)
+        for mu0 in (0.3, np.array([0.3, 0.3])):
+            self.evaluate(mu0, 10.0, 1e6, 2e-6, 1.3e5, 0.01, gradient=True)
         self.v_tilde_crit(np.array([0.5]))
 
     def self_check(self) -> None:
@@ -181,6 +186,14 @@ class Surrogate:
             kernels.value_array(v_all, y_all, *self._data, out)
         return out.reshape(shape) if shape else float(out[0])
 
+    def slopes(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Array, Array, Array]:
+        """mu~, v~ d mu~/d v~ and y~ d mu~/d y~ [-] of the broadcast shape; inputs must be legal and y~ finite."""
+        (v_all, y_all), shape = _columns(v_tilde, y_tilde)
+        mu, along_v, along_y = (np.empty(v_all.size) for _ in range(3))
+        with _ONE_LOOP:
+            slopes_array(v_all, y_all, *self._data, mu, along_v, along_y)
+        return mu.reshape(shape), along_v.reshape(shape), along_y.reshape(shape)
+
     def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Array, Array, NDArray[np.int8]]:
         """mu~, the bound of its absolute error and the source code, of the broadcast shape; inputs must be legal."""
         (v_all, y_all), shape = _columns(v_tilde, y_tilde)
@@ -190,7 +203,15 @@ class Surrogate:
         return mu.reshape(shape), bound.reshape(shape), source.reshape(shape)
 
     def evaluate(
-        self, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike | None, y0: ArrayLike, omega: ArrayLike, v0: ArrayLike
+        self,
+        mu0: ArrayLike,
+        Fz: ArrayLike,
+        k: ArrayLike | None,
+        y0: ArrayLike,
+        omega: ArrayLike,
+        v0: ArrayLike,
+        *,
+        gradient: bool = False,
     ) -> Answer:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
@@ -208,6 +229,8 @@ class Surrogate:
             Angular frequency [rad/s], >= 0.
         v0 : array_like
             Sliding speed [m/s], >= 0.
+        gradient : bool
+            Also differentiate with respect to every input that was given.
 
         Raises
         ------
@@ -228,7 +251,7 @@ class Surrogate:
             shapes = {name: columns[name].shape for name in nondim.FIELDS}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         if shape == ():
-            return self._scalar(*(float(c) for c in ordered))
+            return self._scalar(*(float(c) for c in ordered), gradient)
         flat, _ = _columns(*ordered)
         n = flat[0].size
         mu, bound, v, y = (np.empty(n) for _ in range(4))
@@ -236,6 +259,9 @@ class Surrogate:
         with _ONE_LOOP:
             a, b, c, d, e, f = flat
             nondim.evaluate_array(a, b, c, d, e, f, *self._data, mu, bound, source, v, y)
+            slopes = np.empty((n, 6)) if gradient else None
+            if slopes is not None:
+                nondim.gradient_array(a, b, c, d, e, f, mu, source, v, y, *self._data, slopes)
         scale = np.broadcast_to(ordered[0], shape)
         ratio: Array = mu.reshape(shape)
         with np.errstate(over="ignore", under="ignore"):
@@ -250,10 +276,20 @@ class Surrogate:
             v_tilde=v.reshape(shape),
             y_tilde=y.reshape(shape),
             length_scale=length,
+            gradient=None if slopes is None else self._named(slopes.T.reshape(6, *shape), k is None),
         )
 
-    def _scalar(self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> Answer:
+    @staticmethod
+    def _named(slopes: Array, rigid: bool) -> dict[str, Any]:
+        return {name: slopes[i] for i, name in enumerate(nondim.FIELDS) if not (rigid and name == "k")}
+
+    def _scalar(self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float, gradient: bool) -> Answer:
         mu, bound, source, v, y = nondim.dimensional(mu0, Fz, k, y0, omega, v0, *self._data)
+        named = None
+        if gradient:
+            slopes = np.empty(6)
+            nondim.gradient(mu0, Fz, k, y0, omega, v0, mu, source, v, y, *self._data, slopes)
+            named = {name: float(slope) for name, slope in self._named(slopes, k == math.inf).items()}
         return Answer(
             mu_macro=mu0 * mu,
             mu_ratio=mu,
@@ -263,6 +299,7 @@ class Surrogate:
             v_tilde=v,
             y_tilde=y,
             length_scale=mu0 * (Fz / k),
+            gradient=named,
         )
 
 
