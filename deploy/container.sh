@@ -116,10 +116,14 @@ PYTHON
 
 say "Building $IMAGE"
 started=$SECONDS
+replaced=$("$engine" image inspect --format '{{.Id}}' "$IMAGE" 2>/dev/null || true)
 "$engine" build "${build_flags[@]}" ${BASE:+--build-arg "BASE=$BASE"} --tag "$IMAGE" \
     --secret "id=pip.conf,src=$work/pip.conf" --secret "id=ca.pem,src=$work/ca.pem" . \
     >"$work/build.log" 2>&1 </dev/null || { tail -n 30 "$work/build.log" >&2; fail "the image does not build"; }
 say "Built in $((SECONDS - started)) s"
+if [[ -n $replaced && $replaced != "$("$engine" image inspect --format '{{.Id}}' "$IMAGE")" ]]; then
+    "$engine" image rm "$replaced" >/dev/null 2>&1 || true   # else every run leaves one nameless image behind
+fi
 
 # --- run ----------------------------------------------------------------------------------------------
 
