@@ -122,7 +122,7 @@ def _root(p: np.ndarray, lo: float, hi: float, derivative: bool) -> float:
     """Root of p (or of p') in [lo, hi], where the sign changes: Newton kept inside the bracket."""
     up = (_slope(p, hi) if derivative else _value(p, hi)) > 0.0
     t = 0.5 * (lo + hi)
-    for _ in range(100):
+    for _ in range(1100):  # the window of slip may be as short as 1e-150: bisection alone must get there
         f = _slope(p, t) if derivative else _value(p, t)
         if (f > 0.0) == up:
             hi = t

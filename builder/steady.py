@@ -406,11 +406,19 @@ def stick_slip(
 
 
 @njit(cache=True, error_model="numpy")
-def _unshrink(res: np.ndarray, shrink: float) -> None:
+def _unshrink(res: np.ndarray, shrink: float, v: float, solved: float) -> None:
+    """From the amplitude SMALLEST_Y back to ``shrink`` times it; ``solved`` is the v~ that was solved for ``v``."""
     if shrink != 1.0:
-        for i in (1, 4, 5, 6):
-            res[i] *= shrink * shrink
+        square = shrink * shrink
+        res[1] *= square
+        res[4] *= square
         res[0] = 1.0 - res[1]
+        if solved == v:  # continuous sliding, not scaled in v~: only what the oscillation adds is quadratic
+            res[5] = v * res[0] + res[4]
+            res[6] = v - (v - res[6]) * square
+        else:
+            res[5] *= square
+            res[6] *= square
 
 
 @njit(cache=True, error_model="numpy")
@@ -450,6 +458,7 @@ def solve_raw(
     if not (0.0 < v < math.inf and 0.0 < y < math.inf):
         return BAD_INPUT
     shrink = 1.0
+    given = v
     if y < SMALLEST_Y:
         shrink = y / SMALLEST_Y
         # in stick-slip v~ scales with y~^2; in continuous sliding the response is linear at any v~
@@ -475,7 +484,7 @@ def solve_raw(
             res[7] = 4e-16
             if res[1] < 0.5:
                 res[0] = 1.0 - res[1]
-            _unshrink(res, shrink)
+            _unshrink(res, shrink, given, v)
             return OK
         hint = out[9]
     status, spread = stick_slip(v, y, eta, hint, w, out, orbit)
@@ -501,7 +510,7 @@ def solve_raw(
         res[0] = 1.0 - res[1]
     else:
         res[1] = 1.0 - res[0]
-    _unshrink(res, shrink)
+    _unshrink(res, shrink, given, v)
     return status
 
 
