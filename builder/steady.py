@@ -407,18 +407,18 @@ def stick_slip(
 
 @njit(cache=True, error_model="numpy")
 def _unshrink(res: np.ndarray, shrink: float, v: float, solved: float) -> None:
-    """From the amplitude SMALLEST_Y back to ``shrink`` times it; ``solved`` is the v~ that was solved for ``v``."""
+    """From the amplitude SMALLEST_Y back to ``shrink`` times it; ``solved`` is the v~ that stood in for ``v``."""
     if shrink != 1.0:
         square = shrink * shrink
         res[1] *= square
         res[4] *= square
         res[0] = 1.0 - res[1]
-        if solved == v:  # continuous sliding, not scaled in v~: only what the oscillation adds is quadratic
-            res[5] = v * res[0] + res[4]
-            res[6] = v - (v - res[6]) * square
-        else:
+        if solved < BELOW_LINEAR:  # v~ was scaled with the square of the amplitude, and all speeds with it
             res[5] *= square
             res[6] *= square
+        else:  # far in continuous sliding: only what the oscillation adds is quadratic
+            res[5] = v * res[0] + res[4]
+            res[6] = v - (solved - res[6]) * square
 
 
 @njit(cache=True, error_model="numpy")
