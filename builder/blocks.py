@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from builder.sweep import Sweep
 from friction import tails
 from friction.border import Border
+from friction.companions import fast_power, power_scale, stick_scale
 from friction.kernels import SQRT2, WIDTH
 from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes, s_of_sigma
-from friction.regions import BORDER_PIECES, CONTINUOUS, BlockSpec
+from friction.regions import BLOCK_INDEX, BORDER_PIECES, CONTINUOUS, BlockSpec
 from friction.table import Block, BorderPiece
 
 __all__ = ["Points", "build_block", "build_border", "points_of", "quantity_of", "slope_of"]
@@ -192,7 +193,16 @@ def build_block(
         if not (grow_a or grow_b):
             break
         na, nb = (_next(na) if grow_a else na), (_next(nb) if grow_b else nb)
+    scale = np.vectorize(power_scale, otypes=[np.float64])(BLOCK_INDEX[spec.name], p.v, p.y)
+    lead = np.zeros_like(p.v)
+    if spec.name == "continuous_tail":
+        lead = np.vectorize(lambda v, y: fast_power(v, y)[0], otypes=[np.float64])(p.v, p.y)
+    power = (solved["power"] - lead) / scale
+    stick = np.empty(0)
+    if spec.regime != CONTINUOUS:
+        stick = solved["stick_fraction"] / np.vectorize(stick_scale, otypes=[np.float64])(BLOCK_INDEX[spec.name], p.y)
     follow = [max(wanted, min(best[axis], 1.0)) for axis in (0, 1)]
     if spec.a_name == "inverse_y":
         follow[0] = wanted
-    return Block(a, b, values, (_cells(values, 0, follow[0], spec), _cells(values, 1, follow[1], spec)))
+    cells = (_cells(values, 0, follow[0], spec), _cells(values, 1, follow[1], spec))
+    return Block(a, b, values, cells, power=power, stick=stick)

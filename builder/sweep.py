@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from builder import steady
 from builder.model import OK, ORDER
+from friction.compiled import source_digest
 
 __all__ = ["COLUMNS", "SolveError", "Sweep"]
 
@@ -152,7 +153,10 @@ class Sweep:
     def _file(self, kind: str, points: Array) -> Path | None:
         if self.checkpoint is None:
             return None
-        digest = hashlib.sha256(kind.encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()).hexdigest()
+        # the digest of the sources: what another state of the solver found is not taken over
+        digest = hashlib.sha256(
+            (source_digest() + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
+        ).hexdigest()
         return self.checkpoint / f"{kind}-{digest[:32]}.npy"
 
     def _load(self, kind: str, points: Array) -> Array | None:

@@ -14,10 +14,11 @@ from pathlib import Path
 
 import numba
 
-__all__ = ["cache_folder"]
+__all__ = ["cache_folder", "source_digest"]
 
 
-def _digest() -> str:
+def source_digest() -> str:
+    """Digest of every source file of solver and core: another digest may mean other numbers."""
     h = hashlib.sha256()
     root = Path(__file__).resolve().parent.parent
     for package in ("friction", "builder"):
@@ -31,15 +32,15 @@ def cache_folder() -> Path:
     """The folder for these sources: below NUMBA_CACHE_DIR, else in the user's cache, else in the temporary folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
-        return Path(chosen) / f"mumacro-{_digest()}"
+        return Path(chosen) / f"mumacro-{source_digest()}"
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "mumacro" / _digest()
+    folder = base / "mumacro" / source_digest()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError:
-        return Path(tempfile.gettempdir()) / f"mumacro-{os.getuid() if hasattr(os, 'getuid') else 0}" / _digest()
+        return Path(tempfile.gettempdir()) / f"mumacro-{os.getuid() if hasattr(os, 'getuid') else 0}" / source_digest()
 
 
-numba.config.CACHE_DIR = str(cache_folder())
+setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010 (an attribute that numba's types do not know)

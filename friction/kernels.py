@@ -104,7 +104,7 @@ def _line(coef: Array, first: int, cells: int, a: float, start: float, scale: fl
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
-def _cell(meta: Array, block: int, a: float, b: float) -> tuple[int, float, float]:
+def cell(meta: Array, block: int, a: float, b: float) -> tuple[int, float, float]:
     """Patch number and local coordinates u, w in [-1, 1] of the block coordinates (a, b).
 
     ``meta`` (blocks, 8): first patch, cells in a, cells in b, start and scale of a, start and scale of b, error.
@@ -245,9 +245,9 @@ def ratio(v: float, y: float, coef: Array, meta: Array, bcoef: Array, bmeta: Arr
     source, a, b, base, factor, extra = locate(v, y, bcoef, bmeta)
     if source >= NO_PATCH:
         return base, extra, source
-    p, u, w = _cell(meta, source, a, b)
+    p, u, w = cell(meta, source, a, b)
     mu = base + factor * patch_value(coef, p, u, w)
-    return min(mu, 1.0), abs(factor) * meta[source, 7] + extra, source
+    return min(max(mu, 0.0), 1.0), abs(factor) * meta[source, 7] + extra, source
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, parallel=True)
@@ -280,5 +280,5 @@ def value_array(
         if source >= NO_PATCH:
             mu[i] = base
         else:
-            p, u, w = _cell(meta, source, a, b)
-            mu[i] = min(base + factor * patch_value(coef, p, u, w), 1.0)
+            p, u, w = cell(meta, source, a, b)
+            mu[i] = min(max(base + factor * patch_value(coef, p, u, w), 0.0), 1.0)

@@ -55,7 +55,7 @@ def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
     return builder.fadd(builder.fmul(a, b, flags=("contract",)), c, flags=("contract",))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _patch_vector(_typing: Any, coef: Any, _p: Any, _u: Any, _w: Any) -> Any:
     signature = types.float64(coef, types.int64, types.float64, types.float64)
 
@@ -84,9 +84,9 @@ def _patch_vector(_typing: Any, coef: Any, _p: Any, _u: Any, _w: Any) -> Any:
     return signature, codegen
 
 
-@overload(patch_value, inline="always")  # type: ignore[untyped-decorator]
+@overload(patch_value, inline="always")
 def _compiled_patch_value(coef: Any, p: Any, u: Any, w: Any) -> Any:  # noqa: ARG001 (numba reads the signature)
     def body(coef: Any, p: Any, u: Any, w: Any) -> Any:
-        return _patch_vector(coef, p, u, w)
+        return _patch_vector(coef, p, u, w)  # type: ignore[call-arg]  # numba supplies the typing context
 
     return body

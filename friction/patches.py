@@ -53,7 +53,7 @@ def chebyshev_coefficients(values: Array) -> Array:
 
 def interpolation_matrix(n: int, t: Array) -> Array:
     """Matrix (len(t), n) from Chebyshev coefficients to values at ``t`` in [-1, 1]."""
-    return chebyshev.chebvander(t, n - 1)
+    return np.asarray(chebyshev.chebvander(t, n - 1), dtype=np.float64)
 
 
 def _cell_points(cells: int) -> Array:

@@ -51,11 +51,12 @@ def _border_slope(y: float, bcoef: Array, bmeta: Array) -> float:
     u = 2.0 * (x - i) - 1.0
     i += int(bmeta[k, 0])
     value: float = bcoef[i, 0]
-    slope = 0.0
+    slope: float = 0.0
     for j in range(1, WIDTH):
         slope = slope * u + value
         value = value * u + bcoef[i, j]
-    return base + weight * 2.0 * bmeta[k, 3] * slope / value
+    out: float = base + weight * 2.0 * bmeta[k, 3] * slope / value
+    return out
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
@@ -81,9 +82,9 @@ def _edge_slope(coef: Array, p: int, u: float, w: float) -> float:
     At the border mu~ is smooth in v~, so q has no linear term in sqrt(1 - v~/v~crit); the interpolant has one of the
     size of its error, which the chain rule would divide by that root.  Taking it out leaves the slope bounded.
     """
-    out = 0.0
+    out: float = 0.0
     for i in range(WIDTH):
-        d = 0.0
+        d: float = 0.0
         for k in range(WIDTH - 1):
             n = WIDTH - 1 - k
             # n (w^(n-1) - 1), summed over the powers of w

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from friction import kernels, nondim, regions
 from friction.border import Border
+from friction.companions import companions_array
 from friction.errors import InputError, TableError
 from friction.patches import cells_2d
 from friction.slopes import slopes_array
@@ -96,6 +97,7 @@ class Surrogate:
             patches.append(coefficients)
             first += coefficients.shape[0]
         self._data = (np.concatenate(patches), np.array(rows), *self.border.arrays)
+        self._companion_data: tuple[Array, Array] | None = None
 
     @classmethod
     def open(cls, path: str | Path) -> Surrogate:
@@ -129,6 +131,33 @@ class Surrogate:
             for spec, block in zip(regions.BLOCKS, self.table.blocks, strict=True)
         ]
 
+    def _companions(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
+        with _ONE_LOOP:
+            if self._companion_data is None:
+                stick, power = [], []
+                for spec, block in zip(regions.BLOCKS, self.table.blocks, strict=True):
+                    power.append(cells_2d(spec, block.power, *block.cells))
+                    none = np.zeros_like(power[-1])
+                    stick.append(cells_2d(spec, block.stick, *block.cells) if block.stick.size else none)
+                self._companion_data = (np.concatenate(power), np.concatenate(stick))
+            (v_all, y_all), shape = _columns(v_tilde, y_tilde)
+            power_out, stick_out = np.empty(v_all.size), np.empty(v_all.size)
+            companions_array(v_all, y_all, *self._companion_data, *self._data[1:], power_out, stick_out)
+        return power_out, stick_out, shape
+
+    def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
+        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
+
+        The slip dissipates v~ mu~ plus this power.  Tabulated at the nodes of mu~; the cells are prepared on first use.
+        """
+        power, _, shape = self._companions(v_tilde, y_tilde)
+        return power.reshape(shape) if shape else float(power[0])
+
+    def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
+        """Share of the period during which the contact sticks [-]; legal inputs, scalar in, float out."""
+        _, stick, shape = self._companions(v_tilde, y_tilde)
+        return stick.reshape(shape) if shape else float(stick[0])
+
     @property
     def memory(self) -> int:
         """Bytes of the cells that the kernel walks through."""
@@ -142,6 +171,7 @@ class Surrogate:
         for mu0 in (0.3, np.array([0.3, 0.3])):
             self.evaluate(mu0, 10.0, 1e6, 2e-6, 1.3e5, 0.01, gradient=True)
         self.v_tilde_crit(np.array([0.5]))
+        self.power(0.1, 0.5)
 
     def self_check(self) -> None:
         """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
@@ -251,7 +281,8 @@ class Surrogate:
             shapes = {name: columns[name].shape for name in nondim.FIELDS}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         if shape == ():
-            return self._scalar(*(float(c) for c in ordered), gradient)
+            m, n_force, stiffness, amplitude, frequency, speed = (float(c) for c in ordered)
+            return self._scalar(m, n_force, stiffness, amplitude, frequency, speed, gradient)
         flat, _ = _columns(*ordered)
         n = flat[0].size
         mu, bound, v, y = (np.empty(n) for _ in range(4))

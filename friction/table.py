@@ -5,7 +5,7 @@ Layout (all quantities dimensionless, units "1"):
 * root: the plain log-spaced grid a person plots first, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
   ``error_estimate`` and ``v_tilde_crit(y_tilde)``, and the provenance as attributes;
 * group ``border``: one sub-group a piece of v~crit (:data:`friction.regions.BORDER_PIECES`);
-* group ``blocks``: one sub-group a block (:data:`friction.regions.BLOCKS`): node coordinates, node values, the
+* group ``border/blocks``: one sub-group a block (:data:`friction.regions.BLOCKS`): node coordinates, node values, the
   coordinate map by name, the number of cells for evaluation, the verified error.
 """
 
@@ -50,6 +50,10 @@ _COORDINATES = {
     "radius": "distance R from the corner y_tilde = 1, v_tilde = 0 in normal-form coordinates",
     "angle": "polar angle of the normal form, 2 psi/pi",
 }
+_COMPANIONS = {
+    "power": "mean power of the shaker over mu0 Fz l0 omega, scaled as in friction.companions",
+    "stick": "stick fraction, scaled as in friction.companions",
+}
 _QUANTITIES = {
     "deficit_low": "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2",
     "hypotenuse": "mu_ratio sqrt(1 + y_tilde^2/v_tilde^2)",
@@ -77,7 +81,8 @@ class Block:
     """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), ``values`` (m, n), cells for evaluation, verified errors.
 
     ``quantity_error`` bounds the error of the tabulated quantity; ``max_abs_error`` and ``max_rel_error`` are those of
-    mu~ over the block.
+    mu~ over the block.  ``power`` (m, n) and, in stick-slip, ``stick`` (m, n) hold the scaled oscillation
+    power and stick fraction of :mod:`friction.companions` at the same nodes.
     """
 
     a: Array
@@ -87,6 +92,8 @@ class Block:
     quantity_error: float = 0.0
     max_abs_error: float = 0.0
     max_rel_error: float = 0.0
+    power: Array = field(default_factory=lambda: np.empty(0))
+    stick: Array = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass
@@ -119,7 +126,7 @@ def _digest(table: Table) -> str:
     for name, block in zip(regions.NAMES, table.blocks, strict=True):
         errors = (block.quantity_error, block.max_abs_error, block.max_rel_error)
         h.update(f"{name} {tuple(block.cells)} {errors!r}".encode())
-        for array in (block.a, block.b, block.values):
+        for array in (block.a, block.b, block.values, block.power, block.stick):
             h.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
     return h.hexdigest()
 
@@ -153,13 +160,17 @@ def _fill(root: Any, table: Table) -> None:
         _put(group, coordinate, (coordinate,), piece.nodes, _COORDINATES[coordinate])
         _put(group, "value", (coordinate,), piece.values, quantity)
         group.setncatts({"range": np.array(span), "cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error})
-    blocks = root.createGroup("blocks")
+    # inside the border, which they are fitted to: the CF checker takes a second group at the root for a time series
+    blocks = border.createGroup("blocks")
     for spec, block in zip(regions.BLOCKS, table.blocks, strict=True):
         group = blocks.createGroup(spec.name)
         for axis, values in ((spec.a_name, block.a), (spec.b_name, block.b)):
             group.createDimension(axis, values.size)
             _put(group, axis, (axis,), values, _COORDINATES[axis])
         _put(group, "value", (spec.a_name, spec.b_name), block.values, _QUANTITIES[spec.quantity])
+        for name, nodes in (("power", block.power), ("stick", block.stick)):
+            if nodes.size:
+                _put(group, name, (spec.a_name, spec.b_name), nodes, _COMPANIONS[name])
         group.setncatts(
             {
                 "regime": regions.REGIMES[spec.regime],
@@ -228,7 +239,8 @@ def _read(root: Any, path: Path) -> Table:
     version = attributes["format_version"]
     if int(version) != FORMAT_VERSION:
         raise TableError(path, f"format version {version}, this program reads {FORMAT_VERSION}")
-    border_group, blocks_group = _group(root, "border", path), _group(root, "blocks", path)
+    border_group = _group(root, "border", path)
+    blocks_group = _group(border_group, "blocks", path)
     border, blocks = [], []
     for name, coordinate, _, _ in regions.BORDER_PIECES:
         group = _group(border_group, name, path)
@@ -248,8 +260,11 @@ def _read(root: Any, path: Path) -> Table:
             float(group.quantity_error),
             float(group.verified_max_abs_error),
             float(group.verified_max_rel_error),
+            _array(group, "power", path),
+            _array(group, "stick", path) if spec.regime == regions.STICK_SLIP else np.empty(0),
         )
-        if block.values.shape != (block.a.size, block.b.size) or min(block.cells) < 1:
+        shapes = {block.values.shape, block.power.shape} | ({block.stick.shape} if block.stick.size else set())
+        if shapes != {(block.a.size, block.b.size)} or min(block.cells) < 1:
             raise TableError(path, f"{group.path}: shapes of nodes and values disagree")
         blocks.append(block)
     names = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
