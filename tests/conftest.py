@@ -1,13 +1,22 @@
-"""What the tests of the service share: the committed tables, an application, a client, and the form of errors."""
+"""What the tests share: the committed tables, a service with its client, reference values, solvers, the builder."""
 
+import csv
+import importlib.util
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi import FastAPI
+from numpy.typing import NDArray
 from starlette.testclient import TestClient
 
+from builder.sweep import Sweep
 from friction import Surrogate
 from service.app import create_app
 from service.settings import Settings
@@ -70,3 +79,65 @@ def problem() -> Callable[..., dict[str, Any]]:
         return document
 
     return check
+
+
+# --- what the numerical tests share -------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The 496 points of an independent quadruple-precision solver, tests/data/points.csv; columns as arrays (496,)."""
+
+    case: NDArray[np.str_]
+    v: NDArray[np.float64]
+    y: NDArray[np.float64]
+    mu_ratio: NDArray[np.float64]
+    regime: NDArray[np.str_]
+    stick_fraction: NDArray[np.float64]
+
+
+@pytest.fixture(scope="session")
+def reference(repository: Path) -> Reference:
+    """All reference points."""
+    with (repository / "tests" / "data" / "points.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    text = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Reference(
+        text["case"], text["v"].astype(float), text["y"].astype(float), text["mu_ratio"].astype(float),
+        text["regime"], text["stick_fraction"].astype(float),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def reference_border(repository: Path) -> NDArray[np.float64]:
+    """The border of the same solver, tests/data/border.csv: rows of y~, v~crit, mu~ there, shape (17, 3)."""
+    return np.loadtxt(repository / "tests" / "data" / "border.csv", delimiter=",", skiprows=1)
+
+
+@pytest.fixture(scope="session")
+def sweep() -> Iterator[Sweep]:
+    """Compiled solving of many points at once."""
+    with Sweep(workers=2) as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def naive(repository: Path) -> ModuleType:
+    """The naive solver of tests/naive.py; loaded by path, since tests are no package."""
+    spec = importlib.util.spec_from_file_location("naive", repository / "tests" / "naive.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def run_builder(repository: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """``python -m builder ARGUMENTS`` as a user starts it; returns the finished process."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        words = [sys.executable, "-m", "builder", *map(str, arguments)]
+        return subprocess.run(words, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
+
+    return run

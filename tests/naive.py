@@ -1,0 +1,43 @@
+"""A deliberately naive solver of the same model: Euler steps projected on the friction limit, whole periods, no theory.
+
+It shares nothing with ``builder``: no half period, no closed form, no events, no root-finding.  The foot follows the
+sweeping process u <- P(u + dP) with P the projection on the unit disc and dP the displacement of the upper point.
+Its error is proportional to the step, which is what makes it a witness.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+@njit
+def march(v: float, y: float, steps: int, periods: int) -> NDArray[np.float64]:
+    """Orbit (steps, 2) of u over the last of ``periods`` periods; v = v~ [-], y = y~ [-], from the relaxed spring."""
+    orbit = np.empty((steps, 2))
+    ux, uy = 0.0, 0.0
+    d_tau = 2.0 * math.pi / steps
+    for _ in range(periods):
+        for i in range(steps):
+            ux += v * d_tau
+            uy += y * (math.sin((i + 1) * d_tau) - math.sin(i * d_tau))
+            stretch = math.hypot(ux, uy)
+            if stretch > 1.0:
+                ux /= stretch
+                uy /= stretch
+            orbit[i, 0] = ux
+            orbit[i, 1] = uy
+    return orbit
+
+
+def periods_until_steady(v: float, y: float) -> int:
+    """Periods after which a start is forgotten: the slip path per period is at least 4 (y~ - 1) and about 2 pi v~."""
+    return math.ceil(1.0 / v + 40.0 / max(2.0 * math.pi * v, 4.0 * (y - 1.0)))
+
+
+def mu_ratio(v: float, y: float, steps: int) -> float:
+    """mu~ = <u_x> over one steady period of ``steps`` steps; first-order accurate."""
+    return float(march(v, y, steps, periods_until_steady(v, y))[:, 0].mean())

@@ -1,0 +1,396 @@
+"""The exact solver: against an independent quadruple-precision solver, a naive one, its own invariants and limits."""
+
+import math
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from builder import model, steady
+from builder.model import NO_SLIP, OK, slip
+from builder.steady import ADVICE, BAD_INPUT, Steady, solve, solve_raw, workspace
+from builder.sweep import Sweep
+from friction.tails import outer, second_order
+
+Array = NDArray[np.float64]
+
+ORDINARY = [(0.1, 0.5), (2.0, 1.0), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (0.02, 1.05), (1.5, 20.0)]
+STICKING = [(0.1, 0.5), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (1e-6, 0.7), (1e-6, 1.0), (1e-5, 5.0), (1.5, 20.0)]
+SLIDING = [(2.0, 1.0), (0.5, 0.3), (1.0, 3.0), (20.0, 0.01), (30.0, 400.0), (0.05, 0.3)]
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
+    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
+
+
+def integral(f: Callable[[float], float], low: float, high: float) -> float:
+    """Gauss-Legendre with 200 nodes: to rounding for the sines and cosines of a stick phase."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    return half * math.fsum(w * f(middle + half * x) for x, w in zip(nodes, weights, strict=True))
+
+
+def corner_radius(v: float, y: float) -> float:
+    """R of the polar coordinates: phi is the positive root of phi^3 + 2 (y~ - 1) phi = pi v~, s0^2 = 2 pi v~/phi."""
+    low, high = 0.0, 3.0
+    for _ in range(200):
+        phi = 0.5 * (low + high)
+        if phi**3 + 2.0 * (y - 1.0) * phi > math.pi * v:
+            high = phi
+        else:
+            low = phi
+    return math.sqrt(2.0 * phi * phi + math.pi * v / phi)
+
+
+# --- against the reference ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ["random", "creep", "tail_vinf", "tail_y0", "tail_yinf", "border", "corner"])
+def test_reference_points_are_met_to_rounding(case: str, reference: Any, sweep: Sweep) -> None:
+    at = reference.case == case
+    assert at.sum() >= 12
+    solved = sweep.solve("full", reference.v[at], reference.y[at])  # raises unless every status is success
+    error = np.abs(solved["mu_ratio"] - reference.mu_ratio[at])
+    assert error.max() <= 3e-16
+    assert (error / reference.mu_ratio[at]).max() <= 2e-15
+    assert (error <= solved["error_estimate"]).all()
+    # the end of slip is a grazing root next to the border, known to about 1e-16 / sqrt(1 - v~/v~crit)
+    stick = np.abs(solved["stick_fraction"] - reference.stick_fraction[at])
+    assert stick.max() <= (2e-12 if case == "border" else 2e-15)
+
+
+def test_every_class_of_reference_points_is_tested(reference: Any) -> None:
+    assert reference.case.size == 496
+    assert set(reference.case) == {"random", "creep", "tail_vinf", "tail_y0", "tail_yinf", "border", "corner"}
+
+
+def test_reference_regimes(reference: Any) -> None:
+    for v, y, regime in zip(reference.v, reference.y, reference.regime, strict=True):
+        found = solve(v, y)
+        assert found.status == OK
+        assert found.ok
+        assert found.regime == regime
+
+
+def test_corner_points_keep_relative_digits_at_every_distance(reference: Any) -> None:
+    at = reference.case == "corner"
+    radius = [corner_radius(v, y) for v, y in zip(reference.v[at], reference.y[at], strict=True)]
+    assert min(radius) < 2e-4 < 0.5 < max(radius)
+    for v, y, mu in zip(reference.v[at], reference.y[at], reference.mu_ratio[at], strict=True):
+        assert solve(v, y).mu_ratio == pytest.approx(mu, rel=2e-15, abs=0.0)
+
+
+@pytest.mark.parametrize(("v", "y"), ORDINARY)
+def test_naive_solver_agrees_to_its_own_error_which_halves_with_its_step(v: float, y: float, naive: ModuleType) -> None:
+    mu = solve(v, y).mu_ratio
+    coarse, fine = (naive.mu_ratio(v, y, steps) - mu for steps in (8_000, 16_000))
+    assert abs(fine) < 1e-4
+    assert coarse / fine == pytest.approx(2.0, abs=0.03)
+    assert abs(2.0 * fine - coarse) < 2e-6  # what is left once the first-order error is extrapolated away
+
+
+@pytest.mark.parametrize(("v", "y"), ORDINARY)
+def test_naive_orbit_is_antisymmetric_about_half_a_period(v: float, y: float, naive: ModuleType) -> None:
+    # the naive solver marches whole periods and knows nothing of the symmetry that the exact one relies on
+    orbit = naive.march(v, y, 4_000, naive.periods_until_steady(v, y))
+    first, second = orbit[:2_000], orbit[2_000:]
+    assert np.abs(second[:, 0] - first[:, 0]).max() < 1e-14
+    assert np.abs(second[:, 1] + first[:, 1]).max() < 1e-14
+
+
+# --- the orbit itself ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("v", "y"), SLIDING)
+def test_continuous_orbit_closes_over_a_whole_period(v: float, y: float) -> None:
+    w, out, _, _ = workspace()
+    assert steady.continuous(v, y, w, out) == OK
+    start, chart = out[1], int(out[2])  # at sigma = pi/2 half a period has passed
+    half_turn = chart * 0.5 * math.pi + start
+    # the other half, with the shaker moving the other way, is the mirror image: start it from the mirrored angle
+    assert slip(v, y, -0.5 * math.pi, 0, -start, -chart, 0.5 * math.pi, False, w, out) == OK
+    assert out[2] * 0.5 * math.pi + out[1] == pytest.approx(half_turn, abs=4e-15)
+    assert out[8] > 0.0
+
+
+@pytest.mark.parametrize(("v", "y"), STICKING)
+def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadrature(v: float, y: float) -> None:
+    w, out, orbit, res = workspace()
+    assert solve_raw(v, y, y - 1.0, w, out, orbit, res) == OK
+    duration, ux0, _, uy0, start, end = orbit
+    assert duration == pytest.approx(math.pi - start + end, abs=1e-15)
+    assert math.hypot(ux0, uy0) == pytest.approx(1.0, abs=4e-16)
+
+    def ux(s: float) -> float:
+        return ux0 + v * (s - start)
+
+    def uy(s: float) -> float:
+        return uy0 - 2.0 * y * math.sin(0.5 * (s + start)) * math.sin(0.5 * (s - start))
+
+    def slip_speed(s: float) -> float:
+        return v * ux(s) - y * math.sin(s) * uy(s)
+
+    # slip stops where lam = 0; stick ends where |u| = 1 again, and never passes it in between
+    assert slip_speed(start) == pytest.approx(0.0, abs=1e-15 * (1.0 + y))
+    stop = start + duration
+    assert math.hypot(ux(stop), uy(stop)) == pytest.approx(1.0, abs=4e-15)
+    inside = np.linspace(start, stop, 20_001)[1:-1]
+    assert max(math.hypot(ux(s), uy(s)) for s in inside) <= 1.0 + 4e-15
+
+    stick_mean = integral(ux, start, stop)
+    drive = v * stick_mean
+    shaker = integral(lambda s: -y * math.sin(s) * uy(s), start, stop)
+    assert drive + shaker == pytest.approx(0.0, abs=1e-13 * (1.0 + y))  # the spring returns all it took
+
+    assert (stick_mean + out[4]) / math.pi == pytest.approx(res[0], abs=1e-15)
+    assert (shaker + out[7]) / math.pi == pytest.approx(res[4], abs=1e-13 * (1.0 + y))
+    assert out[6] / math.pi == pytest.approx(res[5], rel=1e-15)
+    # what drive and shaker put in is what friction takes out
+    assert (drive + shaker + v * out[4] + out[7]) / math.pi == pytest.approx(res[5], rel=1e-12)
+    # and slip ends, mirrored, exactly where stick started
+    assert out[0] == pytest.approx(start, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("v_range", "y_range"),
+    [
+        ((1e-3, 1e3), (1e-3, 1e3)),
+        ((1e-12, 1e8), (1e-8, 1e8)),
+        ((1e-200, 1e8), (1e-300, 1e8)),
+        ((1e-60, 1e-3), (1e-9, 10.0)),
+    ],
+)
+def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float], y_range: tuple[float, float]) -> None:
+    rng = np.random.default_rng(7)
+    v, y = log_uniform(rng, *v_range, 1500), log_uniform(rng, *y_range, 1500)
+    w, out, orbit, res = workspace()
+    for vi, yi in zip(v, y, strict=True):
+        assert solve_raw(vi, yi, yi - 1.0, w, out, orbit, res) == OK
+        mu, deficit, regime, stick, power, path, _, estimate = res
+        assert 0.0 <= mu <= 1.0
+        assert 0.0 <= deficit <= 1.0
+        assert mu + deficit == pytest.approx(1.0, abs=1e-15)
+        assert 0.0 <= stick <= 1.0
+        assert (stick > 0.0) == (regime == steady.STICK_SLIP)
+        assert 0.0 < estimate < 1e-15
+        if vi * mu > 1e-280:
+            assert path > 0.0
+            assert abs(vi * mu + power - path) <= 4e-15 * path
+
+
+@pytest.mark.parametrize(
+    ("v", "y"), [(1.0, 1e-10), (1e3, 1e-200), (1e-21, 1e-10), (2e-21, 1e-10), (1e-15, 1e-267), (3e-20, 1e-12)]
+)
+def test_amplitudes_below_the_scaled_one_report_the_speeds_of_their_own_problem(v: float, y: float) -> None:
+    found = solve(v, y)
+    assert found.slip_speed == pytest.approx(v, rel=1e-9)
+    if found.regime == "continuous":
+        assert 0.0 < found.min_slip_speed <= v
+        assert found.deficit == pytest.approx(0.25 * y * y / (1.0 + v * v), rel=1e-9)
+
+
+def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
+    # the window of slip lasts sqrt(v~); down at 1e-96 a bisection of 100 steps no longer finds its end
+    for exponent in range(-200, -4, 4):
+        v = 2.77 * 10.0**exponent
+        found = solve(v, 0.8917)
+        assert found.mu_ratio == pytest.approx(math.sqrt((1.0 - 0.8917) * (1.0 + 0.8917)), abs=8.0 * v**1.0 + 1e-15)
+        assert found.slip_speed / v == pytest.approx(2.20933, rel=1e-3 if exponent > -12 else 1e-5)
+        assert v * found.mu_ratio + found.power == pytest.approx(found.slip_speed, rel=1e-14)
+
+
+# --- monotony -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("y", [1e-3, 0.1, 0.74, 1.0, 1.3, 3.0, 100.0, 1e5])
+def test_mu_rises_strictly_with_speed(y: float, sweep: Sweep) -> None:
+    v = np.geomspace(1e-9, 1e5, 4000)
+    solved = sweep.solve("full", v, np.full_like(v, y))
+    # neighbours differ by 0.8 % in v~, which near mu~ = 1 shows in the deficit alone
+    rising = np.where(solved["mu_ratio"] < 0.5, solved["mu_ratio"], -solved["deficit"])
+    low, high = rising[:-1], rising[1:]
+    both = (low > 0.0) == (high > 0.0)
+    flat = (v[1:] < 1e-7) & (y < 1.0)  # static limit: mu~ moves by less than its last digit
+    assert np.all(high[both & ~flat] > low[both & ~flat])
+    assert np.all(high[both & flat] >= low[both & flat] - 3e-16)
+
+
+@pytest.mark.parametrize("v", [1e-9, 1e-4, 0.01, 0.3, 1.0, 30.0, 1e4])
+def test_mu_falls_strictly_with_amplitude(v: float, sweep: Sweep) -> None:
+    y = np.geomspace(1e-6, 1e6, 4000)
+    solved = sweep.solve("full", np.full_like(y, v), y)
+    falling = np.where(solved["mu_ratio"] < 0.5, solved["mu_ratio"], -solved["deficit"])
+    both = (falling[1:] > 0.0) == (falling[:-1] > 0.0)
+    assert np.all(falling[1:][both] < falling[:-1][both])
+
+
+# --- limits -------------------------------------------------------------------------------------------
+
+
+def order(errors: list[float], factor: float) -> float:
+    """Observed order of convergence of the last step, with the parameter divided by ``factor`` each time."""
+    return math.log(abs(errors[-2] / errors[-1])) / math.log(factor)
+
+
+@pytest.mark.parametrize("y", [0.1, 0.5, 0.9])
+def test_static_limit_below_one_and_its_linear_term(y: float) -> None:
+    static = math.sqrt(1.0 - y * y)  # eq. (16)
+    slope = math.pi / (2.0 * (1.0 - y * y))
+    errors = [solve(v, y).mu_ratio - static - slope * v for v in (1e-5, 1e-6, 1e-7)]
+    assert order(errors, 10.0) == pytest.approx(1.5, abs=0.05)
+
+
+@pytest.mark.parametrize(("y", "constant"), [(1.1, 15.74522672), (2.0, 1.74344269), (10.0, 0.30660836)])
+def test_slope_at_zero_speed_above_one(y: float, constant: float) -> None:
+    assert solve(1e-12, y).mu_ratio / 1e-12 == pytest.approx(constant, abs=6e-9)
+    errors = [solve(v, y).mu_ratio / v - solve(1e-14, y).mu_ratio / 1e-14 for v in (1e-3, 1e-4, 1e-5)]
+    assert abs(errors[0]) > abs(errors[1]) > abs(errors[2])
+
+
+def test_small_amplitude_limit() -> None:
+    # eq. (31): 1 - mu~ = y~^2 / (4 (1 + v~^2)), relative error O(y~^2)
+    for v in (0.5, 3.0, 100.0):
+        errors = [solve(v, y).deficit / (y * y / (4.0 * (1.0 + v * v))) - 1.0 for y in (0.08, 0.04, 0.02)]
+        assert order(errors, 2.0) == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("r", [0.3, 1.0, 7.0])
+def test_fast_limit_and_the_order_of_its_error(r: float) -> None:
+
+    bare = [solve(v, r * v).mu_ratio - float(outer(r)) for v in (50.0, 100.0, 200.0)]
+    assert order(bare, 2.0) == pytest.approx(2.0, abs=0.02)
+    speeds = [scale * max(1.0, 3.0 * r) for scale in (15.0, 30.0, 60.0)]
+    corrected = [solve(v, r * v).mu_ratio - float(outer(r)) - float(second_order(r)) / v**2 for v in speeds]
+    assert order(corrected, 2.0) == pytest.approx(4.0, abs=0.1)
+
+
+def test_corner_follows_the_cube_root() -> None:
+    # mu~ = (pi v~)^(1/3) (1 + O(v~^(2/3))) at y~ = 1
+    errors = [solve(v, 1.0).mu_ratio / math.cbrt(math.pi * v) - 1.0 for v in (1e-4, 1e-6, 1e-8)]
+    assert order(errors, 100.0) == pytest.approx(2.0 / 3.0, abs=0.02)
+
+
+@pytest.mark.parametrize("psi", [0.1, 0.7, 1.3])
+def test_corner_follows_the_normal_form_in_every_direction(psi: float) -> None:
+    # mu~ / phi = 1 + a(psi) R^2 + ... at eta = y~ - 1 exact
+    errors = []
+    for radius in (0.02, 0.01, 0.005):
+        phi, s0 = radius * math.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * math.cos(psi)
+        v, eta = phi * s0 * s0 / (2.0 * math.pi), 0.25 * (s0 * s0 - 2.0 * phi * phi)
+        errors.append(solve(v, 1.0 + eta, eta).mu_ratio / phi - 1.0)
+    assert order(errors, 2.0) == pytest.approx(2.0, abs=0.05)
+
+
+def test_amplitude_excess_is_used_beyond_the_digits_of_the_amplitude() -> None:
+    # 1 + 1e-18 is 1 in double precision, and mu~ at v~ = 1e-27 tells the two apart
+    v, eta = 1e-27, 1e-18
+    phi = math.cbrt(math.pi * v)
+    for _ in range(60):
+        phi -= (phi**3 + 2.0 * eta * phi - math.pi * v) / (3.0 * phi * phi + 2.0 * eta)
+    assert solve(v, 1.0, eta).mu_ratio == pytest.approx(phi, rel=1e-6)
+    assert solve(v, 1.0).mu_ratio > 1.3 * phi
+
+
+# --- events -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("y", [0.1, 0.5, 0.9, 1.0])
+@pytest.mark.parametrize("v", [1e-10, 1e-12, 1e-16])
+def test_slip_shorter_than_any_scan_step_is_found(v: float, y: float) -> None:
+    found = solve(v, y)
+    assert found.ok
+    assert found.regime == "stick_slip"
+    slip_share = 1.0 - found.stick_fraction
+    assert 0.0 < slip_share < 1.0 / 24.0  # the scan for the end of stick has 24 steps
+    # next to the turn of the shaker slip lasts sqrt(2 pi v~ / (y~^2 phi)), phi from the normal form
+    phi = math.sqrt(1.0 - y * y) if y < 1.0 else math.cbrt(math.pi * v)
+    assert slip_share * math.pi == pytest.approx(math.sqrt(2.0 * math.pi * v / (y * y * phi)), rel=0.05)
+
+
+@pytest.mark.parametrize("y", [0.01, 0.3, 0.74, 1.0, 1.5, 4.69, 30.0, 1e3, 1e6, 4.4e7])
+@pytest.mark.parametrize("distance", [1e-6, 1e-8, 1e-9, 1e-10, 1e-12])
+def test_dip_of_the_slip_speed_between_two_samples_is_seen(y: float, distance: float, sweep: Sweep) -> None:
+    crit, mu_crit = steady.border(y)
+    below, above = solve(crit * (1.0 - distance), y), solve(crit * (1.0 + distance), y)
+    assert above.regime == "continuous"
+    assert above.stick_fraction == 0.0
+    assert above.min_slip_speed > 0.0
+    assert below.regime == "stick_slip"
+    assert 0.0 < below.stick_fraction < 10.0 * math.sqrt(distance)
+    assert below.min_slip_speed < 0.0  # of the continuous orbit, which is therefore not admissible
+    assert below.mu_ratio == pytest.approx(mu_crit, abs=distance)
+    if distance <= 1e-8:
+        # stick changes mu~ by O(distance^2) only: the continuous orbit still has every digit
+        smooth = sweep.solve("continuous", np.array([crit * (1.0 - distance)]), np.array([y]))["mu_ratio"][0]
+        assert below.mu_ratio == pytest.approx(smooth, rel=2e-15, abs=0.0)
+
+
+def test_border_points_between_the_samples_of_a_dense_cloud(sweep: Sweep) -> None:
+    """Beside the border, at distances down to the last digit, the sticking and the continuous orbit say the same."""
+    rng = np.random.default_rng(11)
+    y = log_uniform(rng, 1e-6, 1e7, 3000)
+    crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    v = crit * (1.0 - log_uniform(rng, 1e-15, 1e-8, y.size))
+    full, smooth = sweep.solve("full", v, y), sweep.solve("continuous", v, y)
+    assert (np.abs(full["mu_ratio"] - smooth["mu_ratio"]) / smooth["mu_ratio"]).max() <= 2e-14
+    assert np.abs(full["mu_ratio"] - smooth["mu_ratio"]).max() <= 5e-15
+
+
+def test_mu_minus_its_smooth_continuation_starts_quadratically_below_the_border(sweep: Sweep) -> None:
+    y = np.array([0.3, 1.0, 5.0])
+    crit = sweep.solve("border", np.ones(3), y)["deficit"]
+    gaps = []
+    for distance in (2e-4, 1e-4):
+        v = crit * (1.0 - distance)
+        gaps.append(sweep.solve("full", v, y)["mu_ratio"] - sweep.solve("continuous", v, y)["mu_ratio"])
+    assert np.log2(np.abs(gaps[0] / gaps[1])) == pytest.approx(2.0, abs=0.02)
+
+
+# --- inputs and failures ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, -0.0, math.nan, math.inf, -math.inf])
+def test_illegal_inputs_are_a_status_with_advice(bad: float) -> None:
+    for found in (solve(bad, 0.5), solve(0.5, bad), solve(bad, bad)):
+        assert found.status == BAD_INPUT
+        assert not found.ok
+        assert found.regime == "unknown"
+        assert math.isnan(found.mu_ratio)
+        assert "finite and > 0" in found.advice
+
+
+@pytest.mark.parametrize(
+    ("v_range", "y_range"),
+    [((1e-300, 1e8), (1e-300, 1e8)), ((1e-300, 1e-12), (1e-3, 1e8)), ((1e-8, 1e12), (1e8, 1e20))],
+)
+def test_extreme_inputs_end_in_an_answer_or_in_advice(
+    v_range: tuple[float, float], y_range: tuple[float, float]
+) -> None:
+    rng = np.random.default_rng(3)
+    for v, y in zip(log_uniform(rng, *v_range, 800), log_uniform(rng, *y_range, 800), strict=True):
+        found = solve(v, y)
+        assert isinstance(found, Steady)
+        assert found.advice == ADVICE[found.status]
+        if found.ok:
+            assert 0.0 <= found.mu_ratio <= 1.0
+            assert found.error_estimate < 1e-15
+        else:
+            # an answer that comes with a failure is no answer: the estimate says so
+            assert not found.error_estimate < 1e-9
+
+
+def test_every_status_has_advice() -> None:
+
+    codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED}
+    assert codes | {steady.NOT_CONVERGED, steady.BAD_INPUT} == set(ADVICE)
+    assert all(ADVICE.values())
+
+
+def test_a_stick_phase_without_end_is_told_apart() -> None:
+    # slip stops with the spring nearly across: half a swing of 2 y~ = 0.4 back cannot stretch it to the limit again
+    w, out, orbit, _ = workspace()
+    _, status = steady._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)
+    assert status == NO_SLIP
