@@ -1,0 +1,174 @@
+"""The cost of one solve: the compiled solver by regime, its error, and what marching with scipy costs beside it.
+
+    python benchmarks/solver.py [--points 20000] [--quick] [--write]
+
+One thread.  Points are log-uniform over v~, y~ in [1e-3, 1e3]; errors are against tests/data/points.csv, which was
+solved in quadruple precision.  ``--write`` puts the tables into docs/benchmarks.md.
+"""
+
+from __future__ import annotations
+
+import measuring  # isort: split
+
+import argparse
+import csv
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+from marching import march
+from measuring import best_of, markdown, progress, quantity
+from numpy.typing import NDArray
+
+from builder.steady import REGIMES
+from builder.sweep import solve_chunk
+
+Array = NDArray[np.float64]
+SLOWING = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # v~ at which the cost of marching is shown, y~ = 0.5
+ALONE = 2000  # points a regime that are solved one by one, for the spread
+PEER_LOW = 0.01  # smallest v~ of the points that are marched, so that it ends
+
+
+def points(n: int, seed: int, low: float = 1e-3) -> Array:
+    """Rows of v~, y~, y~ - 1, log-uniform over v~ in [low, 1e3], y~ in [1e-3, 1e3]."""
+    rng = np.random.default_rng(seed)
+    v = np.exp(rng.uniform(np.log(low), np.log(1e3), n))
+    y = np.exp(rng.uniform(np.log(1e-3), np.log(1e3), n))
+    return np.stack([v, y, y - 1.0], axis=1)
+
+
+def _alone(point: Array) -> float:
+    """Seconds of one solve, best of three."""
+    best = np.inf
+    for _ in range(3):
+        start = perf_counter()
+        solve_chunk("full", point)
+        best = min(best, perf_counter() - start)
+    return best
+
+
+def by_regime(n: int, rounds: int, clock: str) -> tuple[str, str]:
+    """Mean time a solve, all together and split by regime; and a sentence about the neighbours."""
+    drawn = points(n, seed=1)
+    crit = solve_chunk("border", drawn)[:, 1]
+    slipping = drawn[:, 0] >= crit
+    parts = {"all": drawn, REGIMES[0]: drawn[slipping], REGIMES[1]: drawn[~slipping]}
+    work = {name: partial(solve_chunk, "full", part) for name, part in parts.items()}
+    timed = best_of(rounds, work, clock)
+    rows = []
+    for name, part in parts.items():
+        typical, slow = np.quantile([_alone(part[i : i + 1]) for i in range(min(len(part), ALONE))], (0.5, 0.99))
+        mean = timed.best[name] / len(part)
+        rows.append([name.replace("_", "-"), f"{len(part):,}", *(quantity(s * 1e6) for s in (mean, typical, slow))])
+    header = ("regime", "points", "mean, microseconds", "median", "99 %")
+    return markdown(header, rows), timed.note()
+
+
+def accuracy() -> str:
+    """Error of the compiled solver on the quadruple-precision points, by kind of point."""
+    with open(measuring.ROOT / "tests" / "data" / "points.csv", newline="") as stream:
+        cases = list(csv.DictReader(stream))
+    v, y, truth = (np.array([float(c[name]) for c in cases]) for name in ("v", "y", "mu_ratio"))
+    out = solve_chunk("full", np.stack([v, y, y - 1.0], axis=1))
+    error = np.abs(out[:, 0] - truth)
+    kind = np.array([c["case"] for c in cases])
+    rows = []
+    for name in (*sorted(set(kind)), "all"):
+        at = (kind == name) | (name == "all")
+        relative = (error[at] / truth[at]).max()
+        failed = int(np.count_nonzero(out[at, 5]))
+        rows.append(
+            [name, str(int(at.sum())), quantity(float(error[at].max())), quantity(float(relative)), str(failed)]
+        )
+    return markdown(("kind of point", "points", "max abs error", "max rel error", "failed"), rows)
+
+
+def _pair(v: float, y: float) -> tuple[float, float, float, float, int, bool]:
+    """Seconds and error of marching, seconds of the direct solve, mu~, cycles, agreed."""
+    start = perf_counter()
+    marched = march(v, y)
+    slow = perf_counter() - start
+    point = np.array([[v, y, y - 1.0]])
+    mu = float(solve_chunk("full", point)[0, 0])
+    return slow, abs(marched.mu_ratio - mu), _alone(point), mu, marched.cycles, marched.agreed
+
+
+def against_marching(n: int) -> str:
+    """The same points by both: time and error, split by whether the marching ever agreed with itself."""
+    drawn = points(n, seed=2, low=PEER_LOW)
+    found = [_pair(v, y) for v, y, _ in drawn]
+    slow, error, quick, mu, _, agreed = (np.array(column) for column in zip(*found, strict=True))
+    ok = agreed.astype(bool)
+    rows = [
+        [
+            f"scipy solve_ivp, marched, {int(ok.sum())} of {n} points that converged",
+            *(quantity(1e6 * x) for x in (slow[ok].mean(), slow[ok].max())),
+            quantity(float(error[ok].max())), quantity(float((error[ok] / mu[ok]).max())),
+        ],
+        [
+            "compiled solver, the same points",
+            *(quantity(1e6 * x) for x in (quick[ok].mean(), quick[ok].max())), "reference", "reference",
+        ],
+    ]  # fmt: skip
+    text = markdown(("who", "mean, microseconds", "slowest, microseconds", "max abs error", "max rel error"), rows)
+    text += f"\n\nRatio of the mean times: {quantity(float(slow[ok].mean() / quick[ok].mean()))}."
+    if not ok.all():
+        text += (
+            f" At {int((~ok).sum())} of {n} points no two cycles agreed to 1e-9 before marching was given up, after "
+            f"{quantity(float(slow[~ok].mean() * 1e3))} ms on average and with an error of up to "
+            f"{quantity(float(error[~ok].max()))}: beside the border its steps jump over short windows of stick."
+        )
+    return text
+
+
+def slowing(speeds: tuple[float, ...]) -> str:
+    """Cost of both at falling v~, y~ = 0.5."""
+    rows = []
+    for v in speeds:
+        progress(f"marching at v~ = {v:g}")
+        slow, error, quick, _, cycles, agreed = _pair(v, 0.5)
+        cells = [quantity(slow * 1e3), f"{cycles:,}" + ("" if agreed else " (no agreement)"), quantity(error)]
+        rows.append([f"{v:g}", *cells, quantity(quick * 1e6)])
+    header = ("v~", "marching, milliseconds", "cycles", "its error", "compiled solver, microseconds")
+    return markdown(header, rows)
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, help="points of the compiled solver (20,000; quick: 500)")
+    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds, the best counts")
+    parser.add_argument("--clock", choices=measuring.CLOCKS, default="wall", help="processor: on a busy machine")
+    parser.add_argument("--quick", action="store_true", help="few points: a smoke test, no measurement")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
+    given = parser.parse_args()
+    if given.quick and given.write:
+        parser.error("--quick measures nothing worth writing down")
+    n = given.points or (500 if given.quick else 20_000)
+    if n < 100:
+        parser.error(f"--points must be at least 100, got {n}")
+    progress("compiled solver")
+    regimes, note = by_regime(n, given.rounds, given.clock)
+    progress("marching")
+    text = "\n\n".join(
+        [
+            measuring.machine("scipy"),
+            f"{n:,} log-uniform random points over v~, y~ in [1e-3, 1e3], one thread, best of {given.rounds} rounds; "
+            f"median and 99 % are of solves called one by one. {note}",
+            regimes,
+            "Error against quadruple precision:",
+            accuracy(),
+            "Beside marching with scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and "
+            f"of slip, until two cycles agree to 1e-9), at points with v~ >= {PEER_LOW:g}:",
+            against_marching(3 if given.quick else 40),
+            "The cost of marching grows like 1/v~; here y~ = 0.5:",
+            slowing(SLOWING[:2] if given.quick else SLOWING),
+        ]
+    )
+    print(text)
+    if given.write:
+        measuring.write_section("solver", text)
+
+
+if __name__ == "__main__":
+    main()

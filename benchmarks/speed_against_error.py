@@ -1,0 +1,296 @@
+"""Speed against error: the committed tables, and everything else that could answer, on the same points in one run.
+
+    python benchmarks/speed_against_error.py [--points 1000000] [--quick] [--write]
+
+Points are log-uniform over v~, y~ in [1e-3, 1e3].  Times are of one thread, best of interleaved rounds; errors are
+against fresh solves.  ``--write`` puts the tables and the plot into docs/.
+"""
+
+from __future__ import annotations
+
+import measuring  # isort: split
+
+import argparse
+import csv
+import math
+import timeit
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numba
+import numpy as np
+import peers
+from marching import march
+from measuring import best_of, markdown, progress, quantity
+from numpy.typing import NDArray
+from peers import Contender
+from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
+
+from builder.sweep import Sweep, solve_chunk
+from friction import Surrogate, tails
+
+Array = NDArray[np.float64]
+OURS, PEER, EXACT = "ours", "peer", "exact"
+CORES = numba.get_num_threads()
+TRIAL = 2000  # points of the trial that decides how many one round takes
+BUDGET = 2.0  # seconds that one round may take one contender; slower ones are timed on fewer points
+FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
+FULL_TREES, QUICK_TREES = ((6, 1e-3), (8, 1e-4), (8, 1e-5), (8, 1e-6), (8, 1e-7), (12, 1e-8)), ((6, 1e-2),)
+HEADER = ("what answers", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table; times in ns a point, errors of mu~ [-], NaN where it makes no sense."""
+
+    kind: str
+    name: str
+    size: str
+    ns: float
+    max_abs: float = math.nan
+    p99_abs: float = math.nan
+    max_rel: float = math.nan
+    bytes: int = 0
+    solves: int = 0
+
+    def cells(self) -> list[str]:
+        """The line as text."""
+        numbers = [quantity(x) if x == x else "-" for x in (self.ns, self.max_abs, self.p99_abs, self.max_rel)]
+        counts = [f"{n:,}" if n else "-" for n in (self.bytes, self.solves)]
+        return [f"**{self.name}**" if self.kind == OURS else self.name, self.size, *numbers, *counts]
+
+
+def draw(n: int, seed: int, low: float = peers.SQUARE[0]) -> tuple[Array, Array]:
+    """``n`` points (v~ >= ``low``, y~), log-uniform over the square."""
+    rng = np.random.default_rng(seed)
+    high = peers.SQUARE[1]
+    v = np.exp(rng.uniform(np.log(low), np.log(high), n))
+    return v, np.exp(rng.uniform(np.log(peers.SQUARE[0]), np.log(high), n))
+
+
+def threads(n: int, call: Callable[[], object]) -> Callable[[], object]:
+    """``call`` on ``n`` numba threads."""
+
+    def run() -> object:
+        numba.set_num_threads(n)
+        try:
+            return call()
+        finally:
+            numba.set_num_threads(1)
+
+    return run
+
+
+def tables() -> list[Surrogate]:
+    """The committed tables, coarse to fine."""
+    opened = [Surrogate.open(path) for path in (measuring.ROOT / "tables").glob("*.nc")]
+    return sorted(opened, key=lambda s: -s.tolerance)
+
+
+def spread(error: Array, truth: Array) -> tuple[float, float, float]:
+    """Largest and 99 % absolute error and largest relative error."""
+    return float(error.max()), float(np.quantile(error, 0.99)), float((error / truth).max())
+
+
+def reference_error() -> tuple[float, float, float]:
+    """Largest and 99 % absolute and largest relative error of a direct solve on the quadruple-precision points."""
+    with open(measuring.ROOT / "tests" / "data" / "points.csv", newline="") as stream:
+        cases = [(float(r["v"]), float(r["y"]), float(r["mu_ratio"])) for r in csv.DictReader(stream)]
+    low, high = peers.SQUARE
+    v, y, truth = np.array([c for c in cases if low <= c[0] <= high and low <= c[1] <= high]).T
+    error = np.abs(solve_chunk("full", np.stack([v, y, y - 1.0], axis=1))[:, 0] - truth)
+    return spread(error, truth)
+
+
+def marching_row(points: int) -> Row:
+    """solve_ivp on a few points, v~ >= 0.01 so that it ends."""
+    v, y = draw(points, seed=4, low=0.01)
+    got: list[float] = []
+    seconds = timeit.timeit(lambda: got.extend(march(a, b).mu_ratio for a, b in zip(v, y, strict=True)), number=1)
+    truth = solve_chunk("full", np.stack([v, y, y - 1.0], axis=1))[:, 0]
+    errors = spread(np.abs(np.array(got) - truth), truth)
+    return Row(EXACT, "scipy solve_ivp, marched", f"{points} points, v~ >= 0.01", seconds / points * 1e9, *errors)
+
+
+def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
+    """Everything that is timed on the large set of points, ours first."""
+    found = []
+    for s in tables():
+        solves = int(s.table.attributes["n_solves"])
+        found.append((OURS, Contender(s.id, "border-fitted blocks", s.mu_ratio, s.memory, solves)))
+    for n in QUICK_GRIDS if quick else FULL_GRIDS:
+        progress(f"grid {n} x {n}")
+        found += [(PEER, c) for c in peers.on_grid(peers.solve_grid(sweep, n))]
+    for order, tolerance in QUICK_TREES if quick else FULL_TREES:
+        progress(f"baobzi order {order}, tolerance {tolerance:g}")
+        tree = peers.adaptive(order, tolerance)
+        if tree is not None:
+            found.append((PEER, tree))
+    found.append((PEER, Contender("eq. (35), rigid contact", "formula", lambda v, y: tails.outer(y / v), 0, 0)))
+    return found
+
+
+def affordable(contender: Contender, v: Array, y: Array) -> int:
+    """How many of the points one round may take, from a short trial; the first call compiles."""
+    contender.evaluate(v[:TRIAL], y[:TRIAL])
+    seconds = min(timeit.repeat(partial(contender.evaluate, v[:TRIAL], y[:TRIAL]), number=1, repeat=3))
+    return int(min(v.size, max(TRIAL, BUDGET * TRIAL / seconds)))
+
+
+def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row], str]:
+    """All rows: the tables, the peers, the formula, the solvers; and a sentence about the neighbours."""
+    v, y = draw(points, seed=1)
+    v_true, y_true = draw(2_000 if quick else 100_000, seed=2)
+    with Sweep(1, checkpoint=peers.cache()) as sweep:
+        progress("fresh solves")
+        truth = sweep.solve("full", v_true, y_true)["mu_ratio"]
+        entries = contenders(sweep, quick)
+    used = {str(i): affordable(c, v, y) for i, (_, c) in enumerate(entries)}
+    work: dict[str, Callable[[], object]] = {
+        str(i): partial(c.evaluate, v[: used[str(i)]], y[: used[str(i)]]) for i, (_, c) in enumerate(entries)
+    }
+    parallel = {
+        str(i): threads(CORES, partial(c.evaluate, v, y)) for i, (kind, c) in enumerate(entries) if kind == OURS
+    }
+    logs = np.empty((points, 2))
+    work["logs"] = lambda: (np.log(v, out=logs[:, 0]), np.log(y, out=logs[:, 1]))
+    direct = np.stack([v, y, y - 1.0], axis=1)[: 500 if quick else 10_000]
+    work["direct"] = lambda: solve_chunk("full", direct)
+    progress(f"{rounds} rounds of {len(work)} contenders")
+    timed, cores = best_of(rounds, work, clock), best_of(rounds, parallel)
+    rows: list[Row] = []
+    for i, (kind, c) in enumerate(entries):
+        error = np.abs(c.evaluate(v_true, y_true) - truth)
+        rest = (*spread(error, truth), c.bytes, c.solves)
+        rows.append(Row(kind, c.name, c.size, timed.best[str(i)] / used[str(i)] * 1e9, *rest))
+        if str(i) in parallel:
+            rows.append(Row(OURS, c.name, f"{CORES} threads", cores.best[str(i)] / points * 1e9, *rest))
+    ns = timed.best["logs"] / points * 1e9
+    rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))
+    ns = timed.best["direct"] / len(direct) * 1e9
+    rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns, *reference_error()))
+    progress("solve_ivp")
+    rows.append(marching_row(2 if quick else 40))
+    progress("yardstick")
+    rod = peers.yardstick(20_000 if quick else points, rounds, build=not quick)
+    if rod is not None:
+        rows.append(Row("other", rod.name, "200 x 200", rod.ns, max_rel=rod.max_rel, bytes=rod.bytes))
+    return rows, timed.note()
+
+
+def one_at_a_time(surrogate: Surrogate, number: int) -> str:
+    """Microseconds of calls with plain floats, and ns a point of the call with six dimensional columns."""
+    n = 64
+    axis = np.log(peers.grid_axis(n))
+    values = np.asarray(surrogate.mu_ratio(np.exp(axis)[:, None], np.exp(axis)[None, :]))
+    spline, regular = RectBivariateSpline(axis, axis, values), RegularGridInterpolator((axis, axis), values)
+    log = np.log
+    calls: dict[str, Callable[[], object]] = {
+        f"**{surrogate.id}** `s.mu_ratio(v, y)`": lambda: surrogate.mu_ratio(0.1, 0.5),
+        f"**{surrogate.id}** `s.evaluate(mu0, Fz, k, y0, omega, v0)`": partial(
+            surrogate.evaluate, 0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01
+        ),
+        "scipy RectBivariateSpline.ev k=3": lambda: spline.ev(log(0.1), log(0.5)),
+        "scipy RegularGridInterpolator linear": lambda: regular((log(0.1), log(0.5))),
+    }
+    rows = []
+    for name, call in calls.items():
+        call()
+        best = min(timeit.repeat(call, number=number, repeat=5)) / number
+        rows.append([name, quantity(best * 1e6)])
+    return markdown(("one case a call", "microseconds"), rows)
+
+
+def six_columns(surrogate: Surrogate, points: int, rounds: int, clock: str) -> str:
+    """ns a point of ``evaluate`` on six columns, and with four of them scalars."""
+    v, y = draw(points, seed=3)
+    rng = np.random.default_rng(6)
+    mu0, Fz = rng.uniform(0.1, 0.8, points), 10.0 ** rng.uniform(-1.0, 3.0, points)
+    k, omega = 10.0 ** rng.uniform(4.0, 8.0, points), 10.0 ** rng.uniform(2.0, 6.0, points)
+    length = mu0 * Fz / k
+    y0, v0 = y * length, v * length * omega
+    scale = 0.3 * 10.0 / 1e6
+    y0_fixed, v0_fixed = y * scale, v * scale * 1.3e5
+    calls: dict[str, Callable[[], object]] = {
+        "six columns": lambda: surrogate.evaluate(mu0, Fz, k, y0, omega, v0),
+        "two columns, four scalars": lambda: surrogate.evaluate(0.3, 10.0, 1e6, y0_fixed, 1.3e5, v0_fixed),
+    }
+    one = best_of(rounds, calls, clock).best
+    many = best_of(rounds, {name: threads(CORES, call) for name, call in calls.items()}).best
+    best = {f"{name}, 1 thread": s for name, s in one.items()}
+    best |= {f"{name}, {CORES} threads": s for name, s in many.items()}
+    rows = [[f"**{surrogate.id}** `s.evaluate`, {name}", quantity(s / points * 1e9)] for name, s in best.items()]
+    return markdown(("dimensional batch", "ns/point"), rows)
+
+
+def verdict(rows: list[Row]) -> str:
+    """Which peers beat the tables, said plainly; one thread against one thread."""
+    ours = [r for r in rows if r.kind == OURS and "threads" not in r.size]
+    theirs = [r for r in rows if r.kind == PEER]
+    lines = []
+    for table in ours:
+        faster = [p for p in theirs if p.ns < table.ns and p.max_abs <= table.max_abs]
+        names = "; ".join(f"{p.name} {p.size} ({quantity(p.ns)} ns, {quantity(p.max_abs)})" for p in faster)
+        lines.append(f"- Faster than {table.name} ({quantity(table.ns)} ns) at its error or less: {names or 'none'}.")
+    quickest = min(ours, key=lambda r: r.ns)
+    faster = sorted((p for p in theirs if p.ns < quickest.ns), key=lambda p: p.max_abs)
+    names = "; ".join(f"{p.name} {p.size} ({quantity(p.ns)} ns, error {quantity(p.max_abs)})" for p in faster[:6])
+    more = f"; and {len(faster) - 6} with larger errors" if len(faster) > 6 else ""
+    lines.append(
+        f"- Faster than our fastest, {quickest.name}, at any error, smallest error first: {names or 'none'}{more}."
+    )
+    beaten = [p for p in theirs if any(t.ns <= p.ns and t.max_abs <= p.max_abs for t in ours)]
+    lines.append(f"- One of the tables is both faster and closer than {len(beaten)} of the {len(theirs)} peers.")
+    return "\n".join(lines)
+
+
+def report(rows: list[Row], note: str, extra: list[str], points: int, rounds: int) -> str:
+    """The section of docs/benchmarks.md."""
+    missing = [f"- {name}: {reason}" for name, reason in sorted(peers.MISSING.items())]
+    return "\n\n".join(
+        [
+            measuring.machine("scipy", "xarray", "baobzi", "CoolProp", "interpolation"),
+            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread unless the line says more; "
+            f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves, those of the direct "
+            "solve against quadruple precision. Bytes are those walked through in memory.",
+            markdown(HEADER, [r.cells() for r in rows], 2),
+            verdict(rows),
+            *extra,
+            *(["Not in this run:", "\n".join(missing)] if missing else []),
+        ]
+    )
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, help="points that are timed (1,000,000; quick: 20,000)")
+    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds, the best counts")
+    parser.add_argument("--clock", choices=measuring.CLOCKS, default="wall", help="processor: on a busy machine")
+    parser.add_argument("--quick", action="store_true", help="small grids and few points: a smoke test, no measurement")
+    parser.add_argument("--write", action="store_true", help="put tables and plot into docs/")
+    given = parser.parse_args()
+    if given.quick and given.write:
+        parser.error("--quick measures nothing worth writing down")
+    points = given.points or (20_000 if given.quick else 1_000_000)
+    if points < 10_000:
+        parser.error(f"--points must be at least 10,000, got {points}")
+    numba.set_num_threads(1)
+    rows, note = compare(points, given.quick, given.rounds, given.clock)
+    finest = tables()[-1]
+    extra = [
+        one_at_a_time(finest, 200 if given.quick else 20_000),
+        six_columns(finest, points, given.rounds, given.clock),
+    ]
+    text = report(rows, note, extra, points, given.rounds)
+    print(text)
+    if given.write:
+        from plot_speed import plot
+
+        measuring.write_section("speed_against_error", text)
+        plot(rows, measuring.IMAGES / "speed_against_error.png")
+
+
+if __name__ == "__main__":
+    main()
