@@ -1,0 +1,236 @@
+"""The equations of motion: series, slip, stick and events, against general-purpose integrators and exact structure."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.polynomial import polynomial
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from builder import model, radau
+from builder.model import NO_STICK, OK, ORDER, rechart, series, slip
+from builder.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
+from builder.steady import border, continuous, solve, stick_excess, workspace
+
+Array = NDArray[np.float64]
+HALF = 0.5 * math.pi
+
+
+def follow(v: float, y: float, start: float, angle: float, end: float, chart: int = 0) -> tuple[float, Array]:
+    """Angle after slip from ``start`` to ``end`` in sigma, and everything else that slip reports."""
+    w, out, _, _ = workspace()
+    assert slip(v, y, start, 0, angle - chart * HALF, chart, end, False, w, out) == OK
+    return out[2] * HALF + out[1], out.copy()
+
+
+def right_hand_side(v: float, y: float) -> Callable[[float, Array], list[float]]:
+    """Angle, integrals of u_x, 1 - u_x, lam and y~ cos tau u_y in the time sigma = tau - pi/2; eqs. (11), (12)."""
+
+    def rate(sigma: float, state: Array) -> list[float]:
+        c, th = -math.sin(sigma), state[0]
+        lam = v * math.cos(th) + y * c * math.sin(th)
+        return [
+            y * c * math.cos(th) - v * math.sin(th),
+            math.cos(th), 1.0 - math.cos(th), lam, y * c * math.sin(th),
+        ]  # fmt: skip
+
+    return rate
+
+
+@pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (2.0, 1.0), (0.01, 0.7), (3.0, 30.0), (40.0, 5.0)])
+@pytest.mark.parametrize("angle", [-1.2, 0.0, 0.4, 1.5])
+def test_slip_and_its_integrals_agree_with_a_general_integrator(v: float, y: float, angle: float) -> None:
+    start, end = -1.3, 1.1
+    witness = solve_ivp(
+        right_hand_side(v, y), (start, end), [angle, 0, 0, 0, 0], method="DOP853", rtol=1e-13, atol=1e-14
+    ).y[:, -1]  # fmt: skip
+    th, out = follow(v, y, start, angle, end)
+    assert th == pytest.approx(witness[0], abs=3e-12)
+    assert out[3] == pytest.approx(witness[0] - angle, abs=3e-12)
+    assert out[4:8] == pytest.approx(witness[1:], abs=3e-11 * (1.0 + y))
+    assert out[0] == end
+
+
+@pytest.mark.parametrize(("v", "y"), [(300.0, 200.0), (1000.0, 20.0), (100.0, 5000.0)])
+def test_stiff_steps_agree_with_a_general_integrator(v: float, y: float) -> None:
+    def jacobian(sigma: float, state: Array) -> Array:
+        c, th = -math.sin(sigma), state[0]
+        out = np.zeros((5, 5))
+        out[:, 0] = [
+            -v * math.cos(th) - y * c * math.sin(th), -math.sin(th), math.sin(th),
+            y * c * math.cos(th) - v * math.sin(th), y * c * math.cos(th),
+        ]  # fmt: skip
+        return out
+
+    witness = solve_ivp(
+        right_hand_side(v, y), (-HALF, HALF), [0.3, 0, 0, 0, 0], method="Radau", rtol=1e-10, atol=1e-12, jac=jacobian
+    ).y[:, -1]
+    th, out = follow(v, y, -HALF, 0.3, HALF)
+    assert out[10] < 0.5 * (out[6] / 7.9)  # Taylor steps alone are at most 0.33 ORDER = 7.9 relaxation lengths long
+    assert th == pytest.approx(witness[0], abs=1e-7)
+    assert out[4:8] == pytest.approx(witness[1:], rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize(("v", "y", "angle"), [(0.5, 0.3, 0.2), (2.0, 1.0, -0.7), (0.05, 3.0, 1.1), (1.2, 20.0, 0.5)])
+def test_sensitivity_to_the_start_is_the_exponential_of_the_slip_path(v: float, y: float, angle: float) -> None:
+    h = 1e-5
+    ends = [follow(v, y, -1.0, angle + k * h, 0.8)[0] for k in (-2, -1, 1, 2)]
+    slope = (8.0 * (ends[2] - ends[1]) - (ends[3] - ends[0])) / (12.0 * h)
+    path = follow(v, y, -1.0, angle, 0.8)[1][6]
+    assert slope == pytest.approx(math.exp(-path), rel=1e-9, abs=1e-11)
+
+
+@pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (0.05, 3.0), (1.2, 8.0), (0.0, 1.7), (3.0, 0.0)])
+@pytest.mark.parametrize("span", [(-1.5, -0.2), (-0.4, 0.9), (0.1, 1.5)])
+def test_slip_is_a_moebius_map_of_the_half_angle_tangent(v: float, y: float, span: tuple[float, float]) -> None:
+    """z = tan(th/2) solves a Riccati equation, so the cross ratio of four orbits never changes."""
+
+    def cross_ratio(th: list[float]) -> float:
+        a, b, c, d = (math.tan(0.5 * t) for t in th)
+        return (a - c) * (b - d) / ((a - d) * (b - c))
+
+    starts = [-1.3, -0.2, 0.5, 1.4]
+    ends = [follow(v, y, span[0], th, span[1])[0] for th in starts]
+    gap = min(abs(a - b) for i, a in enumerate(ends) for b in ends[:i])
+    assert cross_ratio(ends) == pytest.approx(cross_ratio(starts), rel=1e-14 / gap + 1e-13)
+
+
+@pytest.mark.parametrize("chart", [-1, 0, 1])
+def test_charts_describe_the_same_orbit(chart: int) -> None:
+    plain, one = follow(0.4, 0.9, -1.0, 0.7, 0.5)
+    other, two = follow(0.4, 0.9, -1.0, 0.7, 0.5, chart)
+    assert other == pytest.approx(plain, abs=2e-15)
+    assert two[3:8] == pytest.approx(one[3:8], abs=3e-15)
+
+
+def test_rechart_keeps_the_direction() -> None:
+    for chart in (-1, 0, 1):
+        for target in (-1, 0, 1):
+            assert rechart(0.3, chart, target) + target * HALF == pytest.approx(0.3 + chart * HALF, abs=1e-15)
+
+
+@pytest.mark.parametrize("turn", [0, -1])
+@pytest.mark.parametrize("sigma", [1e-9, 0.3, 1.2])
+def test_time_may_count_from_either_turn(turn: int, sigma: float) -> None:
+    w, out, _, _ = workspace()
+    start = sigma + turn * math.pi
+    assert slip(0.7, 2.0, sigma, turn, 0.2, 0, 1.4, False, w, out) == OK
+    counted = out.copy()
+    assert slip(0.7, 2.0, start, 0, 0.2, 0, 1.4, False, w, out) == OK
+    assert counted[0:8] == pytest.approx(out[0:8], abs=2e-14)
+
+
+@pytest.mark.parametrize("chart", [-1, 0, 1])
+def test_series_satisfies_the_equations_of_motion(chart: int) -> None:
+    v, y, sigma, x = 0.7, 1.9, 0.4, 0.3
+    w = workspace()[0]
+    series(v, y, -math.sin(sigma), -math.cos(sigma), x, chart, w)
+    for t in (0.0, 0.02, 0.05):
+        th = chart * HALF + polynomial.polyval(t, w[0][: ORDER + 1])
+        c = -math.sin(sigma + t)
+        assert polynomial.polyval(t, w[4][: ORDER + 1]) == pytest.approx(c, abs=1e-15)
+        rate = polynomial.polyval(t, np.polynomial.polynomial.polyder(w[0][: ORDER + 1]))
+        assert rate == pytest.approx(y * c * math.cos(th) - v * math.sin(th), abs=4e-15)
+        assert polynomial.polyval(t, w[7][: ORDER + 1]) == pytest.approx(
+            v * math.cos(th) + y * c * math.sin(th), abs=4e-15
+        )  # fmt: skip
+
+
+# --- stick --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("chart", [0, 1])
+@pytest.mark.parametrize("d", [0.05, 0.5, 1.7, 3.0])
+def test_stick_excess_is_the_deflated_stretch(chart: int, d: float) -> None:
+    v, y, sigma = 0.05, 0.8, 0.3
+    th = math.atan2(v, y * math.sin(sigma))  # lam = 0 ties the angle to the instant
+    x = th if chart == 0 else HALF - th
+    ux = math.cos(th) + v * d
+    uy = math.sin(th) + y * (math.cos(sigma + d) - math.cos(sigma))
+    excess = stick_excess(v, y, y - 1.0, x, chart, sigma, sigma + d - math.pi, d)
+    assert excess == pytest.approx((ux * ux + uy * uy - 1.0) / (d * d), rel=1e-12, abs=1e-13 / (d * d))
+
+
+def test_stick_excess_at_its_double_root_is_the_fall_of_the_slip_speed() -> None:
+    v, y, sigma = 0.05, 0.8, 0.3
+    th = math.atan2(v, y * math.sin(sigma))
+    # d lam / d tau at fixed u: -y~ sin tau u_y + |w|^2 ... of u.w with u' = w, tau = sigma + pi/2
+    expected = -y * math.cos(sigma) * math.sin(th) + v * v + (y * math.sin(sigma)) ** 2
+    found = stick_excess(v, y, y - 1.0, th, 0, sigma, sigma - math.pi, 0.0)
+    assert found == pytest.approx(expected, rel=1e-14)
+
+
+# --- the end of slip ----------------------------------------------------------------------------------
+
+
+def slip_speed(v: float, y: float, sigma: float, th: float) -> float:
+    return v * math.cos(th) - y * math.sin(sigma) * math.sin(th)
+
+
+@pytest.mark.parametrize(("v", "y"), [(0.05, 0.5), (0.05, 3.0), (0.2, 1.0), (1e-4, 2.0)])
+def test_slip_ends_where_the_slip_speed_vanishes_first(v: float, y: float) -> None:
+    w, out, _, _ = workspace()
+    start, angle = -1.2, 0.6
+    assert slip_speed(v, y, start, angle) > 0.0
+    assert slip(v, y, start, 0, angle, 0, HALF, True, w, out) == OK
+    stop, th = out[0], out[2] * HALF + out[1]
+    assert slip_speed(v, y, stop, th) == pytest.approx(0.0, abs=3e-15 * (1.0 + y))
+    dense = np.linspace(start, stop - 1e-6, 400)
+    assert all(slip_speed(v, y, s, follow(v, y, start, angle, s)[0]) > 0.0 for s in dense[1:])
+
+
+def test_slip_that_never_ends_is_told_apart() -> None:
+    w, out, _, _ = workspace()
+    assert slip(3.0, 0.5, -HALF, 0, 0.1, 0, HALF, True, w, out) == NO_STICK
+
+
+def test_too_many_steps_are_told_apart() -> None:
+    # 1e15 relaxation lengths in half a period leave no digits to steer by
+    found = solve(1e15, 1e-3)
+    assert found.status == model.TOO_MANY_STEPS
+    assert math.isnan(found.mu_ratio)
+    assert "tail" in found.advice
+
+
+@pytest.mark.parametrize("y", [0.05, 0.5, 1.0, 3.0, 50.0, 1e4])
+def test_a_dip_below_zero_between_two_positive_samples_is_found(y: float) -> None:
+    """1e-9 below the border lam is negative for less than 1e-4 of the period and by 1e-9 of itself."""
+    crit, _ = border(y)
+    w, out, _, _ = workspace()
+    assert continuous(crit * (1.0 - 1e-9), y, w, out) == OK
+    assert -1e-8 * crit < out[8] < 0.0
+    assert math.isfinite(out[9])  # the angle where it falls below zero
+    assert continuous(crit * (1.0 + 1e-9), y, w, out) == OK
+    assert 0.0 < out[8] < 1e-8 * crit
+    assert math.isnan(out[9])
+
+
+# --- collocation --------------------------------------------------------------------------------------
+
+
+def test_radau_rule_is_exact_for_polynomials_of_its_degree() -> None:
+    n = RADAU_NODES.size
+    assert RADAU_NODES[-1] == 1.0
+    assert np.all(np.diff(RADAU_NODES) > 0.0)
+    assert RADAU_NODES[0] > 0.0
+    assert np.all(RADAU_WEIGHTS > 0.0)
+    for degree in range(2 * n - 1):
+        assert RADAU_WEIGHTS @ RADAU_NODES**degree == pytest.approx(1.0 / (degree + 1), rel=1e-13)
+
+
+def test_three_radau_stages_are_the_known_ones() -> None:
+    nodes, weights, _ = radau._radau(3)
+    root = math.sqrt(6.0)
+    assert nodes == pytest.approx([(4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0], rel=1e-14)
+    assert weights == pytest.approx([(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0], rel=1e-14)
+
+
+def test_radau_differentiation_is_exact_for_polynomials_through_all_nodes() -> None:
+    n = RADAU_NODES.size
+    full = np.concatenate(([0.0], RADAU_NODES))
+    assert RADAU_DIFF.shape == (n, n + 1)
+    for degree in range(n + 1):
+        slope = degree * RADAU_NODES ** max(degree - 1, 0) if degree else np.zeros(n)
+        assert RADAU_DIFF @ full**degree == pytest.approx(slope, abs=2e-11 * n)
