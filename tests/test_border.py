@@ -1,0 +1,128 @@
+"""The border of continuous sliding: solved, stored, and at its two ends."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from builder.steady import border, solve
+from builder.sweep import Sweep
+from friction import InputError, Surrogate
+from friction.regions import BORDER_PIECES, Y_CONT, Y_TAIL
+
+Array = NDArray[np.float64]
+
+
+def test_solved_border_meets_the_reference_to_the_last_digit(reference_border: Array) -> None:
+    assert len(reference_border) == 17
+    for y, crit, mu in reference_border:
+        found, ratio = border(y)
+        assert found == pytest.approx(crit, rel=5e-16, abs=0.0)
+        assert ratio == pytest.approx(mu, rel=0.0, abs=3e-16)
+
+
+def test_solved_border_is_finite_and_rises_everywhere(sweep: Sweep) -> None:
+    y = np.geomspace(1e-8, 1e8, 4_000)
+    crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    assert np.isfinite(crit).all()
+    assert np.all(np.diff(crit) > 0.0)
+    slope = np.diff(np.log(crit)) / np.diff(np.log(y))
+    assert np.all((slope > 0.49) & (slope < 2.0 + 1e-9))
+
+
+@pytest.mark.parametrize("y", [0.11012028129012316, 0.0002339104158737087, 0.0014321221280091054])
+def test_border_does_not_divide_by_a_settled_secant(y: float) -> None:
+    # two equal residuals at rounding level once gave NaN or infinity here, as success
+    crit, mu = border(y)
+    assert crit == pytest.approx(0.5 * y * y * (1.0 - 5.0 / 12.0 * y * y), rel=y**4 + 1e-13)
+    assert solve(crit * (1.0 + 1e-9), y).mu_ratio == pytest.approx(mu, abs=1e-11)
+
+
+def test_small_amplitude_end() -> None:
+    # v~crit = (y~^2 / 2)(1 - 5 y~^2 / 12 + O(y~^4))
+    errors = [border(y)[0] / (0.5 * y * y * (1.0 - 5.0 / 12.0 * y * y)) - 1.0 for y in (0.1, 0.05)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.05)
+
+
+def test_large_amplitude_end() -> None:
+    constant = [y / border(y)[0] ** 2 for y in (1e4, 1e6, 1e8)]
+    assert constant[2] == pytest.approx(4.402914, abs=2e-6)
+    assert constant[2] == pytest.approx(4.5, rel=0.03)  # eq. (26) of the paper, rounded
+    assert (constant[1] - constant[2]) / (constant[0] - constant[2]) == pytest.approx(0.01, abs=0.002)
+    assert border(1e8)[0] / 1e4 == pytest.approx(0.476573, abs=1e-6)
+
+
+def test_border_that_cannot_be_found_is_an_error_with_advice() -> None:
+    with pytest.raises(ArithmeticError, match=r"border at y~ = nan: .+"):
+        border(math.nan)
+
+
+# --- the stored curve ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(
+    scope="module", params=sorted(path.name for path in (Path(__file__).parent.parent / "tables").glob("*.nc"))
+)
+def table(request: Any, tables_dir: Path) -> Surrogate:
+    return Surrogate.open(tables_dir / request.param)
+
+
+def test_stored_border_is_as_good_as_it_says(table: Surrogate, reference_border: Array, sweep: Sweep) -> None:
+    y = np.concatenate([reference_border[:, 0], np.geomspace(1e-8, 1e8, 1000)])
+    truth = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    error = np.abs(table.v_tilde_crit(y) / truth - 1.0)
+    assert table.border.max_rel_error <= max(table.tolerance, 2e-14)
+    assert error.max() <= table.border.max_rel_error + 2e-14
+    assert np.abs(table.v_tilde_crit(reference_border[:, 0]) / reference_border[:, 1] - 1.0).max() <= (
+        table.border.max_rel_error + 1e-15
+    )
+
+
+def test_stored_border_is_continuous_where_its_pieces_meet(table: Surrogate) -> None:
+    for seam in (Y_CONT, Y_TAIL):
+        below, above = table.v_tilde_crit(seam * (1.0 - 1e-15)), table.v_tilde_crit(seam * (1.0 + 1e-15))
+        assert below == pytest.approx(above, rel=2.0 * table.border.max_rel_error + 1e-14)
+
+
+def test_stored_border_rises(table: Surrogate) -> None:
+    y = np.geomspace(1e-6, 1e9, 30_000)
+    assert np.all(np.diff(table.v_tilde_crit(y)) > 0.0)
+
+
+def test_stored_border_in_scalars_arrays_and_shapes(table: Surrogate) -> None:
+    y = np.array([[0.0, 1e-3, 0.5], [1.5, 20.0, 1e7]])
+    crit = table.v_tilde_crit(y)
+    assert crit.shape == y.shape
+    for one, two in zip(y.ravel(), crit.ravel(), strict=True):
+        single = table.v_tilde_crit(float(one))
+        assert isinstance(single, float)
+        assert single == two
+    assert table.v_tilde_crit(0.0) == 0.0
+    assert table.v_tilde_crit(math.inf) == math.inf
+    assert table.v_tilde_crit([]).shape == (0,)
+    assert table.v_tilde_crit(np.broadcast_to(0.5, (2, 3))).shape == (2, 3)
+    assert table.v_tilde_crit(y[:, ::2]).tolist() == crit[:, ::2].tolist()
+
+
+def test_infinite_amplitude_in_an_array(table: Surrogate) -> None:
+    assert table.v_tilde_crit(np.array([math.inf]))[0] == math.inf
+
+
+@pytest.mark.parametrize("bad", [-1.0, -1e-300, math.nan, -math.inf])
+def test_stored_border_refuses_illegal_amplitudes(table: Surrogate, bad: float) -> None:
+    with pytest.raises(InputError, match="y_tilde must be >= 0") as caught:
+        table.v_tilde_crit(bad)
+    assert caught.value.index is None
+    with pytest.raises(InputError, match="y_tilde at index 3 must be >= 0") as caught:
+        table.v_tilde_crit([[1.0, 2.0], [3.0, bad]])
+    assert caught.value.index == 3
+
+
+def test_pieces_cover_every_amplitude() -> None:
+    (_, _, low, _), (_, _, mid, _), (_, _, high, _) = BORDER_PIECES
+    assert low == (0.0, Y_CONT**2)
+    assert mid == (math.log(Y_CONT), math.log(Y_TAIL))
+    assert high == (0.0, 1.0 / Y_TAIL)
