@@ -26,7 +26,10 @@ __all__ = ["Points", "build_block", "build_border", "points_of", "quantity_of", 
 Array = NDArray[np.float64]
 MAX_NODES = 96
 MAX_CELLS = 96
-SHARE = 0.1  # of the tolerance that truncation in one direction, of nodes or of cells, may take
+SHARE = 0.1  # of the tolerance that the nodes' truncation in one direction may take
+CELL_SHARE = (
+    0.4  # of the tolerance that the cells may take in one direction: fewer cells are faster, nodes cost nothing
+)
 NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
 
 
@@ -201,7 +204,7 @@ def build_block(
     stick = np.empty(0)
     if spec.regime != CONTINUOUS:
         stick = solved["stick_fraction"] / np.vectorize(stick_scale, otypes=[np.float64])(BLOCK_INDEX[spec.name], p.y)
-    follow = [max(wanted, min(best[axis], 1.0)) for axis in (0, 1)]
+    follow = [max(CELL_SHARE * tolerance, NODE_FLOOR, min(best[axis], 1.0)) for axis in (0, 1)]
     if spec.a_name == "inverse_y":
         follow[0] = wanted
     cells = (_cells(values, 0, follow[0], spec), _cells(values, 1, follow[1], spec))

@@ -34,6 +34,8 @@ NO_PATCH = FAST  # sources from here on are closed forms
 
 # Fused multiply-add changes the last digit and nothing else; no other liberty is taken with the arithmetic.
 FUSE = {"contract"}
+# forceinline: numba returns tuples through memory from a call, which costs more than the work itself.
+CHUNK = 512  # points whose places are found before their patches are read: mispredicted branches then stall no loads
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
@@ -90,7 +92,7 @@ def normal_form_root(v: float, eta: float) -> float:
     return phi
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
 def _line(coef: Array, first: int, cells: int, a: float, start: float, scale: float) -> float:
     """Piecewise polynomial of one variable; ``coef`` (cells in all pieces, WIDTH), highest power first."""
     x = (a - start) * scale
@@ -103,7 +105,7 @@ def _line(coef: Array, first: int, cells: int, a: float, start: float, scale: fl
     return r
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
 def cell(meta: Array, block: int, a: float, b: float) -> tuple[int, float, float]:
     """Patch number and local coordinates u, w in [-1, 1] of the block coordinates (a, b).
 
@@ -130,7 +132,7 @@ def border_scaled(y: float, bcoef: Array, bmeta: Array) -> tuple[float, float]:
     return _line(bcoef, int(bmeta[k, 0]), int(bmeta[k, 1]), a, bmeta[k, 2], bmeta[k, 3]), math.sqrt(y)
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
 def edge_coordinate(rho: float) -> float:
     """sigma in [0, sqrt 2] for rho = v~/v~crit in [0, 1]: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on.
 
@@ -148,7 +150,7 @@ def polar(v: float, eta: float) -> tuple[float, float, float, float]:
     return phi, s0, math.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi), TWO_OVER_PI * math.atan2(2.0 * phi, s0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
 def locate(v: float, y: float, bcoef: Array, bmeta: Array) -> tuple[int, float, float, float, float, float]:
     """Where (v~, y~) falls: (source, a, b, base, factor, extra) with mu~ = base + factor q(a, b).
 
@@ -234,7 +236,7 @@ def at_zero_speed(y: float) -> tuple[float, float]:
     return mu, ROUNDING / mu
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
 def ratio(v: float, y: float, coef: Array, meta: Array, bcoef: Array, bmeta: Array) -> tuple[float, float, int]:
     """(mu~, bound of its absolute error, source) at v~ = ``v`` >= 0, y~ = ``y`` >= 0; v~ may be infinite, y~ not."""
     if y == 0.0 or v == math.inf:
@@ -268,17 +270,30 @@ def value_array(
     v: Array, y: Array, coef: Array, meta: Array, bcoef: Array, bmeta: Array, mu: Array
 ) -> None:  # fmt: skip
     """Fill ``mu`` (n,) alone: the dimensionless fast path.  NaN where the point is outside the quadrant."""
-    for i in prange(v.size):
-        vi, yi = v[i], y[i]
-        if not (0.0 < vi < math.inf and 0.0 < yi < math.inf):
-            if vi >= 0.0 and yi >= 0.0 and yi < math.inf:
-                mu[i] = ratio(vi, yi, coef, meta, bcoef, bmeta)[0]
+    n = v.size
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        low = c * CHUNK
+        high = min(low + CHUNK, n)
+        patch = np.empty(CHUNK, np.int64)
+        place = np.empty((CHUNK, 4))
+        for i in range(low, high):
+            k = i - low
+            vi, yi = v[i], y[i]
+            patch[k] = -1
+            if 0.0 < vi < math.inf and 0.0 < yi < math.inf:
+                source, a, b, base, factor, _ = locate(vi, yi, bcoef, bmeta)
+                place[k, 2] = base
+                if source < NO_PATCH:
+                    patch[k], place[k, 0], place[k, 1] = cell(meta, source, a, b)
+                    place[k, 3] = factor
+            elif vi >= 0.0 and 0.0 <= yi < math.inf:
+                place[k, 2] = ratio(vi, yi, coef, meta, bcoef, bmeta)[0]
             else:
-                mu[i] = math.nan
-            continue
-        source, a, b, base, factor, _ = locate(vi, yi, bcoef, bmeta)
-        if source >= NO_PATCH:
-            mu[i] = base
-        else:
-            p, u, w = cell(meta, source, a, b)
-            mu[i] = min(max(base + factor * patch_value(coef, p, u, w), 0.0), 1.0)
+                place[k, 2] = math.nan
+        for i in range(low, high):
+            k = i - low
+            m = place[k, 2]
+            if patch[k] >= 0:
+                m += place[k, 3] * patch_value(coef, patch[k], place[k, 0], place[k, 1])
+                m = min(max(m, 0.0), 1.0)
+            mu[i] = m

@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from friction.errors import InputError
-from friction.kernels import NO_OSCILLATION, ROUNDING, STATIC_LIMIT, outer_expansion, ratio
+from friction.kernels import FUSE, NO_OSCILLATION, ROUNDING, STATIC_LIMIT, outer_expansion, ratio
 from friction.regions import RIGID
 from friction.slopes import ratio_and_slopes, speed_slope_at_zero
 
@@ -72,7 +73,7 @@ def find_faults(columns: Mapping[str, ArrayLike]) -> list[Fault]:
     return [first[i] for i in sorted(first)]
 
 
-def check_inputs(columns: Mapping[str, ArrayLike]) -> dict[str, Array]:
+def check_inputs(columns: Mapping[str, Any]) -> dict[str, Array]:
     """The columns as broadcast, flat float64 arrays.
 
     Raises
@@ -108,58 +109,46 @@ def _scaled(a: float, b: float, c: float, d: float, e: float) -> float:
     return math.ldexp(ma * mb / (mc * md * me), ea + eb - ec - ed - ee)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float, float]:
-    """(v~, y~, r), r = y~/v~ = y0 omega/v0 [-]; 0 and inf where they leave the range of double precision.
-
-    ``y0``, ``omega``, ``v0`` must be > 0.
-    """
-    d = mu0 * Fz
-    y = y0 * k / d
-    v = v0 * k / (d * omega)
-    r = y0 * omega / v0
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
+def groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float]:
+    """(v~, y~) [-], eqs. (6), (8); 0 and inf where they leave the range of double precision.  y0, omega, v0 > 0."""
+    force = mu0 * Fz
+    stretch, pace, speed = y0 * k, force * omega, v0 * k
     # the plain products are right unless one of them came near the ends of the double range
-    if not (1e-290 < d < 1e290 and 1e-290 < y0 * k < 1e290 and 1e-290 < v0 * k < 1e290 and 1e-290 < d * omega < 1e290):
-        y = _scaled(y0, k, mu0, Fz, 1.0)
-        v = _scaled(v0, k, mu0, Fz, omega)
-    if not 1e-290 < y0 * omega < 1e290:
-        r = _scaled(y0, omega, v0, 1.0, 1.0)
-    return v, y, r
+    smallest = min(min(force, stretch), min(pace, speed))
+    largest = max(max(force, stretch), max(pace, speed))
+    if smallest > 1e-290 and largest < 1e290:
+        return speed / pace, stretch / force
+    return _scaled(v0, k, mu0, Fz, omega), _scaled(y0, k, mu0, Fz, 1.0)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def dimensional(
-    mu0: float,
-    Fz: float,
-    k: float,
-    y0: float,
-    omega: float,
-    v0: float,
-    coef: Array,
-    meta: Array,
-    bcoef: Array,
-    bmeta: Array,
-) -> tuple[float, float, int, float, float]:
-    """(mu~, bound, source, v~, y~) of one legal case; k = inf is rigid contact, eq. (37)."""
+def amplitude_ratio(y0: float, omega: float, v0: float) -> float:
+    """r = y~/v~ = y0 omega/v0 [-], which needs no stiffness."""
+    product = y0 * omega
+    return product / v0 if 1e-290 < product < 1e290 else _scaled(y0, omega, v0, 1.0, 1.0)
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _unusual(
+    mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+) -> tuple[float, float, int, float, float]:  # fmt: skip
+    """:func:`dimensional` where an input is zero, the contact rigid, or a group beyond double precision."""
     if y0 == 0.0 or omega == 0.0:
         y = 0.0 if y0 == 0.0 else (math.inf if k == math.inf else _scaled(y0, k, mu0, Fz, 1.0))
         return 1.0, 0.0, NO_OSCILLATION, math.inf if v0 > 0.0 else 0.0, y
-    if k == math.inf:
-        if v0 == 0.0:
-            return 0.0, 0.0, STATIC_LIMIT, 0.0, math.inf
-        r = y0 * omega / v0
-        if not 1e-290 < y0 * omega < 1e290:
-            r = _scaled(y0, omega, v0, 1.0, 1.0)
-        mu, _, _, _, _ = outer_expansion(r)
-        return mu, ROUNDING * mu, RIGID, math.inf, math.inf
     if v0 == 0.0:
+        if k == math.inf:
+            return 0.0, 0.0, STATIC_LIMIT, 0.0, math.inf
         y = _scaled(y0, k, mu0, Fz, 1.0)
         mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
         return mu, bound, source, 0.0, y
-    v, y, r = groups(mu0, Fz, k, y0, omega, v0)
-    if 0.0 < y < math.inf and 0.0 < v < math.inf:
-        mu, bound, source = ratio(v, y, coef, meta, bcoef, bmeta)
-        return mu, bound, source, v, y
+    r = amplitude_ratio(y0, omega, v0)
+    mu, _, _, _, _ = outer_expansion(r)
+    if k == math.inf:
+        return mu, ROUNDING * mu, RIGID, math.inf, math.inf
+    v, y = groups(mu0, Fz, k, y0, omega, v0)
     if y == 0.0 or r == 0.0:
         return 1.0, ROUNDING, NO_OSCILLATION if y == 0.0 else RIGID, v, y
     if v == 0.0:
@@ -167,11 +156,21 @@ def dimensional(
         mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
         return mu, bound, source, v, y
     # y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large
-    mu, _, _, _, _ = outer_expansion(r)
-    bound = ROUNDING * mu
-    if v < 1e150:
-        bound += mu
-    return mu, bound, RIGID, v, y
+    return mu, ROUNDING * mu + (mu if v < 1e150 else 0.0), RIGID, v, y
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, forceinline=True)
+def dimensional(
+    mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+) -> tuple[float, float, int, float, float]:  # fmt: skip
+    """(mu~, bound, source, v~, y~) of one legal case; k = inf is rigid contact, eq. (37)."""
+    if y0 > 0.0 and omega > 0.0 and v0 > 0.0 and k < math.inf:
+        v, y = groups(mu0, Fz, k, y0, omega, v0)
+        if 0.0 < y < math.inf and 0.0 < v < math.inf:
+            mu, bound, source = ratio(v, y, coef, meta, bcoef, bmeta)
+            return mu, bound, source, v, y
+    return _unusual(mu0, Fz, k, y0, omega, v0, coef, meta, bcoef, bmeta)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -190,10 +189,7 @@ def gradient(
         return
     if source == RIGID:
         if v0 > 0.0:
-            r = y0 * omega / v0
-            if not 1e-290 < y0 * omega < 1e290:
-                r = _scaled(y0, omega, v0, 1.0, 1.0)
-            _, _, slope, _, _ = outer_expansion(r)
+            _, _, slope, _, _ = outer_expansion(amplitude_ratio(y0, omega, v0))
             out[3], out[4], out[5] = mu0 * slope / y0, mu0 * slope / omega, -mu0 * slope / v0
         return
     if source == STATIC_LIMIT and y == math.inf:

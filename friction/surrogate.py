@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +35,6 @@ _REGIMES = np.array(regions.REGIMES)
 _SOURCES = np.array(regions.SOURCES)
 
 
-@dataclass(frozen=True)
 class Answer:
     """What the surrogate says; floats and strings for a scalar call, arrays of the broadcast shape otherwise.
 
@@ -48,10 +46,8 @@ class Answer:
         mu_macro / mu0 [-].
     error_bound : float or ndarray
         Bound of the absolute error of ``mu_macro`` [-].
-    regime : str or ndarray of str
-        ``"continuous"``, ``"stick_slip"`` or ``"static"`` (v0 = 0).
-    source : str or ndarray of str
-        Block or tail that answered, see :data:`friction.regions.SOURCES`.
+    source_code : int or ndarray of int8
+        Block or tail that answered, index into :data:`friction.regions.SOURCES`.
     v_tilde, y_tilde : float or ndarray
         Dimensionless speed and amplitude [-].
     length_scale : float or ndarray
@@ -60,15 +56,55 @@ class Answer:
         d mu_macro / d input by field name, where it was asked for; infinite for v0 at v0 = 0 on y~ = 1.
     """
 
-    mu_macro: Any
-    mu_ratio: Any
-    error_bound: Any
-    regime: Any
-    source: Any
-    v_tilde: Any
-    y_tilde: Any
-    length_scale: Any
-    gradient: dict[str, Any] | None = None
+    __slots__ = (
+        "error_bound", "gradient", "length_scale", "mu_macro", "mu_ratio", "source_code", "v_tilde", "y_tilde",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        mu_macro: Any,
+        mu_ratio: Any,
+        error_bound: Any,
+        source_code: Any,
+        v_tilde: Any,
+        y_tilde: Any,
+        length_scale: Any,
+        gradient: dict[str, Any] | None = None,
+    ) -> None:
+        self.mu_macro = mu_macro
+        self.mu_ratio = mu_ratio
+        self.error_bound = error_bound
+        self.source_code = source_code
+        self.v_tilde = v_tilde
+        self.y_tilde = y_tilde
+        self.length_scale = length_scale
+        self.gradient = gradient
+
+    @property
+    def regime(self) -> Any:
+        """``"continuous"``, ``"stick_slip"`` or ``"static"`` (v0 = 0): str or ndarray of str, made when asked for."""
+        names = _REGIMES[REGIME_OF_SOURCE[self.source_code]]
+        return names if isinstance(self.source_code, np.ndarray) else str(names)
+
+    @property
+    def source(self) -> Any:
+        """Name of the block or tail that answered: str or ndarray of str, made when asked for."""
+        names = _SOURCES[self.source_code]
+        return names if isinstance(self.source_code, np.ndarray) else str(names)
+
+    def __repr__(self) -> str:
+        shown = (
+            "mu_macro",
+            "mu_ratio",
+            "error_bound",
+            "regime",
+            "source",
+            "v_tilde",
+            "y_tilde",
+            "length_scale",
+            "gradient",
+        )
+        return f"Answer({', '.join(f'{name}={getattr(self, name)!r}' for name in shown)})"
 
 
 class Surrogate:
@@ -271,8 +307,11 @@ class Surrogate:
         -----
         y0 = 0 or omega = 0 gives mu0.  v0 = 0 with y0, omega > 0 gives the static limit, eq. (16).
         """
-        given: dict[str, Any] = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
-        columns = nondim.check_inputs(given)
+        given: tuple[Any, ...] = (mu0, Fz, math.inf if k is None else k, y0, omega, v0)
+        if _plain(given) and (k is None or given[2] < math.inf):
+            a, b, c, d, e, f = given
+            return self._scalar(a, b, c, d, e, f, gradient)
+        columns = nondim.check_inputs({"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0})
         columns.setdefault("k", np.asarray(math.inf))
         ordered = [columns[name] for name in nondim.FIELDS]
         try:
@@ -302,8 +341,7 @@ class Surrogate:
             mu_macro=ratio * scale,
             mu_ratio=ratio,
             error_bound=bound.reshape(shape) * scale,
-            regime=_REGIMES[REGIME_OF_SOURCE[code]],
-            source=_SOURCES[code],
+            source_code=code,
             v_tilde=v.reshape(shape),
             y_tilde=y.reshape(shape),
             length_scale=length,
@@ -325,8 +363,7 @@ class Surrogate:
             mu_macro=mu0 * mu,
             mu_ratio=mu,
             error_bound=mu0 * bound,
-            regime=regions.REGIMES[REGIME_OF_SOURCE[source]],
-            source=regions.SOURCES[source],
+            source_code=source,
             v_tilde=v,
             y_tilde=y,
             length_scale=mu0 * (Fz / k),
@@ -337,6 +374,16 @@ class Surrogate:
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits (tests/test_surrogate.py solves them anew)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
+
+
+def _plain(values: tuple[Any, ...]) -> bool:
+    """Six legal plain floats, which need no arrays; anything else, and anything illegal, takes the careful way."""
+    a, b, c, d, e, f = values
+    return (
+        type(a) is type(b) is type(c) is type(d) is type(e) is type(f) is float
+        and 0.0 < a < math.inf and 0.0 < b < math.inf and c > 0.0
+        and (0.0 <= d < math.inf and 0.0 <= e < math.inf and 0.0 <= f < math.inf)
+    )  # fmt: skip
 
 
 def _columns(*values: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
