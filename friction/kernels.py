@@ -28,6 +28,7 @@ S_LOW, S_MID, CORNER, S_MID_1, S_MID_2, S_HIGH, S_TAIL = 5, 6, 7, 8, 9, 10, 11
 FAST, NO_OSCILLATION, STATIC_LIMIT = _r.FAST, _r.NO_OSCILLATION, _r.STATIC_LIMIT
 FAST_KAPPA = math.exp(L_MAX)
 SIGMA_CUT = _r.SIGMA_CUT
+CUSP = math.sqrt(2.0 * ROUNDING)
 TWO_OVER_PI = 2.0 / math.pi
 SQRT2 = math.sqrt(2.0)
 NO_PATCH = FAST  # sources from here on are closed forms
@@ -190,17 +191,18 @@ def locate(v: float, y: float, bcoef: Array, bmeta: Array) -> tuple[int, float, 
         return S_MID, y, b, 0.0, 1.0, ROUNDING
     eta = y - 1.0
     phi, _, radius, angle = polar(v, eta)
-    # one ulp of y~ and of v~ next to the corner: d phi / d eta = -2 phi / (3 phi^2 + 2 eta)
-    shaken = ROUNDING * phi * (1.0 + 1.0 / (3.0 * phi * phi + 2.0 * eta))
+    # one ulp of y~ and of v~ next to the corner: d phi / d eta = -2 phi / (3 phi^2 + 2 eta), and never more than the
+    # cusp itself gives, phi(eta - d) <= phi(eta) + sqrt(2 d)
+    shaken = ROUNDING * phi + min(ROUNDING * phi / (3.0 * phi * phi + 2.0 * eta), CUSP)
     return CORNER, radius, angle, 0.0, phi, shaken
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def _fast(v: float, y: float, root: float) -> tuple[int, float, float, float, float, float]:
     # (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes from the second term is half r f'
-    speed = v * v + 1.0
-    first, second, slope, _, _ = outer_expansion(y / math.sqrt(speed))
-    correction = (second + 0.5 * slope) / speed
+    speed = math.hypot(v, 1.0)
+    first, second, slope, _, _ = outer_expansion(y / speed)
+    correction = (second + 0.5 * slope) / speed / speed
     # the next term is smaller by (y~/v~^2)^2 where y~ > v~, by 1/v~^2 elsewhere
     small = max(root / v * (root / v), 1.0 / v)
     bound = 4.0 * abs(correction) * small * small + ROUNDING * first

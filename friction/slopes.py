@@ -105,11 +105,11 @@ def ratio_and_slopes(
         return mu, 0.0, (-y * y / mu if mu > 0.0 else 0.0)
     source, a, b, base, factor, _ = locate(v, y, bcoef, bmeta)
     if source == FAST:
-        speed = v * v + 1.0
-        _, second, slope, change, bend = outer_expansion(y / math.sqrt(speed))
-        along_y = slope + (change + 0.5 * bend) / speed
-        share = v * v / speed
-        return base, -share * (along_y + (2.0 * second + slope) / speed), along_y
+        speed = math.hypot(v, 1.0)
+        _, second, slope, change, bend = outer_expansion(y / speed)
+        along_y = slope + (change + 0.5 * bend) / speed / speed
+        share = (v / speed) * (v / speed)
+        return base, -share * (along_y + (2.0 * second + slope) / speed / speed), along_y
     na, nb = int(meta[source, 1]), int(meta[source, 2])
     x = (a - meta[source, 3]) * meta[source, 4]
     z = (b - meta[source, 5]) * meta[source, 6]
