@@ -1,8 +1,8 @@
 """What people do today: integrate the equations of motion with scipy and wait until two cycles agree.
 
 Stick and slip are phases of :func:`scipy.integrate.solve_ivp`, their ends are its events, and the average of u_x is an
-unknown.  The cost grows like 1/v~, because a disturbance of the cycle decays with the slip path alone; for the same
-reason two cycles agree to 1e-9 while both are still 1e-9 / (2 pi v~) away from the answer.
+unknown.  A disturbance of the cycle decays with the slip path alone, by exp(-2 pi v~) a cycle in continuous sliding, so
+the cost grows as v~ falls; for the same reason two cycles agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
 from __future__ import annotations

@@ -1,0 +1,111 @@
+"""What the committed tables hold and cost: the table in tables/README.md.
+
+    python benchmarks/tables_readme.py [--build] [--workers 2] [--write]
+
+Prints; ``--write`` replaces what stands between the markers.  ``--build`` builds each table anew into a temporary
+folder, times it and compares the checksum of what comes out with the committed one; without it those columns are kept
+from the page, as long as the committed table is still the one that they were measured for.
+"""
+
+from __future__ import annotations
+
+import measuring  # isort: split
+
+import argparse
+import json
+import os
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+from measuring import ROOT, markdown, progress, quantity
+
+from friction import Surrogate
+
+PAGE = ROOT / "tables" / "README.md"
+BEGIN, END = "<!-- begin tables -->\n", "<!-- end tables -->"
+HEADER = ("table", "tolerance", "solves", "bytes", "memory of the cells, bytes", "max abs error", "max rel error")
+BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
+
+
+@dataclass(frozen=True)
+class Built:
+    """What a build from nothing cost, as text, and whether it gave the committed numbers."""
+
+    seconds: str = "-"
+    processor: str = "-"
+    same: str = "-"
+
+
+def command(tolerance: float, out: str, workers: int | None = None) -> list[str]:
+    """Arguments of the interpreter that build a table."""
+    words = ["-m", "builder", "build", "--tolerance", f"{tolerance:.0e}".replace("e-0", "e-"), "--out", out]
+    return words + ([] if workers is None else ["--workers", str(workers)])
+
+
+def build(table: Surrogate, workers: int) -> Built:
+    """Build ``table`` again, by the command that a user types, and throw it away."""
+    progress(f"building {table.id}")
+    with tempfile.TemporaryDirectory() as folder:
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
+        done = subprocess.run(
+            [sys.executable, *command(table.tolerance, str(Path(folder) / "table.nc"), workers)],
+            cwd=ROOT, stdout=subprocess.PIPE, check=True,
+        )  # fmt: skip
+        seconds, after = perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    own = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    same = json.loads(done.stdout)["content_sha256"] == table.checksum
+    return Built(quantity(seconds, 2), quantity(own, 2), "yes" if same else "no")
+
+
+def kept(page: str, checksum: str) -> Built:
+    """The measured columns of the line with that checksum, if there is one."""
+    found = re.search(rf"^\|[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|\s*`{checksum}`\s*\|$", page, re.MULTILINE)
+    return Built(*(cell.strip() for cell in found.groups())) if found else Built()
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", action="store_true", help="build every table anew and time it")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="threads that solve")
+    parser.add_argument("--write", action="store_true", help="put the table into tables/README.md")
+    given = parser.parse_args()
+    page = PAGE.read_text(encoding="utf-8")
+    if page.count(BEGIN) != 1 or page.count(END) != 1:
+        parser.error(f"{PAGE} must hold {BEGIN.strip()!r} and {END!r} once each")
+    head, _, rest = page.partition(BEGIN)
+    old, _, tail = rest.partition(END)
+    opened = sorted((Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")), key=lambda s: -s.tolerance)
+    rows, builds = [], []
+    for s in opened:
+        rows.append(
+            [
+                f"`{s.path.name}`", f"{s.tolerance:.0e}", f"{int(str(s.attributes['n_solves'])):,}",
+                f"{s.path.stat().st_size:,}", f"{s.memory:,}", f"{s.max_abs_error:.2e}", f"{s.max_rel_error:.2e}",
+            ]
+        )  # fmt: skip
+        b = build(s, given.workers) if given.build else kept(old, s.checksum)
+        builds.append([f"`{s.path.name}`", b.seconds, b.processor, b.same, f"`{s.checksum}`"])
+    commands = "\n".join(f"    python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened)
+    note = re.search(r"^Built anew .*\n.*$", old, re.MULTILINE)
+    if given.build:
+        said = f"Built anew on {given.workers} threads with the program that this page was written with.\n"
+        said += measuring.machine()
+    else:
+        said = note.group() if note else "Not built anew yet."
+    points = {int(str(s.attributes["verified_points"])) for s in opened}
+    verified = f"Errors are the largest on {' or '.join(f'{n:,}' for n in sorted(points))} fresh solves, off the nodes."
+    text = "\n\n".join([commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)])
+    print(text)
+    if given.write:
+        PAGE.write_text(f"{head}{BEGIN}\n{text}\n\n{END}{tail}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
