@@ -283,6 +283,8 @@ def slip(
             x = stiff[0]
             steps += 1
             if jump == left:
+                if to_stick:
+                    return NO_STICK
                 break
             continue
         last = h >= left

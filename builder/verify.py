@@ -30,7 +30,7 @@ __all__ = ["CASES", "block_errors", "draw", "monotony", "seam_jumps", "verify"]
 
 Array = NDArray[np.float64]
 #: what a fresh solve itself may be wrong by, relative to mu~: rounding, and the input's last digit next to the corner
-SOLVER_NOISE = 2e-14
+SOLVER_NOISE = 2e-15
 SEAMS = (Y_CONT, Y_MID_C, Y_MID_S, Y_HIGH, Y_TAIL, Y_STICK_LO, Y_STICK_HI)
 
 
