@@ -1,0 +1,483 @@
+"""Every number of docs/hard-cases.md: what straightforward code gets wrong, and what is done instead.
+
+    python benchmarks/hard_cases.py [--write]
+
+Each case computes the naive number too.  ``--write`` replaces the sections between the markers of the page.
+"""
+
+from __future__ import annotations
+
+import measuring  # isort: split
+
+import argparse
+import csv
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import mpmath
+import numpy as np
+from marching import march
+from measuring import ROOT, markdown, progress, quantity
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from builder.model import NO_SLIP, NO_STICK, OK, slip
+from builder.steady import _section, border, continuous, solve, stick_excess, stick_slip, workspace
+from friction import Surrogate, tails
+from friction.nondim import groups
+from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes
+
+Array = NDArray[np.float64]
+PAGE = ROOT / "docs" / "hard-cases.md"
+HALF = 0.5 * math.pi
+
+
+def g(x: float) -> str:
+    """Two significant digits."""
+    return quantity(float(x), 2)
+
+
+def reference(case: str) -> list[tuple[float, float, float]]:
+    """v~, y~, mu~ of the quadruple-precision points of one kind."""
+    with open(ROOT / "tests" / "data" / "points.csv", newline="") as stream:
+        return [
+            (float(r["v"]), float(r["y"]), float(r["mu_ratio"])) for r in csv.DictReader(stream) if r["case"] == case
+        ]
+
+
+def worst(case: str) -> str:
+    """Largest relative error of the solver over the reference points of one kind, as text."""
+    points = reference(case)
+    error = max(abs(solve(v, y).mu_ratio - mu) / mu for v, y, mu in points)
+    return f"{g(error)} on {len(points)} points"
+
+
+# --- the border ---------------------------------------------------------------------------------------
+
+
+def _lam_samples(v: float, y: float, n: int) -> tuple[Array, float]:
+    """lam at ``n`` + 1 even instants of half a period of the continuous orbit, and its smallest value between them."""
+    w, out, _, _ = workspace()
+    if continuous(v, y, w, out) != OK:
+        raise ArithmeticError(f"no continuous orbit at v~ = {v!r}, y~ = {y!r}")
+    start, least = -(out[1] + out[2] * HALF), float(out[8])
+    samples = np.empty(n + 1)
+    for i, sigma in enumerate(np.linspace(-HALF, HALF, n + 1)):
+        th = start
+        if i:
+            chart = 1 if start > 0.75 else 0
+            slip(v, y, -HALF, 0, start - chart * HALF, chart, float(sigma), False, w, out)
+            th = out[1] + out[2] * HALF
+        samples[i] = v * math.cos(th) - y * math.sin(sigma) * math.sin(th)
+    return samples, least
+
+
+def grazing() -> str:
+    """Short windows of stick just below the border."""
+    y = 1.0
+    crit, _ = border(y)
+    rows = []
+    for gap in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8):
+        v = crit * (1.0 - gap)
+        samples, least = _lam_samples(v, y, 100)
+        full = solve(v, y)
+        rows.append([f"{gap:.0e}", str(int((samples < 0.0).sum())), f"{least:.1e}", f"{full.stick_fraction:.3e}"])
+    header = ("1 - v~/v~crit", "of 101 samples below 0", "smallest lam", "stick fraction, solved")
+    return f"y~ = 1, lam along the orbit that slides all the time:\n\n{markdown(header, rows)}"
+
+
+def surplus() -> str:
+    """What the poorly known end of slip would cost without taking the surplus out."""
+    w, out, orbit, _ = workspace()
+    lost = kept = spread = 0.0
+    count = 0
+    for v, y, mu in reference("border"):
+        full = solve(v, y)
+        if full.regime != "stick_slip":
+            continue
+        count += 1
+        hint = math.nan
+        if continuous(v, y, w, out) == OK:
+            hint = out[9]
+        stick_slip(v, y, y - 1.0, hint, w, out, orbit)
+        naive = (orbit[0] * (orbit[1] + 0.5 * v * orbit[0]) + out[4]) / math.pi
+        spread = max(spread, abs(out[0] - orbit[4]))
+        lost = max(lost, abs(naive - mu) / mu)
+        kept = max(kept, abs(full.mu_ratio - mu) / mu)
+    rows = [["as it comes", g(lost)], ["surplus taken out", g(kept)]]
+    return (
+        f"{count} reference points below the border; slip and stick fail to add up to half a period by as much as "
+        f"{g(spread)}:\n\n" + markdown(("mu~", "max rel error"), rows)
+    )
+
+
+# --- stick onset --------------------------------------------------------------------------------------
+
+
+def double_root() -> str:
+    """|u|^2 - 1 shortly after slip has stopped."""
+    v, y = 0.1, 0.5
+    w, out, orbit, _ = workspace()
+    stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)
+    x0 = math.atan2(orbit[3], orbit[1])
+    s0 = math.asin(v * math.cos(x0) / (y * math.sin(x0)))
+    rows = []
+    for d in (1e-1, 1e-3, 1e-5, 1e-7, 1e-8):
+        ux = math.cos(x0) + v * d
+        uy = math.sin(x0) + y * (math.cos(s0 + d) - math.cos(s0))
+        naive = ux * ux + uy * uy - 1.0
+        ours = stick_excess(v, y, y - 1.0, x0, 0, s0, s0 + d - math.pi, d) * d * d
+        with mpmath.workdps(60):
+            th, dd = mpmath.mpf(x0), mpmath.mpf(d)
+            # the onset itself: lam = 0 ties sigma0 to th0
+            at = mpmath.asin(mpmath.mpf(v) * mpmath.cos(th) / (mpmath.mpf(y) * mpmath.sin(th)))
+            a = mpmath.cos(th) + v * dd
+            b = mpmath.sin(th) + y * (mpmath.cos(at + dd) - mpmath.cos(at))
+            exact = float(a * a + b * b - 1)
+        rows.append([f"{d:.0e}", f"{exact:.6e}", f"{naive:.6e}", g(abs(naive / exact - 1)), g(abs(ours / exact - 1))])
+    header = ("time since the onset", "exact", "naive", "its rel error", "rel error, root divided out")
+    return f"v~ = {v}, y~ = {y}:\n\n{markdown(header, rows)}"
+
+
+# --- creep --------------------------------------------------------------------------------------------
+
+
+def creep() -> str:
+    """Cycles that marching needs as v~ falls, and what is wrong when two cycles agree."""
+    rows = []
+    for v, y in ((1.0, 0.1), (0.1, 0.1), (0.01, 0.1), (0.01, 0.5), (0.001, 0.5)):
+        progress(f"marching at v~ = {v:g}, y~ = {y:g}")
+        marched = march(v, y)
+        full = solve(v, y)
+        rows.append(
+            [f"{v:g}", f"{y:g}", full.regime.replace("_", "-"), f"{marched.cycles}" + ("" if marched.agreed else " *"),
+             g(abs(marched.mu_ratio - full.mu_ratio))]
+        )  # fmt: skip
+    text = markdown(("v~", "y~", "regime", "cycles", "error when it stops"), rows, 3)
+    return text + f"\n\nThe solver here, at the reference points of creep: max rel error {worst('creep')}."
+
+
+# --- corner -------------------------------------------------------------------------------------------
+
+
+def _corner(radius: Array, psi: Array) -> tuple[Array, Array, Array]:
+    """v~, eta = y~ - 1 and phi in polar coordinates of the normal form."""
+    phi, s0 = radius * np.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * np.cos(psi)
+    return phi * s0 * s0 / (2.0 * math.pi), 0.25 * s0 * s0 - 0.5 * phi * phi, phi
+
+
+def _solved(v: Array, eta: Array) -> Array:
+    one = np.vectorize(lambda a, b: solve(float(a), 1.0 + float(b), float(b)).mu_ratio, otypes=[np.float64])
+    out: Array = one(v, eta)
+    return out
+
+
+def exact_eta() -> str:
+    """y~ rounded next to 1."""
+    rows = []
+    for radius in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5):
+        v, eta, phi = (float(x) for x in _corner(np.array(radius), np.array(0.25 * math.pi)))
+        exact = solve(v, 1.0 + eta, eta).mu_ratio
+        rounded = solve(v, 1.0 + eta).mu_ratio
+        rows.append([f"{radius:.0e}", f"{v:.1e}", f"{eta:.1e}", g(abs(rounded / exact - 1)), g(abs(exact / phi - 1))])
+    header = ("R", "v~", "y~ - 1", "rel change of mu~ by rounding y~", "abs(mu~/phi - 1)")
+    return f"psi = pi/4; phi is the root of the normal form:\n\n{markdown(header, rows, 0)}"
+
+
+def _fit_error(
+    n: int, spans: tuple[tuple[float, float], tuple[float, float]], f: Callable[[Array, Array], Array],
+    a: Array, b: Array, truth: Array,
+) -> float:  # fmt: skip
+    """Largest error at (a, b) of the n x n Chebyshev interpolant of ``f`` on the rectangle ``spans``."""
+    grid = [nodes(n, *span) for span in spans]
+    c = chebyshev_coefficients(f(grid[0][:, None], grid[1][None, :]))
+    left, right = (
+        interpolation_matrix(n, (2.0 * x - low - high) / (high - low))
+        for x, (low, high) in zip((a, b), spans, strict=True)
+    )
+    return float(np.abs(np.einsum("pi,ij,pj->p", left, c, right) - truth).max())
+
+
+def cusp() -> str:
+    """The corner on three grids."""
+    rng = np.random.default_rng(1)
+    radius, psi = 0.8 * np.sqrt(rng.uniform(1e-4, 1.0, 2000)), rng.uniform(0.0, HALF, 2000)
+    v, eta, phi = _corner(radius, psi)
+    inside = _solved(v, eta)
+    low, high = (math.log(1e-6), math.log(0.05)), (math.log(0.7), math.log(1.3))
+    log_v, log_y = rng.uniform(*low, 2000), rng.uniform(*high, 2000)
+    outside = _solved(np.exp(log_v), np.exp(log_y) - 1.0)
+
+    def ratio(p: Array, s: Array) -> Array:
+        eta_ = 0.25 * s * s - 0.5 * p * p
+        p, s, eta_ = np.broadcast_arrays(p, s, eta_)
+        out: Array = _solved(p * s * s / (2.0 * math.pi), eta_) / p
+        return out
+
+    def polar(r: Array, t: Array) -> Array:
+        out: Array = ratio(r * np.sin(t) / math.sqrt(2.0), math.sqrt(2.0) * r * np.cos(t))
+        return out
+
+    def plain(a: Array, b: Array) -> Array:
+        a, b = np.broadcast_arrays(a, b)
+        return _solved(np.exp(a), np.exp(b) - 1.0)
+
+    rows = []
+    for n in (8, 16, 32, 64):
+        progress(f"corner {n} x {n}")
+        rows.append(
+            [
+                f"{n} x {n}",
+                g(_fit_error(n, (low, high), plain, log_v, log_y, outside)),
+                g(
+                    _fit_error(
+                        n, ((0.0, 0.8 / math.sqrt(2.0)), (0.0, 0.8 * math.sqrt(2.0))), ratio,
+                        phi, math.sqrt(2.0) * radius * np.cos(psi), inside / phi,
+                    )
+                ),
+                g(_fit_error(n, ((0.0, 0.8), (0.0, HALF)), polar, radius, psi, inside / phi)),
+            ]
+        )  # fmt: skip
+    header = ("Chebyshev nodes", "mu~ on (ln v~, ln y~)", "mu~/phi on (phi, s0)", "mu~/phi on (R, psi)")
+    return (
+        "Largest absolute error at 2,000 random points; the two right columns over R <= 0.8, the left one over v~ in "
+        f"[1e-6, 0.05], y~ in [0.7, 1.3]:\n\n{markdown(header, rows)}\n\n"
+        f"The solver at the reference points of the corner: max rel error {worst('corner')}."
+    )
+
+
+# --- small and large amplitude ------------------------------------------------------------------------
+
+
+def small_amplitude() -> str:
+    """1 - mu~ where mu~ is all but 1."""
+    v = 2.0
+    rows = []
+    for y in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
+        full = solve(v, y)
+        limit = y * y / (4.0 * (1.0 + v * v))
+        rows.append(
+            [f"{y:.0e}", f"{full.deficit:.6e}", g(abs((1.0 - full.mu_ratio) / full.deficit - 1)),
+             g(abs(full.deficit / limit - 1))]
+        )  # fmt: skip
+    header = ("y~", "1 - mu~, solved", "rel error of 1 - fl(mu~)", "rel distance to eq. (31)")
+    return f"v~ = {v:g}; eq. (31) itself is off by O(y~^2):\n\n{markdown(header, rows, 0)}"
+
+
+def short_stick() -> str:
+    """The instant at which slip starts, counted from the far turn and from the near one."""
+    w, out, orbit, _ = workspace()
+    rows = []
+    for y in (1e4, 1e6, 1e8, 1e10, 1e12):
+        v = 0.9 * tails.border_large_amplitude(y)
+        full = solve(v, y)
+        hint = math.nan
+        if continuous(v, y, w, out) == OK:
+            hint = out[9]
+        stick_slip(v, y, y - 1.0, hint, w, out, orbit)
+        d, cth, sth, s0, s1 = orbit[0], orbit[1], orbit[3], orbit[4], orbit[5]
+        ux, uy = cth + v * d, 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth
+        x, chart = (-math.asin(min(ux, 1.0)), 1) if uy > 0.0 else (math.atan2(uy, ux), 0)
+        slid = []
+        for sigma in (s0 + d, s1 + math.pi):  # s1 = s0 + d - pi counts from the far turn and is rounded there
+            slip(v, y, sigma, -1, x, chart, HALF, True, w, out)
+            slid.append(float(out[4]))
+        layer = (full.mu_ratio - float(tails.outer(y / v))) * y / v
+        rows.append([f"{y:.0e}", f"{d:.2e}", g(abs(slid[1] / slid[0] - 1)), f"{layer:.10f}"])
+    header = ("y~", "length of stick", "rel change of the slip's share of mu~, far turn", "(mu~ - outer) y~/v~, solved")
+    return (
+        f"v~ = 0.9 v~crit; the last column tends to a constant:\n\n{markdown(header, rows, 0)}\n\n"
+        f"The solver at the reference points of large amplitude: max rel error {worst('tail_yinf')}."
+    )
+
+
+def stiffness() -> str:
+    """Steps in half a period at large v~."""
+    rows = []
+    w, out, _, _ = workspace()
+    for v in (1e1, 1e2, 1e3, 1e4, 1e6):
+        y = v
+
+        def rate(sigma: float, th: Array, v: float = v, y: float = y) -> list[float]:
+            return [-y * math.sin(sigma) * math.cos(th[0]) - v * math.sin(th[0])]
+
+        explicit = "-"
+        if v <= 1e4:
+            run = solve_ivp(rate, (-HALF, HALF), [math.atan(v * y / (1 + v * v))], method="DOP853", rtol=1e-9)
+            explicit = f"{run.t.size - 1:,}"
+        continuous(v, y, w, out)
+        steps = int(out[10])
+        closed = float(tails.outer(y / v) + tails.second_order(y / v) / (v * v))
+        rows.append([f"{v:.0e}", explicit, f"{steps}", g(abs(solve(v, y).mu_ratio / closed - 1))])
+    header = ("v~ = y~", "explicit steps (DOP853, rtol 1e-9)", "steps here", "rel distance to two terms of v~ -> inf")
+    return f"{markdown(header, rows, 0)}\n\nAt the reference points of large speed: max rel error {worst('tail_vinf')}."
+
+
+# --- the ends of double precision ---------------------------------------------------------------------
+
+
+def overflow() -> str:
+    """The dimensionless groups from legal inputs whose products leave double precision."""
+    cases = [
+        (0.3, 1e200, 1e200, 1e150, 1.0, 1e120),
+        (0.3, 1e-200, 1e-200, 1e-150, 1e-30, 1e-140),
+        (0.5, 5e-324, 1.0, 5e-324, 3.0, 2e-323),
+        (1e-200, 1e-200, 1e-300, 1e-80, 1.0, 1e-90),
+    ]
+    rows = []
+    with np.errstate(all="ignore"):
+        for mu0, force, k, y0, omega, v0 in cases:
+            a, b, c, d, e, f = (np.float64(x) for x in (mu0, force, k, y0, omega, v0))
+            naive = (float(f * c / (a * b * e)), float(d * c / (a * b)))
+            ours = groups(mu0, force, k, y0, omega, v0)
+            x, z = Fraction(mu0) * Fraction(force), Fraction(k)
+            exact = (Fraction(v0) * z / (x * Fraction(omega)), Fraction(y0) * z / x)
+            off = max(abs(Fraction(o) / t - 1) for o, t in zip(ours, exact, strict=True))
+            inputs = ", ".join(f"{value:g}" for value in (mu0, force, k, y0, omega, v0))
+            rows.append(
+                [inputs, f"{naive[0]:.4g}, {naive[1]:.4g}", f"{float(exact[0]):.4g}, {float(exact[1]):.4g}", g(float(off))]
+            )
+    header = ("mu0, Fz, k, y0, omega, v0", "naive v~, y~", "exact v~, y~", "rel error here")
+    return markdown(header, rows, 3)
+
+
+def denormals() -> str:
+    """Amplitudes whose square is no normal number any more."""
+    rows = []
+    h = solve(0.3e-12, 1e-6)
+    w, out, orbit, _ = workspace()
+    for y in (1e-9, 1e-30, 1e-100, 1e-150):
+        v = 0.3 * y * y
+        status, _ = stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)
+        plain = orbit[0] / math.pi if status == OK else math.nan
+        full = solve(v, y)
+        rows.append([f"{y:.0e}", f"{v:.0e}", f"status {status}, {plain:.12f}", f"{full.stick_fraction:.12f}"])
+    header = ("y~", "v~", "stick fraction, solved at this amplitude", "solved at y~ = 1e-9 and scaled")
+    text = f"v~ = 0.3 y~^2; at y~ = 1e-6 the stick fraction is {h.stick_fraction:.12f}:\n\n{markdown(header, rows, 0)}"
+    s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    rows = []
+    for v, y in ((5e-324, 0.5), (5e-324, 2.0), (1e-310, 2.0), (1e-310, 1.0), (1.0, 5e-324)):
+        rows.append([f"{v:g}", f"{y:g}", f"{s.mu_ratio(v, y):.12g}"])
+    return text + "\n\nThe table `mumacro-1e-12` at denormal inputs:\n\n" + markdown(("v~", "y~", "mu~"), rows, 0)
+
+
+# --- stopping -----------------------------------------------------------------------------------------
+
+
+def _secant(v: float, y: float, kind: int, chart: int, z: float, rule: str, small: float) -> float:
+    """The section's unknown by a plain secant iteration from ``z``; NaN where the iteration leaves the section."""
+    w, out, orbit, _ = workspace()
+    z_old, f_old, before = math.nan, math.inf, math.inf
+    for _ in range(60):
+        f, status = _section(kind, v, y, y - 1.0, z, chart, w, out, orbit)
+        if status in (NO_SLIP, NO_STICK) or status != OK or not math.isfinite(f):
+            return math.nan
+        new = z - f * (z - z_old) / (f - f_old) if math.isfinite(f_old) and f != f_old else z * (1.0 - 1e-2)
+        step = abs(new - z) / abs(z)
+        if math.isfinite(f_old):
+            if f == f_old or (rule == "one" and step < small) or (rule == "two" and step * before < 1e-17):
+                return new
+            before = step
+        z_old, f_old, z = z, f, new
+        if not 0.0 < z < HALF:
+            return math.nan
+    return math.nan
+
+
+def stop_rule() -> str:
+    """Where one small step stops the secant method, against the product of the last two."""
+    rng = np.random.default_rng(4)
+    found: dict[str, list[float]] = {"one 1e-6": [], "one 1e-8": [], "two": []}
+    for _ in range(600):
+        y = 10.0 ** rng.uniform(-2, 0.5)
+        v = border(y)[0] * 10.0 ** rng.uniform(-4, -0.05)
+        chart = 0 if y < 0.7 else 1
+        w, out, orbit, _ = workspace()
+        if stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)[0] != OK:
+            continue
+        true = math.atan2(orbit[3], orbit[1]) if chart == 0 else math.atan2(orbit[1], orbit[3])
+        for name in found:
+            rule, _, small = name.partition(" ")
+            z = _secant(v, y, 0, chart, true * (1.0 + 10.0 ** rng.uniform(-6, -2)), rule, float(small or 0.0))
+            if math.isfinite(z):
+                found[name].append(abs(z / true - 1.0))
+    rows = []
+    for name, errors in found.items():
+        e = np.array(errors)
+        label = "product of the last two steps below 1e-17" if name == "two" else f"one step below {name[4:]}"
+        rows.append([label, f"{e.size}", g(float(np.median(e))), g(float(e.max()))])
+    return markdown(("rule", "runs that stayed on the section", "median rel error", "largest"), rows)
+
+
+# --- the cache ----------------------------------------------------------------------------------------
+
+
+def stale_cache() -> str:
+    """A compiled caller keeps running an old callee from another file."""
+    caller = (
+        "from numba import njit\nfrom callee import f\n"
+        "@njit(cache=True)\ndef twice():\n    return 2 * f()\nprint(twice())\n"
+    )
+    callee = "from numba import njit\n@njit(cache=True)\ndef f():\n    return {}\n"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "caller.py").write_text(caller)
+
+        def run(value: int, cache: str) -> str:
+            (folder / "callee.py").write_text(callee.format(value))
+            environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / cache), "PYTHONDONTWRITEBYTECODE": "1"}
+            done = subprocess.run(
+                [sys.executable, "caller.py"], cwd=folder, env=environment, capture_output=True, text=True, check=True
+            )
+            return done.stdout.strip()
+
+        rows = [["1", run(1, "cache"), "2"], ["10, one cache folder", run(10, "cache"), "20"]]
+        rows.append(["10, a folder named after the sources", run(10, "other"), "20"])
+    return markdown(("the callee returns", "twice the callee, printed", "right"), rows)
+
+
+CASES: dict[str, Callable[[], str]] = {
+    "grazing": grazing,
+    "surplus": surplus,
+    "double_root": double_root,
+    "creep": creep,
+    "exact_eta": exact_eta,
+    "cusp": cusp,
+    "small_amplitude": small_amplitude,
+    "short_stick": short_stick,
+    "stiffness": stiffness,
+    "overflow": overflow,
+    "denormals": denormals,
+    "stop_rule": stop_rule,
+    "stale_cache": stale_cache,
+}
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", choices=list(CASES), help="one case")
+    parser.add_argument("--write", action="store_true", help="put the numbers into docs/hard-cases.md")
+    given = parser.parse_args()
+    progress(measuring.machine("scipy"))
+    for name, case in CASES.items():
+        if given.only in (None, name):
+            text = case()
+            print(f"## {name}\n\n{text}\n", flush=True)
+            if given.write:
+                page = PAGE.read_text(encoding="utf-8")
+                begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+                if page.count(begin) != 1 or page.count(end) != 1:
+                    parser.error(f"{PAGE} must hold {begin.strip()!r} and {end!r} once each")
+                before, _, rest = page.partition(begin)
+                PAGE.write_text(f"{before}{begin}\n{text}\n\n{end}{rest.partition(end)[2]}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
