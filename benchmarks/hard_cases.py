@@ -341,7 +341,12 @@ def overflow() -> str:
             off = max(abs(Fraction(o) / t - 1) for o, t in zip(ours, exact, strict=True))
             inputs = ", ".join(f"{value:g}" for value in (mu0, force, k, y0, omega, v0))
             rows.append(
-                [inputs, f"{naive[0]:.4g}, {naive[1]:.4g}", f"{float(exact[0]):.4g}, {float(exact[1]):.4g}", g(float(off))]
+                [
+                    inputs,
+                    f"{naive[0]:.4g}, {naive[1]:.4g}",
+                    f"{float(exact[0]):.4g}, {float(exact[1]):.4g}",
+                    g(float(off)),
+                ]
             )
     header = ("mu0, Fz, k, y0, omega, v0", "naive v~, y~", "exact v~, y~", "rel error here")
     return markdown(header, rows, 3)
