@@ -23,13 +23,13 @@ from service import __version__
 from service.errors import answer_problem
 from service.middleware import ApiKeyGate, BodyLimit, RequestRecord
 from service.openapi import install
-from service.routes import batch, docs, health, mu_macro, table
+from service.routes import batch, docs, health, mu_macro, table, umbridge
 from service.settings import Settings, load_settings, unknown_variables
 from service.shelf import Shelf
 
 __all__ = ["create_app"]
 
-_ROUTERS = (mu_macro.router, batch.router, table.router, health.router, docs.router)
+_ROUTERS = (mu_macro.router, batch.router, table.router, health.router, docs.router, umbridge.router)
 _log = logging.getLogger("mumacro.app")
 
 
@@ -86,6 +86,10 @@ async def _answer_http(request: Request, error: Exception) -> Response:
     path = request.url.path
     if isinstance(error, HTTPException) and error.status_code == 405:
         allowed = _allowed_methods(path)
+        if path in umbridge.PATHS:
+            answer = umbridge.umbridge_error("UnsupportedFeature", f"{path} takes {allowed}", 405)
+            answer.headers["Allow"] = allowed
+            return answer
         error = HTTPException(
             405, f"{request.method} is not allowed here; allowed: {allowed}", headers={"Allow": allowed}
         )

@@ -2,8 +2,11 @@
 
 import csv
 import importlib.util
+import os
+import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,6 +82,36 @@ def problem() -> Callable[..., dict[str, Any]]:
         return document
 
     return check
+
+
+@dataclass(frozen=True)
+class LiveServer:
+    """A service process on a loopback port."""
+
+    url: str
+    log: Path
+
+
+@pytest.fixture(scope="session")
+def live_server(
+    surrogate: Surrogate, repository: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[LiveServer]:
+    """One service on the committed tables for all tests that talk to a real socket and do not stop it."""
+    log = tmp_path_factory.mktemp("live") / "log.jsonl"
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
+    command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path.parent)]
+    with log.open("wb") as sink:
+        process = subprocess.Popen(command, cwd=repository, env=variables, stdout=sink, stderr=subprocess.STDOUT)
+    try:
+        deadline = time.monotonic() + 180  # a first start compiles the kernels
+        while (found := re.search(r"running on (http://[^ ]+:\d+) ", log.read_text("utf-8"))) is None:
+            assert process.poll() is None, log.read_text("utf-8")
+            assert time.monotonic() < deadline, log.read_text("utf-8")
+            time.sleep(0.05)
+        yield LiveServer(found[1], log)
+    finally:
+        process.terminate()
+        process.wait(timeout=60)
 
 
 # --- what the numerical tests share -------------------------------------------------------------------
