@@ -5,12 +5,13 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from service import __version__
+from service import __version__, forms
 from service import schemas as models
 
-__all__ = ["case_parameters", "describe_json", "install", "option_parameters", "table_parameters"]
+__all__ = ["case_parameters", "describe_json", "form_parameters", "install", "option_parameters", "table_parameters"]
 
 _REF = "#/components/schemas/{model}"
 _DESCRIPTION = (
@@ -26,11 +27,15 @@ _WHY = {
     422: "Invalid, missing or unknown fields",
     503: "Not ready or overloaded; see Retry-After",
 }
-_REQUESTS: tuple[Any, ...] = (models.Case, models.CaseRequest, models.BatchColumns)
+_REQUESTS: tuple[Any, ...] = (
+    models.Case, models.CaseRequest, models.BatchColumns, forms.SolveForRequest, forms.LawRequest
+)  # fmt: skip
 _ANSWERS: tuple[Any, ...] = (
     models.CaseAnswer,
     models.ColumnsAnswer,
     models.RowsAnswer,
+    forms.SolveForAnswer,
+    forms.LawAnswer,
     models.TableAnswer,
     models.Health,
     models.Problem,
@@ -69,6 +74,29 @@ def table_parameters() -> list[dict[str, Any]]:
         "name": "id", "in": "query", "required": False, "schema": {"type": "string"}, "description": "Name of the table"
     }  # fmt: skip
     return [identity, _parameter("tolerance", False)]
+
+
+def form_parameters(form: type[BaseModel]) -> list[dict[str, Any]]:
+    """Query parameters of a request that also exists as a JSON body."""
+    example = form.model_json_schema()["examples"][0]
+    described = []
+    for name, full in form.model_json_schema()["properties"].items():
+        schema = dict(full)
+        description = schema.pop("description", "")
+        for choice in schema.pop("anyOf", ()):
+            if choice.get("type") != "null":
+                schema.update(choice)
+        required = form.model_fields[name].is_required()
+        parameter: dict[str, Any] = {
+            "name": name, "in": "query", "required": required, "description": description,
+            "schema": {key: value for key, value in schema.items() if key not in ("default", "title")},
+        }  # fmt: skip
+        if name in example:
+            parameter["example"] = example[name]
+        if name == "include":
+            parameter.update(style="form", explode=False)
+        described.append(parameter)
+    return described
 
 
 def _parameter(name: str, required: bool) -> dict[str, Any]:

@@ -123,8 +123,7 @@ def _case(model: str, body: Mapping[str, Any]) -> list[float]:
 
 def _evaluate(surrogate: Surrogate, values: list[float], gradient: bool) -> Any:
     try:
-        case: dict[str, float] = dict(zip(FIELDS, values, strict=True))
-        return surrogate.evaluate(**case, gradient=True) if gradient else surrogate.evaluate(**case)
+        return surrogate.evaluate(*values, gradient=gradient)
     except InputError as error:
         raise _invalid(str(error)) from None
 

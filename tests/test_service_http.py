@@ -15,6 +15,9 @@ from service.settings import Settings
 PATHS = {
     "/v1/mu-macro": "GET, HEAD, POST",
     "/v1/mu-macro/batch": "POST",
+    "/v1/solve-for": "POST",
+    "/v1/law": "POST",
+    "/v1/law.csv": "GET, HEAD",
     "/v1/table": "GET, HEAD",
     "/v1/table.nc": "GET, HEAD",
     "/livez": "GET, HEAD",
@@ -190,7 +193,8 @@ def test_the_description_is_whole(client):
 
 def test_the_described_examples_are_answered(client):
     schemas = client.get("/openapi.json").json()["components"]["schemas"]
-    for name, path in (("Case", "/v1/mu-macro"), ("BatchColumns", "/v1/mu-macro/batch")):
+    for name, path in (("Case", "/v1/mu-macro"), ("BatchColumns", "/v1/mu-macro/batch"),
+                       ("SolveForRequest", "/v1/solve-for"), ("LawRequest", "/v1/law")):  # fmt: skip
         for example in schemas[name]["examples"]:
             assert client.post(path, json=example).status_code == 200
 

@@ -258,7 +258,7 @@ def test_the_python_client_reads_our_errors(live):
     model = umbridge.HTTPModel(url, "mu_macro")
     with pytest.raises(Exception, match=r"InvalidInput: .*mu0"):
         model([[-0.3, *POINT[1:]]])
-    with pytest.raises(Exception, match="InvalidInput: .*Expected 6 but got 5"):
+    with pytest.raises(Exception, match=r"InvalidInput: .*Expected 6 but got 5"):
         model([POINT[:5]])
     with pytest.raises(Exception, match="not supported by server"):
         umbridge.HTTPModel(url, "nobody")

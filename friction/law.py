@@ -1,0 +1,126 @@
+"""The friction law: mu_macro over a range of v0, or of any one input, with its marks and the paper's approximations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from friction import tails
+from friction.errors import InputError
+from friction.inverse import Crossing, border_crossings, checked_case
+from friction.nondim import FIELDS, POSITIVE
+from friction.surrogate import Answer, Surrogate
+
+__all__ = ["APPROXIMATIONS", "SCALES", "Law", "approximations", "friction_law", "sweep_values"]
+
+Array = NDArray[np.float64]
+
+SCALES = ("log", "linear")
+
+#: name -> what it is and where it holds; NaN elsewhere
+APPROXIMATIONS = {
+    "static": "eq. (16), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
+    "small_amplitude": "eq. (31), continuous sliding at y~ << 1: mu0 (1 - y~^2 / (4 (1 + v~^2))); given for y~ <= 1",
+    "rigid": "eqs. (35), (37), fast sliding or rigid contact: mu0 (2/pi) K(i y~/v~)",
+    "corner": "slow sliding near y~ = 1, root of mu~^3 + 2 (y~ - 1) mu~ = pi v~; given for |y~ - 1| <= 0.5, mu~ <= 0.7",
+}
+_CORNER_REACH, _CORNER_TOP = 0.5, 0.7
+
+
+@dataclass(frozen=True)
+class Law:
+    """A sweep of one input.
+
+    Attributes
+    ----------
+    along : str
+        The swept input.
+    values : ndarray
+        Its values [SI], ascending, shape (n,).
+    answer : Answer
+        What the surrogate says at each, arrays (n,).
+    mu_static : ndarray
+        Static limit (v0 -> 0) of each case [-], eq. (38), shape (n,).
+    border : tuple of Crossing
+        Where in the range continuous sliding begins or ends.
+    """
+
+    along: str
+    values: Array
+    answer: Answer
+    mu_static: Array
+    border: tuple[Crossing, ...]
+
+
+def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
+    """``points`` values from ``start`` to ``stop``, both included exactly.
+
+    Raises
+    ------
+    InputError
+        Ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
+    """
+    if along not in FIELDS:
+        raise InputError("along", along, f"one of {', '.join(FIELDS)}")
+    if scale not in SCALES:
+        raise InputError("scale", scale, f"one of {', '.join(SCALES)}")
+    if points < 2:
+        raise InputError("points", points, ">= 2")
+    positive = along in POSITIVE or scale == "log"
+    if not (math.isfinite(start) and (start > 0.0 or (start == 0.0 and not positive))):
+        raise InputError("start", start, "finite and > 0" if positive else "finite and >= 0")
+    if not (math.isfinite(stop) and stop > start):
+        raise InputError("stop", stop, "finite and > start")
+    if scale == "linear":
+        share = np.linspace(0.0, 1.0, points)
+        values: Array = start * (1.0 - share) + stop * share
+    else:
+        values = np.exp(np.linspace(math.log(start), math.log(stop), points))
+    values[0], values[-1] = start, stop
+    np.clip(values, start, stop, out=values)
+    return values
+
+
+def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[str, float | None]) -> Law:
+    """mu_macro at ``values`` (ascending) of the input ``along``; ``case`` holds the other five inputs.
+
+    Raises
+    ------
+    InputError
+        An input that is missing, out of bounds, or given twice.
+    """
+    known = checked_case(case, along)
+    full: dict[str, Any] = {"k": None, **known, along: values}
+    answer = surrogate.evaluate(**full)
+    mu0 = np.broadcast_to(np.asarray(full["mu0"], dtype=np.float64), values.shape)
+    at_rest = (np.asarray(full["y0"]) == 0.0) | (np.asarray(full["omega"]) == 0.0)
+    static = np.where(at_rest, mu0, mu0 * tails.static_limit(answer.y_tilde))
+    crossings = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]))
+    return Law(along, values, answer, static, crossings)
+
+
+def approximations(law: Law, mu0: float | Array) -> dict[str, Array]:
+    """The approximations of :data:`APPROXIMATIONS` along a law; NaN where one is not meant to hold."""
+    v, y = (np.asarray(x, dtype=np.float64) for x in (law.answer.v_tilde, law.answer.y_tilde))
+    elastic = np.isfinite(y) & np.isfinite(v)
+    v_safe, y_safe = np.where(elastic, v, 1.0), np.where(elastic, y, 0.0)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        ratio = np.where(v_safe > 0.0, y_safe / v_safe, np.inf)
+        rigid = np.where(np.isfinite(ratio), tails.outer(np.where(np.isfinite(ratio), ratio, 0.0)), 0.0)
+        small = tails.small_amplitude(np.minimum(v_safe, 1e150), np.minimum(y_safe, 1.0))
+    # rigid contact has no v~ and y~ of its own; eq. (37) is then the answer itself
+    rigid = np.where(elastic, rigid, np.asarray(law.answer.mu_ratio))
+    near = elastic & (np.abs(y_safe - 1.0) <= _CORNER_REACH) & (v_safe > 0.0) & (v_safe < 1.0)
+    corner = np.full(v.shape, np.nan)
+    corner[near] = tails.corner_root(v_safe[near], y_safe[near] - 1.0)
+    return {
+        "static": law.mu_static.copy(),
+        "small_amplitude": np.where(elastic & (y <= 1.0), mu0 * small, np.nan),
+        "rigid": mu0 * rigid,
+        "corner": np.where(corner <= _CORNER_TOP, mu0 * corner, np.nan),
+    }

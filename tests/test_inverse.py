@@ -1,0 +1,290 @@
+"""The inverse question and the friction law: roots against the forward answer, folds, reach, border, approximations."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from friction import InputError
+from friction.inverse import border_crossings, last_double, solve_for
+from friction.law import approximations, friction_law, sweep_values
+from friction.nondim import FIELDS
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+
+
+def others(case, name):
+    return {field: value for field, value in case.items() if field != name}
+
+
+def only_root(solution):
+    ((root,),) = solution.roots
+    return root
+
+
+def decade(low, high):
+    return st.floats(low, high).map(lambda x: 10.0**x)
+
+
+cases = st.fixed_dictionaries(
+    {"mu0": decade(-2, 0), "Fz": decade(-3, 4), "k": decade(3, 9), "y0": decade(-9, -3), "omega": decade(0, 7),
+     "v0": decade(-6, 2)}
+)  # fmt: skip
+
+
+def test_neighbouring_doubles_are_found_at_any_scale():
+    wanted = np.array([5e-324, 1e-300, 0.1, 1.0, math.pi, 1e300])
+
+    def below(x):
+        return x < wanted[:, None]
+
+    a, b = last_double(below, np.zeros(6), np.full(6, 1.7976931348623157e308))
+    assert b.tolist() == wanted.tolist()
+    assert a.tolist() == np.nextafter(wanted, 0.0).tolist()
+
+
+@settings(max_examples=100, deadline=None)
+@given(case=cases, unknown=st.sampled_from(FIELDS))
+def test_the_forward_answer_is_inverted(surrogate, case, unknown):
+    forward = surrogate.evaluate(**case)
+    solution = solve_for(surrogate, unknown, forward.mu_macro, others(case, unknown))
+    if solution.constant or not solution.roots[0]:
+        # to the surrogate's own error the input has no influence here, or its end is not told from the limit
+        edge = min(abs(forward.mu_macro - solution.reach.mu_min), abs(forward.mu_macro - solution.reach.mu_max))
+        assert edge <= 4.0 * forward.error_bound + 1e-9 * case["mu0"]
+        return
+    for root in solution.roots[0]:
+        there = surrogate.evaluate(**{**case, unknown: root.value})
+        assert there.mu_macro == root.mu_macro
+        assert root.mu_macro == pytest.approx(forward.mu_macro, rel=1e-9, abs=2.0 * forward.error_bound)
+        assert root.low <= root.value <= root.high
+    value = min(max(case[unknown], solution.reach.low), solution.reach.high)
+    assert any(root.low <= value <= root.high for root in solution.roots[0])
+
+
+def test_a_root_is_enclosed_to_the_tables_error(surrogate):
+    answer = surrogate.evaluate(**CASE, gradient=True)
+    root = only_root(solve_for(surrogate, "v0", answer.mu_macro, others(CASE, "v0")))
+    width = answer.error_bound / answer.gradient["v0"]
+    assert root.high - 0.01 == pytest.approx(width, rel=0.05)
+    assert 0.01 - root.low == pytest.approx(width, rel=0.05)
+
+
+def test_an_enclosure_on_a_plateau_spans_it(surrogate):
+    # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, whatever the stiffness from a hundredth of this one on
+    case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
+    root = only_root(solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, others(case, "k")))
+    assert root.low < 10.0
+    assert root.high > 1e9
+
+
+def test_targets_are_solved_together_as_alone(surrogate):
+    targets = np.linspace(0.23, 0.299, 57)
+    together = solve_for(surrogate, "v0", targets, others(CASE, "v0"))
+    values = [roots[0].value for roots in together.roots]
+    assert values == sorted(values)
+    for target, value in zip(targets, values, strict=True):
+        assert only_root(solve_for(surrogate, "v0", target, others(CASE, "v0"))).value == pytest.approx(value, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "low", "high"),
+    [("v0", 0.3 * math.sqrt(5.0) / 3.0, 0.3), ("y0", 0.0, 0.3), ("omega", 0.3 * math.sqrt(5.0) / 3.0, 0.3)],
+)
+def test_a_monotone_unknown_tells_its_reach(surrogate, unknown, low, high):
+    targets = [0.999 * low, low + 0.5 * (high - low), 1.001 * high]
+    solution = solve_for(surrogate, unknown, targets, others(CASE, unknown))
+    assert [len(roots) for roots in solution.roots] == [0, 1, 0]
+    assert solution.reach.mu_min == pytest.approx(low, abs=1e-10)
+    assert solution.reach.mu_max == high
+
+
+def test_an_end_that_is_attained_is_a_root(surrogate):
+    static = surrogate.evaluate(**{**CASE, "v0": 0.0}).mu_macro
+    assert only_root(solve_for(surrogate, "v0", static, others(CASE, "v0"))).value == 0.0
+    for unknown in ("y0", "omega"):
+        assert only_root(solve_for(surrogate, unknown, 0.3, others(CASE, unknown))).value == 0.0
+    # at rest friction vanishes from y0 = l0 on
+    root = only_root(solve_for(surrogate, "y0", 0.0, {**others(CASE, "y0"), "v0": 0.0}))
+    assert root.value == pytest.approx(3e-6, rel=1e-12)
+
+
+def test_an_end_that_is_only_approached_is_none(surrogate):
+    for unknown, end in (("v0", 0.3), ("y0", 0.0)):
+        solution = solve_for(surrogate, unknown, end, others(CASE, unknown))
+        assert solution.roots == ((),)
+        assert not solution.reach.holds(end)
+
+
+@pytest.mark.parametrize("unknown", ["k", "Fz"])
+def test_a_fold_has_three_roots(surrogate, unknown):
+    case = {**CASE, "v0": 1e-4}  # r = 2600
+    kappa = np.geomspace(1e-6, 1e10, 40_001)  # y~
+    ratio = surrogate.mu_ratio(kappa / 2600.0, kappa)
+    falling = np.diff(ratio) < 0.0
+    (turns,) = np.nonzero(falling[1:] != falling[:-1])
+    assert turns.size == 2  # a minimum, then a maximum, then down to rigid contact
+    low, high = ratio[turns + 1]
+    last = ratio[-1]
+    for share, expected in ((-0.01, 2), (0.5, 3), (1.01, 1)):
+        target = 0.3 * (last + share * (high - last))
+        roots = solve_for(surrogate, unknown, target, others(case, unknown)).roots[0]
+        assert len(roots) == expected
+        assert [root.value for root in roots] == sorted(root.value for root in roots)
+        for root in roots:
+            assert root.mu_macro == pytest.approx(target, rel=1e-12)
+    below = solve_for(surrogate, unknown, 0.3 * 0.99 * low, others(case, unknown))
+    assert below.roots == ((),)
+    assert below.reach.mu_min == pytest.approx(0.3 * low, rel=1e-6)
+
+
+def test_a_range_keeps_its_roots_only(surrogate):
+    case = others({**CASE, "v0": 1e-4}, "k")
+    target = 0.3 * 0.0023
+    every = solve_for(surrogate, "k", target, case)
+    assert len(every.roots[0]) == 3
+    first, second, third = (root.value for root in every.roots[0])
+    middle = solve_for(surrogate, "k", target, case, within=(math.sqrt(first * second), math.sqrt(second * third)))
+    assert only_root(middle).value == pytest.approx(second, rel=1e-9)
+    half = solve_for(surrogate, "v0", 0.25, others(CASE, "v0"), within=(0.0, 1e-3))
+    assert half.roots == ((),)
+    assert half.reach.max_included
+    assert half.reach.mu_max == surrogate.evaluate(**{**CASE, "v0": 1e-3}).mu_macro
+
+
+def test_friction_coefficients_are_found_far_out(surrogate):
+    for target in (1e-9, 0.1, 1e7):
+        root = only_root(solve_for(surrogate, "mu0", target, others(CASE, "mu0")))
+        assert root.mu_macro == pytest.approx(target, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "changed"),
+    [("v0", {"y0": 0.0}), ("v0", {"omega": 0.0}), ("k", {"y0": 0.0}), ("Fz", {"omega": 0.0}), ("y0", {"omega": 0.0}),
+     ("omega", {"y0": 0.0}), ("Fz", {"k": None})],
+)  # fmt: skip
+def test_an_input_without_influence_is_called_so(surrogate, unknown, changed):
+    case = {**CASE, **changed}
+    value = surrogate.evaluate(**case).mu_macro
+    solution = solve_for(surrogate, unknown, [value, 0.9 * value], others(case, unknown))
+    assert solution.constant
+    assert solution.roots == ((), ())
+    assert solution.reach.mu_min == solution.reach.mu_max == value
+
+
+def test_at_rest_the_frequency_only_matters_by_being_there(surrogate):
+    case = others({**CASE, "v0": 0.0}, "omega")
+    solution = solve_for(surrogate, "omega", [0.3, 0.25], case)
+    assert [[root.value for root in roots] for roots in solution.roots] == [[0.0], []]
+
+
+def test_rigid_contact_is_inverted(surrogate):
+    for unknown in ("v0", "y0", "omega", "mu0"):
+        case = {**CASE, "k": None}
+        target = surrogate.evaluate(**case).mu_macro
+        root = only_root(solve_for(surrogate, unknown, target, others(case, unknown)))
+        assert root.value == pytest.approx(CASE[unknown], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("field", "arguments"),
+    [("unknown", ("w0", 0.1, CASE)), ("v0", ("v0", 0.1, CASE)), ("Fz", ("v0", 0.1, {"mu0": 0.3})),
+     ("target", ("v0", -0.1, others(CASE, "v0"))), ("target", ("v0", [0.1, math.nan], others(CASE, "v0"))),
+     ("mu0", ("v0", 0.1, {**others(CASE, "v0"), "mu0": 0.0})),
+     ("range", ("v0", 0.1, others(CASE, "v0"), (1.0, 1.0))), ("range", ("k", 0.1, others(CASE, "k"), (0.0, 1.0))),
+     ("range", ("v0", 0.1, others(CASE, "v0"), (0.0, math.inf)))],
+)  # fmt: skip
+def test_a_bad_question_names_its_field(surrogate, field, arguments):
+    with pytest.raises(InputError) as caught:
+        solve_for(surrogate, *arguments)
+    assert caught.value.field == field
+
+
+# --- border -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("along", "expected"), [("v0", 1), ("omega", 1), ("y0", 1), ("k", 2), ("Fz", 2), ("mu0", 2)])
+def test_the_border_is_where_the_regime_changes(surrogate, along, expected):
+    crossings = border_crossings(surrogate, along, others(CASE, along), 1e-12, 1e12)
+    assert len(crossings) == expected
+    for crossing in crossings:
+        regimes = surrogate.evaluate(**{**CASE, along: crossing.value * np.array([1 - 1e-9, 1 + 1e-9])}).regime
+        assert set(regimes) == {"continuous", "stick_slip"}
+        answer = surrogate.evaluate(**{**CASE, along: crossing.value})
+        assert answer.v_tilde == pytest.approx(surrogate.v_tilde_crit(answer.y_tilde), rel=1e-9)
+        assert crossing.mu_macro == answer.mu_macro
+
+
+def test_outside_its_range_there_is_no_border(surrogate):
+    assert border_crossings(surrogate, "v0", others(CASE, "v0"), 1e-12, 1e-3) == ()
+    assert border_crossings(surrogate, "v0", {**others(CASE, "v0"), "k": None}, 0.0, 1e3) == ()
+    assert border_crossings(surrogate, "k", {**others(CASE, "k"), "v0": 0.0}, 1e-3, 1e3) == ()
+
+
+# --- law ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", ["log", "linear"])
+def test_a_range_has_its_ends_exactly(scale):
+    values = sweep_values("v0", 1e-7, 0.3, 101, scale)
+    assert (values[0], values[-1], values.size) == (1e-7, 0.3, 101)
+    steps = np.diff(np.log(values) if scale == "log" else values)
+    assert steps == pytest.approx(steps[0], rel=1e-9)
+    assert np.all(np.diff(sweep_values("v0", 1.0, math.nextafter(1.0, 2.0), 9, scale)) >= 0.0)
+
+
+@pytest.mark.parametrize("along", FIELDS)
+def test_a_law_is_the_surrogate_along_a_line(surrogate, along):
+    values = sweep_values(along, 0.01 * CASE[along], 100.0 * CASE[along], 41, "log")
+    law = friction_law(surrogate, along, values, others(CASE, along))
+    for i in (0, 17, 40):
+        alone = surrogate.evaluate(**{**CASE, along: values[i]})
+        assert law.answer.mu_macro[i] == pytest.approx(alone.mu_macro, rel=1e-15)
+        static = surrogate.evaluate(**{**CASE, along: values[i], "v0": 0.0})
+        assert law.mu_static[i] == pytest.approx(static.mu_macro, rel=1e-9, abs=1e-15)
+    changes = np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1])
+    assert changes == len(law.border)
+
+
+def test_the_approximations_hold_where_they_should(surrogate):
+    def compare(name, case, **ranges):
+        values = sweep_values("v0", *ranges["v0"], 31, "log")
+        law = friction_law(surrogate, "v0", values, others(case, "v0"))
+        approximation = approximations(law, case["mu0"])[name]
+        return np.max(np.abs(approximation - law.answer.mu_macro)) / case["mu0"]
+
+    unit = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 1.0}
+    assert compare("static", {**unit, "y0": 0.5}, v0=(1e-12, 1e-9)) < 1e-8
+    assert compare("small_amplitude", {**unit, "y0": 0.01}, v0=(1e-3, 1e3)) < 1e-8  # O(y~^4)
+    assert compare("rigid", {**unit, "y0": 1.0}, v0=(1e3, 1e6)) < 1e-6  # O(1/v~^2)
+    assert compare("corner", {**unit, "y0": 1.0}, v0=(1e-12, 1e-9)) < 1e-8  # O(mu~^3)
+
+
+def test_an_approximation_is_silent_where_it_is_not_meant(surrogate):
+    values = sweep_values("v0", 1e-3, 10.0, 11, "log")
+    law = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 1e-5})  # y~ = 3.3
+    found = approximations(law, 0.3)
+    assert np.isnan(found["small_amplitude"]).all()
+    assert np.isnan(found["corner"]).all()
+    assert np.isfinite(found["rigid"]).all()
+    rigid = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "k": None})
+    assert approximations(rigid, 0.3)["rigid"] == pytest.approx(rigid.answer.mu_macro, rel=1e-14)
+    assert (rigid.mu_static == 0.0).all()
+    still = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 0.0})
+    assert (still.mu_static == 0.3).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "arguments"),
+    [("along", ("x", 1.0, 2.0, 5, "log")), ("scale", ("v0", 1.0, 2.0, 5, "cubic")),
+     ("points", ("v0", 1.0, 2.0, 1, "log")),
+     ("start", ("v0", 0.0, 2.0, 5, "log")), ("start", ("k", 0.0, 2.0, 5, "linear")),
+     ("stop", ("v0", 2.0, 2.0, 5, "log")),
+     ("stop", ("v0", 1.0, math.inf, 5, "log")), ("start", ("v0", math.nan, 1.0, 5, "log"))],
+)  # fmt: skip
+def test_a_bad_range_names_its_field(field, arguments):
+    with pytest.raises(InputError) as caught:
+        sweep_values(*arguments)
+    assert caught.value.field == field
