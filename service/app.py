@@ -23,14 +23,15 @@ from service import __version__
 from service.errors import answer_problem
 from service.middleware import ApiKeyGate, BodyLimit, RequestRecord
 from service.openapi import install
-from service.routes import batch, docs, health, inverse, law, mu_macro, table, umbridge
+from service.routes import batch, docs, health, inverse, law, mu_macro, page, table, umbridge
 from service.settings import Settings, load_settings, unknown_variables
 from service.shelf import Shelf
 
 __all__ = ["create_app"]
 
 _ROUTERS = (
-    mu_macro.router, batch.router, inverse.router, law.router, table.router, health.router, docs.router, umbridge.router
+    mu_macro.router, batch.router, inverse.router, law.router, table.router, health.router, docs.router,
+    umbridge.router, page.router,
 )  # fmt: skip
 _log = logging.getLogger("mumacro.app")
 

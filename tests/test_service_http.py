@@ -29,7 +29,7 @@ PATHS = {
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/nowhere", "/v1", "/v1/mu-macro/", "/v2/mu-macro", "/static/../settings.py", "/%00"]
+    "path", ["/nowhere", "/static/page/", "/v1", "/v1/mu-macro/", "/v2/mu-macro", "/static/../settings.py", "/%00"]
 )
 def test_an_unknown_path_is_not_found(client, problem, path):
     problem(client.get(path), 404)

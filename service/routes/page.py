@@ -1,0 +1,79 @@
+"""``/``: the page.  The map of all cases, the user's point on it, the friction law beside it."""
+
+from pathlib import Path
+
+import anyio.to_thread
+import numpy as np
+from fastapi import APIRouter
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+
+from friction import Surrogate
+from service import __version__
+from service.codecs import encode
+from service.routes.mu_macro import etag_matches
+from service.shelf import shelf_of
+
+__all__ = ["ASSETS", "POLICY", "router"]
+
+router = APIRouter(include_in_schema=False)
+
+_FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
+_SCRIPTS = ("main.js", "api.js", "fields.js", "plot.js", "map.js", "law.js")
+ASSETS = {**dict.fromkeys(_SCRIPTS, "text/javascript"), "page.css": "text/css"}
+
+# No inline script, no inline style, nothing from another host.
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+# The window of the map [-]: from deep in creep to fast sliding, twenty places a decade.
+_PER_DECADE = 20
+_V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
+_UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
+
+
+@router.head("/")
+@router.get("/")
+async def page() -> Response:
+    """Return the page."""
+    headers = {"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer", "Cache-Control": "no-cache"}
+    return FileResponse(_FOLDER / "index.html", media_type="text/html", headers=headers)
+
+
+def _add_asset(name: str, media_type: str) -> None:
+    async def asset() -> Response:
+        return FileResponse(_FOLDER / name, media_type=media_type, headers={"Cache-Control": "no-cache"})
+
+    router.add_api_route(f"/static/page/{name}", asset, methods=["GET", "HEAD"], name=f"page-{name}")
+
+
+for _name, _media_type in ASSETS.items():
+    _add_asset(_name, _media_type)
+
+
+@router.head("/static/page/map.json")
+@router.get("/static/page/map.json")
+async def map_data(request: Request) -> Response:
+    """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and the border."""
+    surrogate = shelf_of(request).pick().surrogate
+    etag = f'"{surrogate.checksum[:32]}-{__version__}"'
+    headers = {"ETag": etag, "Cache-Control": "no-cache"}
+    if etag_matches(request, etag):
+        return Response(status_code=304, headers=headers)
+    content = await anyio.to_thread.run_sync(_map, surrogate)
+    return Response(content, headers=headers, media_type="application/json")
+
+
+def _map(surrogate: Surrogate) -> bytes:
+    axes = {}
+    for name, (low, high) in {"v_tilde": _V_DECADES, "y_tilde": _Y_DECADES}.items():
+        axes[name] = {"start": 10.0**low, "stop": 10.0**high, "n": _PER_DECADE * (high - low) + 1}
+    v, y = (np.geomspace(axis["start"], axis["stop"], int(axis["n"])) for axis in axes.values())
+    ratio = surrogate.mu_ratio(v[None, :], y[:, None])
+    amplitudes = np.geomspace(y[0], y[-1], 4 * y.size)
+    border = np.column_stack((surrogate.v_tilde_crit(amplitudes), amplitudes))
+    rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
+    line = [[float(f"{x:.6g}") for x in place] for place in border.tolist()]
+    return encode({**axes, "unit": _UNIT, "mu_ratio": rounded, "border": line})

@@ -1,0 +1,43 @@
+// Questions to the service.
+
+/** One question in flight; while it is, only the newest of those that come is kept. */
+export class Channel {
+  constructor(ask, answer, fail) {
+    this.ask = ask;
+    this.answer = answer;
+    this.fail = fail;
+    this.busy = false;
+    this.next = null;
+  }
+
+  push(...question) {
+    this.next = question;
+    if (!this.busy) this.run();
+  }
+
+  async run() {
+    this.busy = true;
+    while (this.next !== null) {
+      const question = this.next;
+      this.next = null;
+      try {
+        const found = await this.ask(...question);
+        if (this.next === null) this.answer(found, ...question);
+      } catch (error) {
+        if (this.next === null) this.fail(error);
+      }
+    }
+    this.busy = false;
+  }
+}
+
+async function read(response) {
+  const body = await response.json().catch(() => ({}));
+  if (response.ok) return body;
+  throw new Error(body.detail ?? body.error?.message ?? `the service answered ${response.status}`);
+}
+
+export const query = (values) => new URLSearchParams(Object.entries(values).map(([name, value]) => [name, String(value)])).toString();
+export const get = async (path, values) => read(await fetch(values ? `${path}?${query(values)}` : path));
+export const post = async (path, body) =>
+  read(await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) }));
