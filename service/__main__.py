@@ -1,4 +1,5 @@
 """``python -m service``: serve.  ``python -m service healthcheck``: ask a running service whether it is ready.
+``python -m service eval CASES -o OUT``: answer a file of cases, see :mod:`service.bulk`.
 
 Exit codes: 0 stopped on request (or ready), 1 could not run (or not ready), 2 bad setting or argument.
 """
@@ -21,6 +22,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m service",
         description="Serve macroscopic friction over HTTP.  Every option is also a setting MUMACRO_<OPTION>.",
+        epilog="python -m service eval --help: answer a file of cases without a server.",
     )
     parser.add_argument("command", nargs="?", choices=("serve", "healthcheck"), default="serve", help="default: serve")
     for name in _OPTIONS:
@@ -31,7 +33,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return the exit code."""
-    chosen = _parser().parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words[:1] == ["eval"]:
+        from service.bulk import main as evaluate
+
+        return evaluate(words[1:])
+    chosen = _parser().parse_args(words)
     for name in _OPTIONS:
         value = getattr(chosen, name)
         if value is not None:
