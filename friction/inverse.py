@@ -8,12 +8,16 @@ input  course                                 roots
 v0     rises from the static limit to mu0     one; mu0 itself is not reached
 y0     falls from mu0 to 0                    one; 0 is not reached, unless v0 = 0
 omega  falls from mu0 to the static limit     one; the static limit is not reached
-k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above about 9 it falls to a minimum
-                                              at y~ = 4 to 5.5, rises to a maximum (at y~ = r^2/9 for large r), and
+k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above 9.72 it falls to a minimum at y~
+                                              from 4.1 to 6.5, rises to a maximum (at y~ = 0.115 r^2 for large r), and
                                               falls again
 Fz     the same in 1/Fz                       the same
-mu0    rises (seen for every r up to 1e8)     one, but treated like k and Fz: nobody has proven it
+mu0    rises: it would fold only where        one, but searched like k and Fz
+       d ln mu~ / d ln y~ > 1 on a ray of
+       constant r; it is 0.09 at the most
 =====  =====================================  ====================================================================
+
+The figures are those of benchmarks/folds.py, for r up to 1e8.
 
 Roots are found by bisection on the *bits* of the input: doubles of one sign are ordered like the integers that their
 bits spell, so cutting ends at two neighbouring doubles, whatever the scale, at no risk of overflow.
@@ -41,14 +45,14 @@ Bools = NDArray[np.bool_]
 MONOTONE = ("v0", "y0", "omega")
 TINY, HUGE = 5e-324, 1.7976931348623157e308
 
-# A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  The narrowest fold
-# (r = 9, just born) is a fifth of a decade wide; the steepest descent (y~ = 1 at large r) holds none.
+# A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  At r = 10, three
+# percent above its birth, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
 _PER_DECADE = 100
 _MAX_SAMPLES = 20_001
 _PER_CALL = 512
 # y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls strictly from 2 to 1/2
 # (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on either side.
-Y_CLOSEST = 1.2885
+Y_CLOSEST = 1.290791
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
         share = np.linspace(0.0, 1.0, points)
         values: Array = start * (1.0 - share) + stop * share
     else:
-        values = np.exp(np.linspace(math.log(start), math.log(stop), points))
+        values = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))  # decades come out exactly
     values[0], values[-1] = start, stop
     np.clip(values, start, stop, out=values)
     return values

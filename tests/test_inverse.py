@@ -217,6 +217,26 @@ def test_the_border_is_where_the_regime_changes(surrogate, along, expected):
         assert crossing.mu_macro == answer.mu_macro
 
 
+@pytest.mark.parametrize(("share", "expected"), [(1.0 + 1e-9, 2), (1.0 - 1e-9, 0)])
+def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(surrogate, share, expected):
+    closest = 1.290791
+    ratio = share * closest / surrogate.v_tilde_crit(closest)  # y~ / v~
+    case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}
+    crossings = border_crossings(surrogate, "k", case, 1e-3, 1e3)
+    assert len(crossings) == expected
+    assert all(crossing.value == pytest.approx(closest, rel=1e-3) for crossing in crossings)
+
+
+def test_a_fold_that_was_just_born_is_seen(surrogate):
+    case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
+    target = float(surrogate.mu_ratio(0.6626, 6.626))  # between minimum and maximum, which differ by a thousandth
+    roots = solve_for(surrogate, "k", target, case).roots[0]
+    assert len(roots) == 3
+    assert roots[1].low <= 6.626 <= roots[1].high
+    below = solve_for(surrogate, "k", target, {**case, "omega": 9.7})
+    assert len(below.roots[0]) == 1
+
+
 def test_outside_its_range_there_is_no_border(surrogate):
     assert border_crossings(surrogate, "v0", others(CASE, "v0"), 1e-12, 1e-3) == ()
     assert border_crossings(surrogate, "v0", {**others(CASE, "v0"), "k": None}, 0.0, 1e3) == ()
@@ -230,6 +250,8 @@ def test_outside_its_range_there_is_no_border(surrogate):
 def test_a_range_has_its_ends_exactly(scale):
     values = sweep_values("v0", 1e-7, 0.3, 101, scale)
     assert (values[0], values[-1], values.size) == (1e-7, 0.3, 101)
+    if scale == "log":
+        assert sweep_values("v0", 1e-4, 10.0, 6, "log").tolist() == [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0]
     steps = np.diff(np.log(values) if scale == "log" else values)
     assert steps == pytest.approx(steps[0], rel=1e-9)
     assert np.all(np.diff(sweep_values("v0", 1.0, math.nextafter(1.0, 2.0), 9, scale)) >= 0.0)
