@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl
 
-import anyio.to_thread
 from pydantic import ValidationError
-from pydantic_core import from_json
 from starlette.requests import Request
 
 from friction.nondim import BOUNDS, FIELDS
@@ -20,14 +18,18 @@ from service.errors import FieldFault, InvalidFieldsError, MalformedBodyError, U
 from service.schemas import INCLUDES, CaseRequest
 
 __all__ = [
+    "ARROW",
+    "JSON",
     "KNOWN_FIELDS",
+    "NDJSON",
     "Options",
     "canonical",
     "case_from_body",
     "case_from_query",
+    "media_type",
+    "merged_options",
     "options_from",
     "options_from_query",
-    "parse_json",
     "query_pairs",
     "read_body",
     "refuse_query",
@@ -37,8 +39,8 @@ __all__ = [
 KNOWN_FIELDS = (*FIELDS, "include", "tolerance")
 _BOUND = {**BOUNDS, "tolerance": "finite and > 0"}
 
-# Above this many bytes a body is parsed in a worker thread.
-_LARGE_BODY = 64 * 1024
+JSON, NDJSON, ARROW = "application/json", "application/x-ndjson", "application/vnd.apache.arrow.stream"
+_ALIASES = {"application/ndjson": NDJSON, "application/jsonl": NDJSON, "application/x-jsonlines": NDJSON}
 _MAX_PARAMETERS = 100
 
 # An unescaped "+" of a query arrives as a space; between "e" and a digit it can be nothing else.
@@ -53,6 +55,28 @@ class Options:
     tolerance: float | None = None
 
 
+def media_type(request: Request, known: Sequence[str]) -> str:
+    """Return which of the known types the body has; a body without a type is of the first.
+
+    Raises
+    ------
+    UnsupportedBodyError
+        Another media type, another charset than UTF-8, or a compressed body.
+    """
+    given = request.headers.get("content-type")
+    found = known[0]
+    if given is not None:
+        media, _, parameters = given.lower().partition(";")
+        charset = parameters.strip().removeprefix("charset=").strip('"') if "charset=" in parameters else "utf-8"
+        found = _ALIASES.get(media.strip(), media.strip())
+        if found not in known or charset not in ("utf-8", "utf8", "us-ascii"):
+            offer = ", ".join(known)
+            raise UnsupportedBodyError(f"send {offer}, not {given[:80]}", headers={"Accept-Post": offer})
+    if request.headers.get("content-encoding", "identity").lower() != "identity":
+        raise UnsupportedBodyError("send the body without Content-Encoding", headers={"Accept-Encoding": "identity"})
+    return found
+
+
 async def read_body(request: Request) -> bytes:
     """Return the body of a JSON request.
 
@@ -61,37 +85,11 @@ async def read_body(request: Request) -> bytes:
     UnsupportedBodyError, MalformedBodyError, BodyTooLargeError
         Another media type or a compressed body; nothing in it; more than the limit.
     """
-    content_type = request.headers.get("content-type")
-    if content_type is not None:
-        media, _, parameters = content_type.lower().partition(";")
-        charset = parameters.strip().removeprefix("charset=").strip('"') if "charset=" in parameters else "utf-8"
-        if media.strip() != "application/json" or charset not in ("utf-8", "utf8", "us-ascii"):
-            shown = content_type[:80]
-            raise UnsupportedBodyError(
-                f"send application/json, not {shown}", headers={"Accept-Post": "application/json"}
-            )
-    if request.headers.get("content-encoding", "identity").lower() != "identity":
-        raise UnsupportedBodyError("send the body without Content-Encoding", headers={"Accept-Encoding": "identity"})
+    media_type(request, (JSON,))
     body = await request.body()
     if not body:
         raise MalformedBodyError("the body is empty")
     return body
-
-
-async def parse_json(body: bytes) -> Any:
-    """Return the parsed body.  NaN and Infinity are read as such: whoever uses the numbers refuses them by name.
-
-    Raises
-    ------
-    MalformedBodyError
-        The body is not JSON in UTF-8.
-    """
-    try:
-        if len(body) > _LARGE_BODY:
-            return await anyio.to_thread.run_sync(from_json, body)
-        return from_json(body)
-    except ValueError as error:
-        raise _unreadable(str(error)) from None
 
 
 def case_from_body(body: bytes) -> CaseRequest:
@@ -194,6 +192,26 @@ def options_from(values: dict[str, Any], place: str, faults: Sequence[FieldFault
     if faults:
         raise InvalidFieldsError(_summary(faults), faults)
     return Options(canonical(checked.include), checked.tolerance)
+
+
+def merged_options(query: Options, body: dict[str, Any]) -> tuple[Options, str]:
+    """Return the options of query and body, and the place of the tolerance: "parameter" or "pointer".
+
+    Raises
+    ------
+    InvalidFieldsError
+        One is given in both; a bad one in the body.
+    """
+    if not body:
+        return query, "parameter"
+    own = options_from(body, "pointer")
+    given = {"include": query.include, "tolerance": query.tolerance}
+    twice = [name for name, value in given.items() if value and body.get(name) is not None]
+    if twice:
+        faults = [FieldFault(name, "is given in the query and in the body", body[name]) for name in twice]
+        raise InvalidFieldsError(f"{twice[0]} is given in the query and in the body", faults)
+    place = "pointer" if query.tolerance is None else "parameter"
+    return Options(own.include or query.include, own.tolerance or query.tolerance), place
 
 
 def canonical(include: Iterable[str] | None) -> tuple[str, ...]:

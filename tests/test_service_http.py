@@ -20,6 +20,7 @@ PATHS = {
     "/livez": "GET, HEAD",
     "/readyz": "GET, HEAD",
     "/healthz": "GET, HEAD",
+    "/metrics": "GET, HEAD",
     "/docs": "GET, HEAD",
     "/openapi.json": "GET, HEAD",
 }
