@@ -123,7 +123,7 @@ def case_etag(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> 
         case.mu0, case.Fz, 0.0 if k is None else k, case.y0 + 0.0, case.omega + 0.0, case.v0 + 0.0, len(include)
     )
     tail = ",".join(include).encode()
-    return f'"{blake2b(numbers + tail, digest_size=16, key=table.tag_key).hexdigest()}"'
+    return f'"{blake2b(table.tag_key + numbers + tail, digest_size=16).hexdigest()}"'
 
 
 def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str]) -> Answers:

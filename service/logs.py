@@ -6,6 +6,7 @@ import logging
 import os
 import re
 import time
+from collections.abc import Callable
 from contextlib import nullcontext
 from contextvars import ContextVar
 from datetime import UTC, datetime
@@ -69,32 +70,62 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(line, default=str)
 
 
+# time, request id, what stands between it and the duration, seconds, client; texts free of what JSON escapes
+Entry = tuple[float, str, str, float, str | None]
+
+
+def _access_text(method: str, path: str, status: int) -> str:
+    """What stands in a request's line between its id and its duration."""
+    return f'", "method": "{method}", "path": "{path}", "status": {status}, "duration_ms": '
+
+
+def _access_lines(entries: list[Entry]) -> str:
+    lines = []
+    second, text = -1, ""
+    for now, identity, between, seconds, client in entries:
+        if int(now) != second:
+            second = int(now)
+            text = time.strftime('{"time": "%Y-%m-%dT%H:%M:%S.', time.gmtime(second))
+        shown = f'"{client}"}}\n' if client is not None else "null}\n"
+        lines.append(
+            f'{text}{int(1e3 * (now - second)):03d}+00:00", "level": "info", "logger": "mumacro.access", '
+            f'"message": "request", "request_id": "{identity}{between}{1e3 * seconds:.3f}, "client": {shown}'
+        )
+    return "".join(lines)
+
+
 class LineHandler(logging.StreamHandler[Any]):
-    """Writes records as they come, and finished lines a few at a time: a write per request would cost more than it."""
+    """Writes records as they come, and finished requests many at a time: a write for each would cost more than it."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._lines: list[str] = []
+        self._entries: list[Entry] = []
 
-    def put(self, line: str) -> None:
-        """Take a finished line; it is written within a twentieth of a second, before any later record."""
-        if not self._lines:
+    def put(self, entry: Entry) -> None:
+        """Take a finished request; its line is written within a twentieth of a second, before any later record."""
+        if not self._entries:
             asyncio.get_running_loop().call_later(_FLUSH_AFTER_S, self.flush)
-        self._lines.append(line)
+        self._entries.append(entry)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write what waits, then the record."""
-        if self._lines:
+        if self._entries:
             self.flush()
         super().emit(record)
 
     def flush(self) -> None:
         """Write what waits."""
         with self.lock or nullcontext():
-            lines, self._lines = self._lines, []
-            if lines:
-                self.stream.write("".join(lines))
+            entries, self._entries = self._entries, []
+            if entries:
+                self.stream.write(_access_lines(entries))
             super().flush()
+
+
+class _Texts(dict[tuple[str, str, int], str]):
+    def __missing__(self, key: tuple[str, str, int]) -> str:
+        text = self[key] = _access_text(*key)
+        return text
 
 
 class AccessLog:
@@ -102,30 +133,21 @@ class AccessLog:
 
     def __init__(self) -> None:
         self._log = logging.getLogger("mumacro.access")
-        self._handler: LineHandler | None = None
-        self._second = 0
-        self._time = ""
+        self._put: Callable[[Entry], None] | None = None
+        self._texts = _Texts()
 
     def start(self) -> None:
         """Look where the lines go."""
         found = [handler for handler in logging.getLogger().handlers if isinstance(handler, LineHandler)]
-        self._handler = found[0] if found and self._log.propagate and not self._log.handlers else None
+        straight = found and self._log.propagate and not self._log.handlers and self._log.isEnabledFor(logging.INFO)
+        self._put = found[0].put if straight else None
 
     def write(self, identity: str, method: str, path: str, status: int, seconds: float, client: str | None) -> None:
         """Write the line of one finished request.  All texts must be free of what JSON escapes."""
-        if self._handler is None or not self._log.isEnabledFor(logging.INFO):
+        if self._put is None:
             self.record(logging.INFO, method, path, status, seconds, client)
-            return
-        now = time.time()
-        second = int(now)
-        if second != self._second:
-            self._second, self._time = second, time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(second))
-        shown = "null" if client is None else f'"{client}"'
-        self._handler.put(
-            f'{{"time": "{self._time}.{int(1e3 * (now - second)):03d}+00:00", "level": "info", '
-            f'"logger": "mumacro.access", "message": "request", "request_id": "{identity}", "method": "{method}", '
-            f'"path": "{path}", "status": {status}, "duration_ms": {1e3 * seconds:.3f}, "client": {shown}}}\n'
-        )
+        else:
+            self._put((time.time(), identity, self._texts[method, path, status], seconds, client))
 
     def record(self, level: int, method: str, path: str, status: int, seconds: float, client: str | None) -> None:
         """Log the same the ordinary way."""

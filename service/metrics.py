@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from friction.regions import REGIMES, SOURCES
 from friction.surrogate import REGIME_OF_SOURCE
 
@@ -42,6 +44,8 @@ _WIDTH = len(BUCKETS_S) + 2  # of one histogram: buckets, the rest, the sum
 _CASES = _DURATIONS + len(ROUTES) * _WIDTH
 _PER_TABLE = len(SOURCES) + 1  # by source; bad cases
 _SHARE_EVERY_S = 0.25
+
+Place = tuple[int, int]
 
 
 @contextmanager
@@ -77,6 +81,7 @@ class Metrics:
         self._file: Path | None = None
         self._saved: list[float] = []
         self._tables: list[dict[str, Any]] = []
+        self._pending: dict[Place, list[float]] = {}
 
     def start(self, tables: list[dict[str, Any]]) -> None:
         """Make room for the cases of each table; find the shared folder.  The same tables in every worker."""
@@ -87,20 +92,37 @@ class Metrics:
             self._file = Path(folder) / f"{os.getpid()}-{os.urandom(4).hex()}"
 
     @staticmethod
-    def place(route: str, method: str, status: int) -> tuple[int, int]:
+    def place(route: str, method: str, status: int) -> Place:
         """Where requests and durations of a kind are counted."""
         r = _ROUTE.get(route, len(ROUTES) - 1)
         m = _METHOD.get(method, len(METHODS) - 1)
         s = _STATUS.get(status, len(STATUSES) - 1)
         return _REQUESTS + (r * len(METHODS) + m) * len(STATUSES) + s, _DURATIONS + r * _WIDTH
 
-    def count(self, place: tuple[int, int], seconds: float) -> None:
+    def count(self, place: Place, seconds: float) -> None:
         """Count one request."""
         cells = self.cells
         request, durations = place
         cells[request] += 1.0
         cells[durations + bisect_left(BUCKETS_S, seconds)] += 1.0
         cells[durations + _WIDTH - 1] += seconds
+
+    def pending(self, place: Place) -> list[float]:
+        """A list that durations of a kind may simply be appended to; :meth:`settle` counts them."""
+        return self._pending.setdefault(place, [])
+
+    def settle(self) -> None:
+        """Count what is pending."""
+        for place, durations in self._pending.items():
+            taken = durations.copy()
+            del durations[: len(taken)]
+            if taken:
+                request, first = place
+                numbers = np.bincount(np.searchsorted(BUCKETS_S, taken), minlength=_WIDTH - 1).tolist()
+                self.cells[request] += len(taken)
+                for index, number in enumerate(numbers):
+                    self.cells[first + index] += number
+                self.cells[first + _WIDTH - 1] += sum(taken)
 
     def count_cases(self, first: int, by_source: list[int], bad: int) -> None:
         """Count the cases of a batch; ``first`` is the source_place of the table."""
@@ -109,13 +131,14 @@ class Metrics:
         self.cells[first + _PER_TABLE - 1] += bad
 
     async def share(self) -> None:
-        """Leave copies in the shared folder, for ever; returns at once without one."""
-        while self._file is not None:
+        """Settle, and leave copies in the shared folder if there is one, for ever."""
+        while True:
             self.save()
             await asyncio.sleep(_SHARE_EVERY_S)
 
     def save(self) -> None:
         """Leave a copy in the shared folder.  Replacing the file is atomic: nobody reads half a copy."""
+        self.settle()
         if self._file is None or self.cells == self._saved:
             return
         self._saved = self.cells.copy()
@@ -128,6 +151,7 @@ class Metrics:
 
     def total(self) -> list[float]:
         """Sum over all workers; of the others, what they last left, at most a quarter of a second ago."""
+        self.settle()
         cells = self.cells.copy()
         if self._file is None:
             return cells

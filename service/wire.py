@@ -25,14 +25,20 @@ from service.schemas import CaseRequest
 from service.settings import Settings, cache_control
 from service.shelf import LoadedTable, Shelf
 
-__all__ = ["Application", "ShortWay"]
+__all__ = ["CASE_PATH", "Application", "ShortWay"]
 
-_PATH = "/v1/mu-macro"
+CASE_PATH = "/v1/mu-macro"
 _LONG = 4  # digits of a Content-Length that no single case has
 _JSON = frozenset({None, b"application/json", b"application/json; charset=utf-8", b"application/json;charset=utf-8"})
 _PLAIN_QUERY = b"0123456789.eE+-=&" + "".join(sorted(set("mu0Fzky0omegav0tolerance"))).encode()
 _validate = CaseRequest.__pydantic_validator__.validate_json
 
+_HEAD = (
+    b"%bcontent-length: %d\r\ncontent-type: application/json\r\n"
+    b"x-request-id: %b\r\nx-content-type-options: nosniff\r\n\r\n"
+)
+
+Headers = dict[bytes, bytes]
 Handler = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 
@@ -44,17 +50,14 @@ class Application(FastAPI):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request, the short way if it may be one for it."""
-        if scope["type"] == "http" and scope["path"] == _PATH:
-            method = scope["method"]
-            if method == "POST":
-                await self.short.post(scope, receive, send)
+        if scope["type"] == "http":
+            path, method = scope["path"], scope["method"]
+            if path == CASE_PATH and method in ("GET", "POST"):
+                await self.short(scope, receive, send)
                 return
-            if method == "GET":
-                await self.short.get(scope, receive, send)
+            if path == BATCH_PATH and method == "POST":
+                await self.batch_way(scope, receive, send)
                 return
-        elif scope["type"] == "http" and scope["path"] == BATCH_PATH and scope["method"] == "POST":
-            await self.batch_way(scope, receive, send)
-            return
         await self.long_way(scope, receive, send)
 
     async def long_way(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -73,121 +76,112 @@ class ShortWay:
         self._cache_control = cache_control(settings).encode("ascii")
         self._metrics = metrics
         self._log = log
-        self._posted = metrics.place(_PATH, "POST", 200)
-        self._got = metrics.place(_PATH, "GET", 200)
+        self._durations = {m: metrics.pending(metrics.place(CASE_PATH, m, 200)) for m in ("GET", "POST")}
 
-    async def post(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one case in the body."""
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, or hand the request on with nothing taken from it."""
         started = time.perf_counter()
         headers = dict(scope["headers"])
-        length = headers.get(b"content-length", b"")
-        if (
-            not 0 < len(length) < _LONG
-            or headers.get(b"content-type") not in _JSON
-            or scope["query_string"]
-            or b"content-encoding" in headers
-            or (self._key is not None and not self._admits(headers))
-        ):
-            await self._long_way(scope, receive, send)
-            return
-        message = await receive()
-        body = message.get("body", b"")
-        while message.get("more_body") and len(body) < 1000:
+        method = scope["method"]
+        body = b""
+        if method == "POST":
+            if not self.is_short(scope, headers):
+                await self._long_way(scope, receive, send)
+                return
             message = await receive()
-            body += message.get("body", b"")
-        content = None
-        if message["type"] == "http.request" and not message.get("more_body") and len(body) <= self._max_bytes:
-            content = self._answer(body)
-        if content is None:
-            await self._long_way(scope, _again(message, body, receive), send)
-            return
-        offered = headers.get(b"x-request-id")
-        identity = new_request_id() if offered is None else accept_request_id(offered)
-        await send(
-            {
-                "type": "http.response.start",
-                "status": 200,
-                "headers": [
-                    (b"content-length", b"%d" % len(content)),
-                    (b"content-type", b"application/json"),
-                    (b"x-request-id", identity.encode("ascii")),
-                    (b"x-content-type-options", b"nosniff"),
-                ],
-            }
-        )
-        await send({"type": "http.response.body", "body": content})
-        seconds = time.perf_counter() - started
-        self._metrics.count(self._posted, seconds)
-        client = scope["client"]
-        self._log.write(identity, "POST", _PATH, 200, seconds, client[0] if client else None)
-
-    async def get(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one case in the query."""
-        started = time.perf_counter()
-        headers = dict(scope["headers"])
-        found = None
-        if b"if-none-match" not in headers and (self._key is None or self._admits(headers)):
-            found = self._answer_query(scope["query_string"])
-        if found is None:
+            body = message.get("body", b"")
+            if message["type"] != "http.request" or message.get("more_body"):
+                await self._long_way(scope, _again(message, receive), send)
+                return
+            receive = _again(message, receive)
+        reply = self.reply(scope, headers, body)
+        if reply is None:
             await self._long_way(scope, receive, send)
             return
-        content, etag = found
-        offered = headers.get(b"x-request-id")
-        identity = new_request_id() if offered is None else accept_request_id(offered)
-        await send(
-            {
-                "type": "http.response.start",
-                "status": 200,
-                "headers": [
-                    (b"etag", etag.encode("ascii")),
-                    (b"cache-control", self._cache_control),
-                    (b"content-length", b"%d" % len(content)),
-                    (b"content-type", b"application/json"),
-                    (b"x-request-id", identity.encode("ascii")),
-                    (b"x-content-type-options", b"nosniff"),
-                ],
-            }
-        )
+        identity, etag, content = reply
+        fields = [
+            (b"content-length", b"%d" % len(content)),
+            (b"content-type", b"application/json"),
+            (b"x-request-id", identity.encode("ascii")),
+            (b"x-content-type-options", b"nosniff"),
+        ]
+        if etag is not None:
+            fields += [(b"etag", etag.encode("ascii")), (b"cache-control", self._cache_control)]
+        await send({"type": "http.response.start", "status": 200, "headers": fields})
         await send({"type": "http.response.body", "body": content})
-        seconds = time.perf_counter() - started
-        self._metrics.count(self._got, seconds)
-        client = scope["client"]
-        self._log.write(identity, "GET", _PATH, 200, seconds, client[0] if client else None)
+        self.finish(scope, identity, time.perf_counter() - started)
 
-    def _admits(self, headers: dict[bytes, bytes]) -> bool:
-        assert self._key is not None  # noqa: S101  (asked only when there is a key)
-        return secrets.compare_digest(headers.get(b"x-api-key", b""), self._key)
+    @staticmethod
+    def is_short(scope: Scope, headers: Headers) -> bool:
+        """Whether the head of a POST promises one case, plainly put."""
+        return (
+            0 < len(headers.get(b"content-length", b"")) < _LONG
+            and headers.get(b"content-type") in _JSON
+            and not scope["query_string"]
+            and b"content-encoding" not in headers
+        )
 
-    def _answer(self, body: bytes) -> bytes | None:
+    def reply(self, scope: Scope, headers: Headers, body: bytes) -> tuple[str, str | None, bytes] | None:
+        """Request id, entity tag (for GET) and content; None for what has to go the long way."""
+        if self._key is not None and not secrets.compare_digest(headers.get(b"x-api-key", b""), self._key):
+            return None
+        if scope["method"] == "GET":
+            if b"if-none-match" in headers:
+                return None
+            case = self._case_in_query(scope["query_string"])
+        else:
+            case = self._case_in_body(body)
+        if case is None:
+            return None
+        table = self._table(case.tolerance)
+        if table is None:
+            return None
+        content = self._write(table, case)
+        etag = case_etag(table, case, ()) if scope["method"] == "GET" else None
+        offered = headers.get(b"x-request-id")
+        return (new_request_id() if offered is None else accept_request_id(offered)), etag, content
+
+    def head(self, identity: str, etag: str | None, length: int) -> bytes:
+        """The fields of a reply as they stand on the wire."""
+        cached = b"" if etag is None else b"etag: %b\r\ncache-control: %b\r\n" % (etag.encode(), self._cache_control)
+        return _HEAD % (cached, length, identity.encode())
+
+    def finish(self, scope: Scope, identity: str, seconds: float) -> None:
+        """Count and log."""
+        method, client = scope["method"], scope["client"]
+        self._durations[method].append(seconds)
+        self._log.write(identity, method, CASE_PATH, 200, seconds, client[0] if client else None)
+
+    def _case_in_body(self, body: bytes) -> CaseRequest | None:
+        if len(body) > self._max_bytes:
+            return None
         try:
-            case = _validate(body)
+            case: CaseRequest = _validate(body)
         except ValidationError:
             return None
-        table = self._table(case)
-        return None if table is None else self._write(table, case)
+        return case
 
-    def _answer_query(self, query: bytes) -> tuple[bytes, str] | None:
+    @staticmethod
+    def _case_in_query(query: bytes) -> CaseRequest | None:
         # A query of plain numbers is a JSON object in another spelling.  Anything that JSON, or a query, spells
         # in its own way has a character or a word that is not let through here, or is no JSON after this.
-        if not query or query.translate(None, _PLAIN_QUERY) or b"=null" in query:
+        if query.translate(None, _PLAIN_QUERY) or b"=null" in query:
             return None
         try:
-            case = _validate(b'{"' + query.replace(b"=", b'":').replace(b"&", b',"') + b"}")
+            case: CaseRequest = _validate(b'{"' + query.replace(b"=", b'":').replace(b"&", b',"') + b"}")
         except ValidationError:
             return None
-        if len(case.model_fields_set) != query.count(b"&") + 1:
-            return None  # a name is given twice
-        table = self._table(case)
-        return None if table is None else (self._write(table, case), case_etag(table, case, ()))
+        # fewer fields than names: one is given twice
+        return case if len(case.__pydantic_fields_set__) == query.count(b"&") + 1 else None
 
-    def _table(self, case: CaseRequest) -> LoadedTable | None:
+    def _table(self, tolerance: float | None) -> LoadedTable | None:
         shelf = self._shelf
         if shelf.fault is not None:
             return None
-        if case.tolerance is None:
+        if tolerance is None:
             return shelf.tables[0]
         try:
-            return shelf.pick(case.tolerance)
+            return shelf.pick(tolerance)
         except InvalidFieldsError:
             return None
 
@@ -201,9 +195,9 @@ class ShortWay:
         return orjson.dumps(values)
 
 
-def _again(message: Message, body: bytes, receive: Receive) -> Receive:
+def _again(message: Message, receive: Receive) -> Receive:
     """A ``receive`` that gives once more what was taken."""
-    first: Message | None = {**message, "body": body} if message["type"] == "http.request" else message
+    first: Message | None = message
 
     async def receive_again() -> Message:
         nonlocal first
