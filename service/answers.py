@@ -1,6 +1,6 @@
 """Cases -> answers.  Nothing is computed that is not asked for."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
 from struct import Struct
@@ -16,7 +16,7 @@ from friction.surrogate import REGIME_OF_SOURCE
 from service import API_VERSION
 from service.compiled.block import evaluate_cases
 from service.limits import groups, limits
-from service.schemas import INCLUDES, CaseRequest
+from service.schemas import CaseRequest, Groups, InputStd, Limits
 from service.shelf import LoadedTable
 
 __all__ = [
@@ -37,7 +37,7 @@ DEFAULT_KEYS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 _NAMES = [(REGIMES[regime], source) for regime, source in zip(REGIME_OF_SOURCE, SOURCES, strict=True)]
 _INFINITE = float("inf")
 _EXTRA_SLICE = 16384  # cases that included values are computed for at a time
-_SIX = Struct("<7d")
+_SIX = Struct("<6d")
 
 
 @dataclass
@@ -105,8 +105,11 @@ def default_answer(table: LoadedTable, case: CaseRequest) -> tuple[dict[str, Any
 def included(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> dict[str, Any]:
     """What is included in the answer to one case, as plain Python values."""
     given = {name: getattr(case, name) for name in FIELDS}
-    extras = _extras(table.surrogate, given, include)
-    return {name: {key: float(part) for key, part in value.items()} for name, value in extras.items()}
+    extras = _extras(table.surrogate, given, include, case.std)
+    return {
+        name: {key: float(part) for key, part in value.items()} if isinstance(value, dict) else float(value)
+        for name, value in extras.items()
+    }
 
 
 def answer_case(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> dict[str, Any]:
@@ -119,14 +122,14 @@ def case_etag(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> 
     """Strong entity tag: an answer is a pure function of the table, the version and the query."""
     k = case.k
     # Adding 0.0 turns -0.0 into 0.0: the same case, the same tag.
-    numbers = _SIX.pack(
-        case.mu0, case.Fz, 0.0 if k is None else k, case.y0 + 0.0, case.omega + 0.0, case.v0 + 0.0, len(include)
-    )
-    tail = ",".join(include).encode()
+    numbers = _SIX.pack(case.mu0, case.Fz, 0.0 if k is None else k, case.y0 + 0.0, case.omega + 0.0, case.v0 + 0.0)
+    tail = b""
+    if include or case.std is not None:
+        tail = repr((tuple(include), case.std)).encode()
     return f'"{blake2b(table.tag_key + numbers + tail, digest_size=16).hexdigest()}"'
 
 
-def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str]) -> Answers:
+def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: InputStd | None = None) -> Answers:
     """Answer every good case; a bad one gets NaN and its code in ``flaws``.  Runs without the interpreter's lock."""
     n = cases.size
     mu_macro, mu_ratio, bound, v_tilde, y_tilde = (np.empty(n) for _ in range(5))
@@ -138,27 +141,51 @@ def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str]) -> An
     )
     answers = Answers(cases, n, mu_macro, mu_ratio, bound, source, cases.flaws, n_bad)
     if include:
-        answers.extras = _batch_extras(table.surrogate, cases, include)
+        answers.extras = _batch_extras(table.surrogate, cases, include, std)
     return answers
 
 
-_INCLUDED: dict[str, Callable[[Surrogate, Mapping[str, Any], Any], Mapping[str, Any]]] = {
-    "groups": lambda _surrogate, _case, answer: groups(answer),
-    "limits": limits,
+#: what each included name holds; None: one number
+_KEYS: dict[str, tuple[str, ...] | None] = {
+    "groups": tuple(Groups.model_fields),
+    "limits": tuple(Limits.model_fields),
+    "gradient": FIELDS,
+    "std": None,
 }
-_INCLUDED_KEYS = {"groups": ("v_tilde", "y_tilde", "l0"), "limits": ("mu_static", "v0_crit", "mu_crit")}
-assert set(_INCLUDED) == set(INCLUDES)  # noqa: S101  (what is offered is what is there)
 
 
-def _extras(surrogate: Surrogate, case: Mapping[str, Any], include: Sequence[str]) -> dict[str, Mapping[str, Any]]:
-    answer = surrogate.evaluate(**case)
-    return {name: _INCLUDED[name](surrogate, case, answer) for name in include}
+def _extras(
+    surrogate: Surrogate, case: Mapping[str, Any], include: Sequence[str], std: InputStd | None
+) -> dict[str, Any]:
+    """What is included, as dicts of values or values; k is missing in what is asked of rigid contact."""
+    slopes = "gradient" in include or "std" in include
+    answer = surrogate.evaluate(**case, gradient=slopes)
+    gradient = answer.gradient or {}
+    values: dict[str, Any] = {}
+    for name in include:
+        if name == "groups":
+            values[name] = groups(answer)
+        elif name == "limits":
+            values[name] = limits(surrogate, case, answer)
+        elif name == "gradient":
+            values[name] = {field: gradient.get(field, np.nan) for field in FIELDS}
+        elif std is not None:
+            total: Any = 0.0
+            with np.errstate(over="ignore", invalid="ignore"):
+                for field, slope in gradient.items():
+                    deviation = getattr(std, field)
+                    if deviation:  # an infinite slope does no harm where the input is exact
+                        total = np.hypot(total, slope * deviation)
+            values[name] = total
+    return values
 
 
-def _batch_extras(surrogate: Surrogate, cases: Cases, include: Sequence[str]) -> dict[str, Any]:
-    extras: dict[str, Any] = {
-        name: {key: np.full(cases.size, np.nan) for key in _INCLUDED_KEYS[name]} for name in include
-    }
+def _batch_extras(surrogate: Surrogate, cases: Cases, include: Sequence[str], std: InputStd | None) -> dict[str, Any]:
+    extras: dict[str, Any] = {}
+    for name in include:
+        keys = _KEYS[name]
+        empty = [np.full(cases.size, np.nan) for _ in keys or (name,)]
+        extras[name] = empty[0] if keys is None else dict(zip(keys, empty, strict=True))
     k = cases.columns[FIELDS.index("k")]
     rigid = np.isposinf(k) if k.size != 1 else np.full(cases.size, bool(np.isposinf(k[0])))
     for start in range(0, cases.size, _EXTRA_SLICE):
@@ -174,7 +201,10 @@ def _batch_extras(surrogate: Surrogate, cases: Cases, include: Sequence[str]) ->
             }
             if rigid[where[0]]:
                 case["k"] = None
-            for name, values in _extras(surrogate, case, include).items():
-                for key, value in values.items():
-                    extras[name][key][where] = value
+            for name, values in _extras(surrogate, case, include, std).items():
+                if isinstance(values, dict):
+                    for key, value in values.items():
+                        extras[name][key][where] = value
+                else:
+                    extras[name][where] = values
     return extras

@@ -1,6 +1,6 @@
 """Arrow streams in and out: the columns are used where they lie, and nothing is turned into text.  Needs pyarrow."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from service.codecs import encode
 from service.compiled.block import BOUND_FLAW, MISSING_FLAW, NUMBER_FLAW
 from service.compiled.scan import NOT_A_NUMBER
 from service.errors import BatchTooLargeError, FieldFault, InvalidFieldsError, MalformedBodyError
+from service.intake import Options
 from service.shelf import LoadedTable
 
 __all__ = ["answer_arrow"]
@@ -27,7 +28,7 @@ _SLICE = 65536  # cases of a record batch of the answer
 
 
 def answer_arrow(
-    body: bytearray, table: LoadedTable, include: Sequence[str], max_batch: int, count: Count
+    body: bytearray, table: LoadedTable, options: Options, max_batch: int, count: Count
 ) -> Iterator[bytes]:
     """Answer a stream, order kept; what is yielded is a stream again.
 
@@ -48,7 +49,7 @@ def answer_arrow(
     writer: Any = None
     for batch in batches:
         for start in range(0, max(batch.num_rows, 1), _SLICE):
-            answers = answer_cases(table, _cases(batch.slice(start, _SLICE)), include)
+            answers = answer_cases(table, _cases(batch.slice(start, _SLICE)), options.include, options.std)
             count(table, answers)
             answered = _answer(answers)
             if writer is None:

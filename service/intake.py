@@ -15,17 +15,19 @@ from starlette.requests import Request
 
 from friction.nondim import BOUNDS, FIELDS
 from service.errors import FieldFault, InvalidFieldsError, MalformedBodyError, UnsupportedBodyError, safe_value
-from service.schemas import INCLUDES, CaseRequest
+from service.schemas import INCLUDES, CaseRequest, InputStd
 
 __all__ = [
     "ARROW",
     "JSON",
     "KNOWN_FIELDS",
     "NDJSON",
+    "STD_PARAMETERS",
     "Options",
     "canonical",
     "case_from_body",
     "case_from_query",
+    "check_std",
     "media_type",
     "merged_options",
     "options_from",
@@ -36,8 +38,10 @@ __all__ = [
     "table_choice_from_query",
 ]
 
-KNOWN_FIELDS = (*FIELDS, "include", "tolerance")
-_BOUND = {**BOUNDS, "tolerance": "finite and > 0"}
+KNOWN_FIELDS = (*FIELDS, "include", "tolerance", "std")
+STD_PARAMETERS = tuple(f"std_{name}" for name in FIELDS)
+_OPTION_PARAMETERS = ("include", "tolerance", *STD_PARAMETERS)
+_BOUND = {**BOUNDS, "tolerance": "finite and > 0", **dict.fromkeys(STD_PARAMETERS, "finite and >= 0")}
 
 JSON, NDJSON, ARROW = "application/json", "application/x-ndjson", "application/vnd.apache.arrow.stream"
 _ALIASES = {"application/ndjson": NDJSON, "application/jsonl": NDJSON, "application/x-jsonlines": NDJSON}
@@ -53,6 +57,7 @@ class Options:
 
     include: tuple[str, ...] = ()
     tolerance: float | None = None
+    std: InputStd | None = None
 
 
 def media_type(request: Request, known: Sequence[str]) -> str:
@@ -101,9 +106,21 @@ def case_from_body(body: bytes) -> CaseRequest:
         Not JSON; bad fields, all of them listed.
     """
     try:
-        return CaseRequest.model_validate_json(body)
+        case = CaseRequest.model_validate_json(body)
     except ValidationError as error:
         raise _refusal(error, "pointer") from None
+    check_std(case.include, case.std, "pointer")
+    return case
+
+
+def check_std(include: Iterable[str] | None, std: InputStd | None, place: str) -> None:
+    """Raise InvalidFieldsError unless standard deviations are given exactly where they are asked for."""
+    asked = include is not None and "std" in include
+    if asked == (std is not None):
+        return
+    name = "std" if place == "pointer" else "std_mu0"
+    reason = "is required where include asks for std" if asked else "is of no use unless include asks for std"
+    raise InvalidFieldsError(f"{name}: {reason}", [FieldFault(name, reason, place=place)])
 
 
 def query_pairs(request: Request) -> list[tuple[str, str]]:
@@ -125,7 +142,7 @@ def case_from_query(request: Request) -> CaseRequest:
     InvalidFieldsError
         Bad, unknown, missing or repeated parameters, all of them listed.
     """
-    values, faults = _read_query(query_pairs(request), KNOWN_FIELDS)
+    values, faults = _read_query(query_pairs(request), (*FIELDS, *_OPTION_PARAMETERS))
     try:
         case = CaseRequest.model_validate(values)
     except ValidationError as error:
@@ -133,6 +150,7 @@ def case_from_query(request: Request) -> CaseRequest:
         raise _refusal(error, "parameter", faults, refused) from None
     if faults:
         raise InvalidFieldsError(_summary(faults), faults)
+    check_std(case.include, case.std, "parameter")
     return case
 
 
@@ -147,7 +165,7 @@ def options_from_query(request: Request) -> Options:
     pairs = query_pairs(request)
     if not pairs:
         return Options()
-    values, faults = _read_query(pairs, ("include", "tolerance"))
+    values, faults = _read_query(pairs, _OPTION_PARAMETERS)
     return options_from(values, "parameter", faults)
 
 
@@ -184,14 +202,14 @@ def options_from(values: dict[str, Any], place: str, faults: Sequence[FieldFault
         A name that is not offered, or a tolerance that is none.
     """
     filler: dict[str, Any] = dict.fromkeys(("mu0", "Fz", "y0", "omega", "v0"), 1.0)
-    wanted = {name: values[name] for name in ("include", "tolerance") if name in values}
+    wanted = {name: values[name] for name in ("include", "tolerance", "std") if name in values}
     try:
         checked = CaseRequest.model_validate({**filler, **wanted})
     except ValidationError as error:
         raise _refusal(error, place, faults, {fault.field for fault in faults}) from None
     if faults:
         raise InvalidFieldsError(_summary(faults), faults)
-    return Options(canonical(checked.include), checked.tolerance)
+    return Options(canonical(checked.include), checked.tolerance, checked.std)
 
 
 def merged_options(query: Options, body: dict[str, Any]) -> tuple[Options, str]:
@@ -203,15 +221,18 @@ def merged_options(query: Options, body: dict[str, Any]) -> tuple[Options, str]:
         One is given in both; a bad one in the body.
     """
     if not body:
+        check_std(query.include, query.std, "parameter")
         return query, "parameter"
     own = options_from(body, "pointer")
-    given = {"include": query.include, "tolerance": query.tolerance}
+    given = {"include": query.include, "tolerance": query.tolerance, "std": query.std}
     twice = [name for name, value in given.items() if value and body.get(name) is not None]
     if twice:
         faults = [FieldFault(name, "is given in the query and in the body", body[name]) for name in twice]
         raise InvalidFieldsError(f"{twice[0]} is given in the query and in the body", faults)
     place = "pointer" if query.tolerance is None else "parameter"
-    return Options(own.include or query.include, own.tolerance or query.tolerance), place
+    merged = Options(own.include or query.include, own.tolerance or query.tolerance, own.std or query.std)
+    check_std(merged.include, merged.std, "pointer")
+    return merged, place
 
 
 def canonical(include: Iterable[str] | None) -> tuple[str, ...]:
@@ -237,6 +258,9 @@ def _read_query(
             values[name] = float(text.replace(" ", "+"))
         else:
             faults.append(FieldFault(name, _not_a_number(name, text), text, _BOUND[name], "parameter"))
+    std = {name: values.pop(f"std_{name}") for name in FIELDS if f"std_{name}" in values}
+    if std:
+        values["std"] = std
     return values, faults
 
 
@@ -259,6 +283,8 @@ def _refusal(
             return _unreadable(entry["msg"].removeprefix("Invalid JSON: "))
         path = entry["loc"]
         field = str(path[0]) if path else "body"
+        if place == "parameter" and field == "std":
+            field, path = f"std_{path[-1]}", (f"std_{path[-1]}",)
         if field in skip:
             continue
         bound = _BOUND.get(field)
@@ -272,7 +298,7 @@ def _refusal(
 
 def _reason(kind: str, field: str) -> str:
     if kind == "extra_forbidden":
-        return f"unknown field; allowed: {', '.join(KNOWN_FIELDS)}"
+        return f"unknown field; allowed: {', '.join(FIELDS if field == 'std' else KNOWN_FIELDS)}"
     if field == "include":
         return f"must be a list of names out of: {', '.join(INCLUDES)}"
     if kind == "float_type":

@@ -105,12 +105,27 @@ def describe_batch() -> dict[int | str, dict[str, Any]]:
 
 def case_parameters() -> list[dict[str, Any]]:
     """Query parameters of one case, from the model of its JSON form."""
-    return [_parameter(name, name in models.Case.model_fields and name != "k") for name in _PARAMETER_SCHEMAS]
+    names = [name for name in _PARAMETER_SCHEMAS if name != "std"]
+    return [_parameter(name, name in models.Case.model_fields and name != "k") for name in names] + _std_parameters()
 
 
 def option_parameters() -> list[dict[str, Any]]:
     """Query parameters of a batch."""
-    return [_parameter(name, False) for name in ("include", "tolerance")]
+    return [_parameter(name, False) for name in ("include", "tolerance")] + _std_parameters()
+
+
+def _std_parameters() -> list[dict[str, Any]]:
+    schemas = models.InputStd.model_json_schema()["properties"]
+    return [
+        {
+            "name": f"std_{name}",
+            "in": "query",
+            "required": False,
+            "description": f"Standard deviation of {name} {schema['description']}, where include asks for std",
+            "schema": {"type": "number", "minimum": 0},
+        }
+        for name, schema in schemas.items()
+    ]
 
 
 def table_parameters() -> list[dict[str, Any]]:

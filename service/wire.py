@@ -131,7 +131,7 @@ class ShortWay:
             case = self._case_in_query(scope["query_string"])
         else:
             case = self._case_in_body(body)
-        if case is None:
+        if case is None or (case.std is None) == ("std" in (case.include or ())):
             return None
         table = self._table(case.tolerance)
         if table is None:

@@ -146,8 +146,9 @@ class BatchEndpoint:
         if kind == ARROW:
             from service.arrow import answer_arrow
 
-            table = self._shelf.pick(query.tolerance, "parameter")
-            pieces = answer_arrow(body, table, query.include, self._settings.max_batch, self._count)
+            query, place = merged_options(query, {})
+            table = self._shelf.pick(query.tolerance, place)
+            pieces = answer_arrow(body, table, query, self._settings.max_batch, self._count)
         else:
             pieces = await self._run(size, lambda: self._answer(body, query))
         await self._send(request, send, kind, size, _gather(pieces), budget)
@@ -176,7 +177,7 @@ class BatchEndpoint:
         cases, given = read_batch(text, view, self._settings.max_batch)
         options, place = merged_options(query, given)
         table = self._shelf.pick(options.tolerance, place)
-        answers = answer_cases(table, cases, options.include)
+        answers = answer_cases(table, cases, options.include, options.std)
         self._count(table, answers)
         if line and not rows and not cases.listed:
             return row_text(answers, signature(table))
