@@ -112,10 +112,10 @@ def included(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> d
     }
 
 
-def answer_case(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> dict[str, Any]:
-    """Answer one case, as plain Python values."""
-    values, _ = default_answer(table, case)
-    return {**values, **included(table, case, include), **signature(table)}
+def answer_case(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> tuple[dict[str, Any], int]:
+    """The whole answer to one case, as plain Python values, and the code of its source."""
+    values, source = default_answer(table, case)
+    return {**values, **included(table, case, include), **signature(table)}, source
 
 
 def case_etag(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> str:
@@ -129,12 +129,20 @@ def case_etag(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> 
     return f'"{blake2b(table.tag_key + numbers + tail, digest_size=16).hexdigest()}"'
 
 
+def _read_only(column: Array) -> Array:
+    # Compiled code is kept by type, and arrays that may be written to are of another one than those that lie in an
+    # Arrow stream.
+    seen = column.view()
+    seen.setflags(write=False)
+    return seen
+
+
 def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: InputStd | None = None) -> Answers:
     """Answer every good case; a bad one gets NaN and its code in ``flaws``.  Runs without the interpreter's lock."""
     n = cases.size
     mu_macro, mu_ratio, bound, v_tilde, y_tilde = (np.empty(n) for _ in range(5))
     source = np.empty(n, dtype=np.int8)
-    mu0, fz, k, y0, omega, v0 = cases.columns
+    mu0, fz, k, y0, omega, v0 = map(_read_only, cases.columns)
     a, b, c, d = table.arrays
     n_bad = evaluate_cases(
         *(mu0, fz, k, y0, omega, v0), a, b, c, d, mu_macro, mu_ratio, bound, source, v_tilde, y_tilde, cases.flaws

@@ -32,6 +32,7 @@ from service.routes import metrics as metrics_route
 from service.routes.batch import BatchEndpoint
 from service.settings import Settings, load_settings, unknown_variables
 from service.shelf import Shelf
+from service.warm import prepare
 from service.wire import Application, ShortWay
 
 __all__ = ["create_app"]
@@ -47,7 +48,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     state = app.state
     settings: Settings = state.settings
     with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="batch") as threads:
-        await asyncio.get_running_loop().run_in_executor(threads, state.shelf.load)
+        await asyncio.get_running_loop().run_in_executor(threads, prepare, state.shelf)
         state.metrics.start([table.label for table in state.shelf.tables])
         state.access_log.start()
         state.batches.start(threads)
