@@ -40,9 +40,7 @@ ENV NUMBA_CPU_NAME=generic \
     NUMBA_CACHE_LOCATOR_CLASSES=read_only_cache.ReadOnlyCacheLocator \
     PYTHONPATH=/app
 RUN venv/bin/python -m compileall -q friction service read_only_cache.py \
-    && venv/bin/python -c "from pathlib import Path; from friction import Surrogate; \
-tables = sorted(Path('tables').glob('*.nc')); assert tables, 'no table'; \
-[Surrogate.open(table).warm_up() for table in tables]" \
+    && venv/bin/python -m service.warm tables \
     && find cache -name '*.nbc' | grep .
 
 FROM ${BASE}

@@ -21,7 +21,7 @@ def source_digest() -> str:
     """Digest of every source file of solver and core: another digest may mean other numbers."""
     h = hashlib.sha256()
     root = Path(__file__).resolve().parent.parent
-    for package in ("friction", "builder"):
+    for package in ("friction", "builder", "service/compiled"):
         for source in sorted((root / package).glob("*.py")):
             h.update(source.name.encode())
             h.update(source.read_bytes())

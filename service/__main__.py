@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from types import FrameType
 
 from service.settings import PREFIX, Settings, SettingsError, load_settings
@@ -70,22 +71,26 @@ def _serve(settings: Settings) -> int:
     import uvicorn
 
     from service.app import create_app
+    from service.connection import Connection
     from service.logs import log_config
+    from service.metrics import shared_folder
 
     try:
-        uvicorn.run(
-            create_app(settings) if settings.workers == 1 else "service.app:create_app",
-            factory=settings.workers > 1,
-            host=settings.host,
-            port=settings.port,
-            workers=settings.workers,
-            log_config=log_config(settings.log_level),
-            log_level=settings.log_level,
-            access_log=False,
-            server_header=False,
-            ws="none",
-            timeout_graceful_shutdown=settings.shutdown_grace_s,
-        )
+        with shared_folder() if settings.workers > 1 else nullcontext():
+            uvicorn.run(
+                create_app(settings) if settings.workers == 1 else "service.app:create_app",
+                factory=settings.workers > 1,
+                http=Connection,
+                host=settings.host,
+                port=settings.port,
+                workers=settings.workers,
+                log_config=log_config(settings.log_level),
+                log_level=settings.log_level,
+                access_log=False,
+                server_header=False,
+                ws="none",
+                timeout_graceful_shutdown=settings.shutdown_grace_s,
+            )
     except SystemExit as stop:
         return 1 if stop.code else 0
     return 0

@@ -3,57 +3,85 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from threading import Lock
+from struct import Struct
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from friction import Surrogate
-from friction.nondim import FIELDS, find_faults
-from service import API_VERSION, __version__
+from friction.nondim import FIELDS, dimensional
+from friction.regions import REGIMES, SOURCES
+from friction.surrogate import REGIME_OF_SOURCE
+from service import API_VERSION
+from service.compiled.block import evaluate_cases
 from service.limits import groups, limits
-from service.schemas import CaseRequest, Groups, Limits
+from service.schemas import CaseRequest, Groups, InputStd, Limits
 from service.shelf import LoadedTable
 
-__all__ = ["DEFAULT_KEYS", "Batch", "CaseFault", "answer_batch", "answer_case", "case_etag", "signature"]
+__all__ = [
+    "DEFAULT_KEYS",
+    "Answers",
+    "Cases",
+    "answer_case",
+    "answer_cases",
+    "case_etag",
+    "default_answer",
+    "included",
+    "signature",
+]
+
+Array = NDArray[np.float64]
 
 DEFAULT_KEYS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
-# Array kernels may run in parallel, and numba's threading layer of last resort (no OpenMP, no TBB: small images)
-# ends the process when two threads enter such kernels at once.  An evaluation takes milliseconds, so they queue.
-_ARRAY_KERNELS = Lock()
-
-INCLUDE_KEYS = {"groups": tuple(Groups.model_fields), "limits": tuple(Limits.model_fields)}
-
-
-@dataclass(frozen=True)
-class CaseFault:
-    """Why a case of a batch has no result; ``field`` is None when the case as a whole is bad."""
-
-    field: str | None
-    reason: str
+_NAMES = [(REGIMES[regime], source) for regime, source in zip(REGIME_OF_SOURCE, SOURCES, strict=True)]
+_INFINITE = float("inf")
+_EXTRA_SLICE = 16384  # cases that included values are computed for at a time
+_SIX = Struct("<6d")
 
 
 @dataclass
-class Batch:
-    """A decoded batch of ``size`` cases.
+class Cases:
+    """A decoded batch.
 
     Attributes
     ----------
     size : int
-    columns : dict
-        A float, or a float64 array of shape (size,), for each of the six inputs.  NaN at ``faults``.
-        ``k`` is None when every case has rigid contact.
-    rigid : NDArray[bool] or None
-        Cases without k, when only some of them are; their entry in ``columns["k"]`` is 1.
-    faults : dict
-        Cases that were bad already as JSON, by index.
+    columns : list of ndarray
+        The six inputs in the order of FIELDS, shape (size,) or (1,) where one value holds for all.  ``k`` is infinite
+        for rigid contact; an entry that is no number is a NaN whose payload says why, see service/compiled/scan.py.
+    flaws : NDArray[uint8]
+        Not 0 where a case is bad as a whole.
+    names : NDArray[int64] or None
+        Where in ``text`` the unknown name of a bad row stands.
+    listed : bool
+        Whether any input came as a list.
     """
 
     size: int
-    columns: dict[str, Any]
-    rigid: NDArray[np.bool_] | None = None
-    faults: dict[int, CaseFault] = field(default_factory=dict)
+    columns: list[Array]
+    flaws: NDArray[np.uint8]
+    names: NDArray[np.int64] | None = None
+    text: bytearray = field(default_factory=bytearray)
+    listed: bool = True
+
+
+@dataclass
+class Answers:
+    """Answers to a batch, order kept: NaN, and -1 in ``source``, where ``flaws`` is not 0.
+
+    ``extras`` holds what was included: an array, or a mapping of arrays, a name.
+    """
+
+    cases: Cases
+    size: int
+    mu_macro: Array
+    mu_ratio: Array
+    error_bound: Array
+    source: NDArray[np.int8]
+    flaws: NDArray[np.uint8]
+    n_bad: int
+    extras: dict[str, Any] = field(default_factory=dict)
 
 
 def signature(table: LoadedTable) -> dict[str, object]:
@@ -61,108 +89,130 @@ def signature(table: LoadedTable) -> dict[str, object]:
     return {"table": table.label, "api_version": API_VERSION}
 
 
-def compute(surrogate: Surrogate, case: Mapping[str, Any], include: Sequence[str]) -> dict[str, Any]:
-    """Evaluate scalars or columns; ``groups`` and ``limits`` are dicts of their own.
-
-    Raises
-    ------
-    InputError
-        A value is out of bounds.
-    """
-    answer = surrogate.evaluate(**case)
-    values: dict[str, Any] = {
-        "mu_macro": answer.mu_macro,
-        "mu_ratio": answer.mu_ratio,
-        "regime": answer.regime,
-        "error_bound": answer.error_bound,
-        "source": answer.source,
-    }
-    if "groups" in include:
-        values["groups"] = groups(answer)
-    if "limits" in include:
-        values["limits"] = limits(surrogate, case, answer)
-    return values
+def default_answer(table: LoadedTable, case: CaseRequest) -> tuple[dict[str, Any], int]:
+    """The default answer to one checked case, as plain Python values, and the code of its source."""
+    mu0, k = case.mu0, case.k
+    mu, bound, source, _, _ = dimensional(
+        mu0, case.Fz, _INFINITE if k is None else k, case.y0, case.omega, case.v0, *table.arrays
+    )
+    regime, name = _NAMES[source]
+    return (
+        {"mu_macro": mu0 * mu, "mu_ratio": mu, "regime": regime, "error_bound": mu0 * bound, "source": name},
+        source,
+    )
 
 
-def answer_case(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> dict[str, Any]:
-    """Answer one case, as plain Python values."""
+def included(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> dict[str, Any]:
+    """What is included in the answer to one case, as plain Python values."""
     given = {name: getattr(case, name) for name in FIELDS}
-    values = compute(table.surrogate, given, include)
-    for name in include:
-        values[name] = {key: float(values[name][key]) for key in INCLUDE_KEYS[name]}
-    values.update(signature(table))
-    return values
+    extras = _extras(table.surrogate, given, include, case.std)
+    return {
+        name: {key: float(part) for key, part in value.items()} if isinstance(value, dict) else float(value)
+        for name, value in extras.items()
+    }
+
+
+def answer_case(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> tuple[dict[str, Any], int]:
+    """The whole answer to one case, as plain Python values, and the code of its source."""
+    values, source = default_answer(table, case)
+    return {**values, **included(table, case, include), **signature(table)}, source
 
 
 def case_etag(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> str:
     """Strong entity tag: an answer is a pure function of the table, the version and the query."""
+    k = case.k
     # Adding 0.0 turns -0.0 into 0.0: the same case, the same tag.
-    numbers = [None if value is None else value + 0.0 for value in (getattr(case, name) for name in FIELDS)]
-    text = repr((table.surrogate.checksum, table.surrogate.id, __version__, API_VERSION, numbers, tuple(include)))
-    return f'"{blake2b(text.encode(), digest_size=16).hexdigest()}"'
+    numbers = _SIX.pack(case.mu0, case.Fz, 0.0 if k is None else k, case.y0 + 0.0, case.omega + 0.0, case.v0 + 0.0)
+    tail = b""
+    if include or case.std is not None:
+        tail = repr((tuple(include), case.std)).encode()
+    return f'"{blake2b(table.tag_key + numbers + tail, digest_size=16).hexdigest()}"'
 
 
-def answer_batch(surrogate: Surrogate, batch: Batch, include: Sequence[str]) -> dict[str, Any]:
-    """Answer every good case; a bad one gets None and an entry in ``batch.faults``.
+def _read_only(column: Array) -> Array:
+    # Compiled code is kept by type, and arrays that may be written to are of another one than those that lie in an
+    # Arrow stream.
+    seen = column.view()
+    seen.setflags(write=False)
+    return seen
 
-    Returns
-    -------
-    dict
-        Lists of length ``batch.size`` under DEFAULT_KEYS; dicts of such lists under the included names.
-    """
-    _find_value_faults(batch)
-    good = np.ones(batch.size, dtype=np.bool_)
-    good[list(batch.faults)] = False
-    parts: list[tuple[NDArray[np.intp], dict[str, Any]]] = []
-    for rigid in (False, True):
-        chosen = good & _rigid_mask(batch, rigid)
-        where = np.flatnonzero(chosen)
-        if where.size:
-            case = {name: _take(column, where, batch.size) for name, column in batch.columns.items()}
-            if rigid:
-                case["k"] = None
-            with _ARRAY_KERNELS:
-                parts.append((where, compute(surrogate, case, include)))
-    answers: dict[str, Any] = {key: _gather(parts, (key,), batch.size) for key in DEFAULT_KEYS}
-    for name in include:
-        answers[name] = {key: _gather(parts, (name, key), batch.size) for key in INCLUDE_KEYS[name]}
+
+def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: InputStd | None = None) -> Answers:
+    """Answer every good case; a bad one gets NaN and its code in ``flaws``.  Runs without the interpreter's lock."""
+    n = cases.size
+    mu_macro, mu_ratio, bound, v_tilde, y_tilde = (np.empty(n) for _ in range(5))
+    source = np.empty(n, dtype=np.int8)
+    mu0, fz, k, y0, omega, v0 = map(_read_only, cases.columns)
+    a, b, c, d = table.arrays
+    n_bad = evaluate_cases(
+        *(mu0, fz, k, y0, omega, v0), a, b, c, d, mu_macro, mu_ratio, bound, source, v_tilde, y_tilde, cases.flaws
+    )
+    answers = Answers(cases, n, mu_macro, mu_ratio, bound, source, cases.flaws, n_bad)
+    if include:
+        answers.extras = _batch_extras(table.surrogate, cases, include, std)
     return answers
 
 
-def _find_value_faults(batch: Batch) -> None:
-    if batch.size == 0:
-        return
-    columns = {name: column for name, column in batch.columns.items() if column is not None}
-    for fault in find_faults(columns):
-        index = fault.index or 0
-        if index not in batch.faults:  # one entry per case: its first fault
-            batch.faults[index] = CaseFault(fault.field, fault.reason)
+#: what each included name holds; None: one number
+_KEYS: dict[str, tuple[str, ...] | None] = {
+    "groups": tuple(Groups.model_fields),
+    "limits": tuple(Limits.model_fields),
+    "gradient": FIELDS,
+    "std": None,
+}
 
 
-def _rigid_mask(batch: Batch, rigid: bool) -> NDArray[np.bool_]:
-    if batch.rigid is not None:
-        return batch.rigid if rigid else ~batch.rigid
-    return np.full(batch.size, (batch.columns["k"] is None) == rigid)
+def _extras(
+    surrogate: Surrogate, case: Mapping[str, Any], include: Sequence[str], std: InputStd | None
+) -> dict[str, Any]:
+    """What is included, as dicts of values or values; k is missing in what is asked of rigid contact."""
+    slopes = "gradient" in include or "std" in include
+    answer = surrogate.evaluate(**case, gradient=slopes)
+    gradient = answer.gradient or {}
+    values: dict[str, Any] = {}
+    for name in include:
+        if name == "groups":
+            values[name] = groups(answer)
+        elif name == "limits":
+            values[name] = limits(surrogate, case, answer)
+        elif name == "gradient":
+            values[name] = {field: gradient.get(field, np.nan) for field in FIELDS}
+        elif std is not None:
+            total: Any = 0.0
+            with np.errstate(over="ignore", invalid="ignore"):
+                for field, slope in gradient.items():
+                    deviation = getattr(std, field)
+                    if deviation:  # an infinite slope does no harm where the input is exact
+                        total = np.hypot(total, slope * deviation)
+            values[name] = total
+    return values
 
 
-def _take(column: Any, where: NDArray[np.intp], size: int) -> Any:
-    if not isinstance(column, np.ndarray) or where.size == size:
-        return column
-    return column[where]
-
-
-def _gather(parts: Sequence[tuple[NDArray[np.intp], dict[str, Any]]], path: Sequence[str], size: int) -> list[Any]:
-    """Bring one column of the parts into the order of the batch, None where no part has a case."""
-    out: NDArray[np.object_] | None = None
-    for where, values in parts:
-        value = values
-        for step in path:
-            value = value[step]
-        column = np.broadcast_to(np.asarray(value), where.shape)
-        if where.size == size:
-            whole: list[Any] = column.tolist()
-            return whole
-        if out is None:
-            out = np.full(size, None, dtype=object)
-        out[where] = column.tolist()
-    return [None] * size if out is None else list(out)
+def _batch_extras(surrogate: Surrogate, cases: Cases, include: Sequence[str], std: InputStd | None) -> dict[str, Any]:
+    extras: dict[str, Any] = {}
+    for name in include:
+        keys = _KEYS[name]
+        empty = [np.full(cases.size, np.nan) for _ in keys or (name,)]
+        extras[name] = empty[0] if keys is None else dict(zip(keys, empty, strict=True))
+    k = cases.columns[FIELDS.index("k")]
+    rigid = np.isposinf(k) if k.size != 1 else np.full(cases.size, bool(np.isposinf(k[0])))
+    for start in range(0, cases.size, _EXTRA_SLICE):
+        part = slice(start, start + _EXTRA_SLICE)
+        good = cases.flaws[part] == 0
+        for chosen in (good & ~rigid[part], good & rigid[part]):
+            where = start + np.flatnonzero(chosen)
+            if where.size == 0:
+                continue
+            case: dict[str, Any] = {
+                name: column[where] if column.size > 1 else np.full(where.size, column[0])
+                for name, column in zip(FIELDS, cases.columns, strict=True)
+            }
+            if rigid[where[0]]:
+                case["k"] = None
+            for name, values in _extras(surrogate, case, include, std).items():
+                if isinstance(values, dict):
+                    for key, value in values.items():
+                        extras[name][key][where] = value
+                else:
+                    extras[name][where] = values
+    return extras

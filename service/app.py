@@ -4,13 +4,13 @@ Nothing happens at import.  ``uvicorn --factory service.app:create_app`` works: 
 come from the environment.
 """
 
+import asyncio
 import logging
 import os
 from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 
-import anyio
-import anyio.to_thread
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
@@ -20,18 +20,26 @@ from starlette.responses import Response
 
 from friction.errors import MumacroError
 from service import __version__
+from service.connection import sweep
+from service.drain import draining
 from service.errors import answer_problem
+from service.logs import AccessLog
+from service.metrics import Metrics
 from service.middleware import ApiKeyGate, BodyLimit, RequestRecord
 from service.openapi import install
 from service.routes import batch, docs, health, inverse, law, mu_macro, page, table, umbridge
+from service.routes import metrics as metrics_route
+from service.routes.batch import BatchEndpoint
 from service.settings import Settings, load_settings, unknown_variables
 from service.shelf import Shelf
+from service.warm import prepare
+from service.wire import Application, ShortWay
 
 __all__ = ["create_app"]
 
 _ROUTERS = (
-    mu_macro.router, batch.router, inverse.router, law.router, table.router, health.router, docs.router,
-    umbridge.router, page.router,
+    mu_macro.router, batch.router, inverse.router, law.router, table.router, health.router, metrics_route.router,
+    docs.router, umbridge.router, page.router,
 )  # fmt: skip
 _log = logging.getLogger("mumacro.app")
 
@@ -40,12 +48,22 @@ _log = logging.getLogger("mumacro.app")
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     for name in unknown_variables():
         _log.warning("%s is no setting and has no effect", name)
-    app.state.batch_limiter = anyio.CapacityLimiter(os.cpu_count() or 1)
-    await anyio.to_thread.run_sync(app.state.shelf.load)
-    yield
+    state = app.state
+    settings: Settings = state.settings
+    with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="batch") as threads:
+        await asyncio.get_running_loop().run_in_executor(threads, prepare, state.shelf)
+        state.metrics.start([table.label for table in state.shelf.tables])
+        state.access_log.start()
+        state.batches.start(threads)
+        tasks = [asyncio.create_task(sweep(settings.client_timeout_s)), asyncio.create_task(state.metrics.share())]
+        with draining(state.shelf, settings.drain_s):
+            yield
+        for task in tasks:
+            task.cancel()
+        state.metrics.save()
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
+def create_app(settings: Settings | None = None) -> Application:
     """Return the application.
 
     Parameters
@@ -61,7 +79,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if settings is None:
         settings = load_settings()
     key = None if settings.api_key is None else settings.api_key.get_secret_value()
-    app = FastAPI(
+    metrics, access_log, shelf = Metrics(), AccessLog(), Shelf(settings.tables)
+    app = Application(
         title="mumacro",
         version=__version__,
         lifespan=_lifespan,
@@ -69,13 +88,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
         middleware=[
-            Middleware(RequestRecord),
+            Middleware(RequestRecord, metrics=metrics, log=access_log),
             Middleware(ApiKeyGate, key=key),
             Middleware(BodyLimit, max_bytes=settings.max_body_bytes),
         ],
     )
     app.state.settings = settings
-    app.state.shelf = Shelf(settings.tables)
+    app.state.shelf = shelf
+    app.state.metrics = metrics
+    app.state.access_log = access_log
+    app.state.batches = BatchEndpoint(shelf, settings, metrics)
+    app.batch_way = RequestRecord(ApiKeyGate(app.state.batches, key), metrics, access_log)
+    app.short = ShortWay(app.long_way, shelf, settings, metrics, access_log)
     app.add_exception_handler(MumacroError, answer_problem)
     app.add_exception_handler(HTTPException, _answer_http)
     for router in _ROUTERS:

@@ -1,147 +1,257 @@
 """JSON batches in and out: columns (an object of lists and numbers) and rows (a list of objects).
 
-Only what makes a batch unreadable refuses it as a whole: an unknown or missing column, lists of different lengths,
-a bad plain number that would hold for every case.  A bad entry of a list spoils its own case.
+Only what makes a batch unreadable refuses it as a whole: text that is not JSON, an unknown or missing column, lists of
+different lengths, a bad plain number that would hold for every case.  A bad entry of a list spoils its own case.
+Cases go from text to arrays and back in compiled loops; Python objects are made for names, options and faults only.
 """
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
+import orjson
 from numpy.typing import NDArray
-from pydantic_core import to_json
+from pydantic_core import from_json
 
-from friction.nondim import BOUNDS, FIELDS, find_faults
-from service.answers import DEFAULT_KEYS, Batch, CaseFault
-from service.errors import BatchTooLargeError, FieldFault, InvalidFieldsError, safe_value
+from friction.nondim import BOUNDS, FIELDS
+from friction.regions import REGIMES, SOURCES
+from friction.surrogate import REGIME_OF_SOURCE
+from service.answers import Answers, Cases
+from service.compiled.block import (
+    BOUND_FLAW,
+    MISSING_FLAW,
+    NUMBER_FLAW,
+    write_names,
+    write_numbers,
+    write_rows,
+)
+from service.compiled.digits import TEXT_WIDTH, Bytes
+from service.compiled.scan import (
+    DEEP,
+    FULL,
+    HARD_ROOM,
+    LONG,
+    NO_OBJECT,
+    OUT_OF_BOUNDS,
+    PAUSE,
+    SOUND,
+    read_list,
+    read_rows,
+    skip_space,
+    skip_value,
+)
+from service.errors import (
+    BatchTooLargeError,
+    FieldFault,
+    InvalidFieldsError,
+    MalformedBodyError,
+    safe_value,
+)
 from service.intake import KNOWN_FIELDS
 
-__all__ = [
-    "MAX_ERRORS",
-    "columns_from_json",
-    "encode",
-    "encode_case",
-    "encode_columns",
-    "encode_rows",
-    "rows_from_json",
-]
+__all__ = ["MAX_ERRORS", "columns_text", "encode", "is_rows", "read_batch", "row_text", "rows_text", "terminated"]
 
 MAX_ERRORS = 1000
 _REQUIRED = tuple(name for name in FIELDS if name != "k")
 _NOT_A_NUMBER = "must be a number"
-# The encoder holds the interpreter; between slices other requests get their turn.
-_SLICE = 8192
+_SLICE = 8192  # cases that are written at a time: about half a millisecond
+_MAX_OPTION = 64 * 1024  # bytes of a value that is neither a column nor a number
+_NAME = re.compile(rb'"(?:[^"\\\x00-\x1f]|\\.)*"')
 
 
-def columns_from_json(body: Mapping[str, Any], max_batch: int) -> Batch:
-    """Read columns.  ``include`` and ``tolerance`` are the caller's to read.
+def encode(values: Mapping[str, Any]) -> bytes:
+    """Write JSON; numbers that are not finite become null."""
+    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+# --- reading ------------------------------------------------------------------------------------------
+
+
+def terminated(body: bytes | bytearray) -> tuple[bytearray, Bytes]:
+    """The text with the 0 byte that stops every scan, as Python's and as numpy's; without a copy of a bytearray."""
+    text = body if isinstance(body, bytearray) else bytearray(body)
+    text.append(0)
+    return text, np.frombuffer(text, dtype=np.uint8)
+
+
+def is_rows(text: bytearray) -> bool:
+    """Whether the text is a list."""
+    return text.lstrip(b" \t\r\n")[:1] == b"[" if text[:1].isspace() else text[:1] == b"["
+
+
+def read_batch(text: bytearray, view: Bytes, max_batch: int) -> tuple[Cases, dict[str, Any]]:
+    """Read a batch in either form.  For columns, return ``include``, ``tolerance`` and ``std`` as they stand there.
 
     Raises
     ------
-    InvalidFieldsError, BatchTooLargeError
+    MalformedBodyError, InvalidFieldsError, BatchTooLargeError
         See the module's docstring; too many cases.
     """
+    i = skip_space(view, 0)
+    first = view[i]
+    if first == ord("["):
+        cases, end = _read_rows(text, view, i + 1, max_batch)
+        options: dict[str, Any] = {}
+    elif first == ord("{"):
+        columns, end = _read_columns(text, view, i, max_batch)
+        _expect_end(view, end, len(text))
+        cases, options = _columns(columns)
+    else:
+        end, state = skip_value(view, i)
+        if state != SOUND:
+            raise _unreadable(state, end)
+        _expect_end(view, end, len(text))
+        value = _small_value(text, i, end)
+        fault = FieldFault("body", "must be an object of columns or a list of rows", value, path=())
+        raise InvalidFieldsError("the body must be an object of columns or a list of rows", [fault])
+    _expect_end(view, end, len(text))
+    return cases, options
+
+
+def _unreadable(state: int, where: int) -> MalformedBodyError:
+    reason = "nested too deeply" if state == DEEP else "unexpected text"
+    return MalformedBodyError(f"the body is not JSON: {reason} at byte {where}")
+
+
+def _expect_end(view: Bytes, end: int, length: int) -> None:
+    i = skip_space(view, end)
+    if i != length - 1:
+        raise _unreadable(SOUND, i)
+
+
+def _too_large(max_batch: int) -> BatchTooLargeError:
+    return BatchTooLargeError(f"a batch may have up to {max_batch} cases, this one has more", max_batch=max_batch)
+
+
+def _read_rows(text: bytearray, view: Bytes, i: int, max_batch: int) -> tuple[Cases, int]:
+    capacity = min(max_batch, len(text) // 2 + 1)
+    words = np.empty((6, capacity), dtype=np.uint64)
+    flaws = np.empty(capacity, dtype=np.uint8)
+    names = np.empty(capacity, dtype=np.int64)
+    hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
+    count = waiting = 0
+    while True:
+        i, count, waiting, state = read_rows(view, i, words, flaws, names, count, hard, waiting)
+        for case, field, start, end in hard[:waiting].tolist():
+            if words[field, case] == LONG:
+                words[field, case] = _long_number(text, start, end)
+        waiting = 0
+        if state != PAUSE:
+            break
+    if state == FULL:
+        raise _too_large(max_batch)
+    if state != SOUND:
+        raise _unreadable(state, i)
+    columns = [words[field, :count].view(np.float64) for field in range(6)]
+    return Cases(count, columns, flaws[:count], names, text), i
+
+
+def _read_list(text: bytearray, view: Bytes, i: int, nullable: bool, max_batch: int) -> tuple[NDArray[np.float64], int]:
+    column = np.empty(min(max_batch, (len(text) - i) // 2 + 1), dtype=np.uint64)
+    hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
+    count = waiting = 0
+    while True:
+        i, count, waiting, state = read_list(view, i, column, count, nullable, hard, waiting)
+        for case, _, start, end in hard[:waiting].tolist():
+            column[case] = _long_number(text, start, end)
+        waiting = 0
+        if state != PAUSE:
+            break
+    if state == FULL:
+        raise _too_large(max_batch)
+    if state != SOUND:
+        raise _unreadable(state, i)
+    return column[:count].view(np.float64), i
+
+
+def _long_number(text: bytearray, start: int, end: int) -> np.uint64:
+    value = np.float64(text[start:end].decode("ascii"))
+    return value.view(np.uint64) if np.isfinite(value) else OUT_OF_BOUNDS
+
+
+def _small_value(text: bytearray, start: int, end: int) -> Any:
+    """The value of text[start:end], or one of its kind if it is long: it is wanted for a message, or is an option."""
+    if end - start > _MAX_OPTION:
+        return {ord("["): [], ord("{"): {}}.get(text[start], "a long value")
+    try:
+        return from_json(bytes(text[start:end]))
+    except ValueError as error:
+        if str(error).startswith("number out of range"):
+            return 10**400
+        raise MalformedBodyError(f"the body is not JSON: {error}") from None
+
+
+def _read_columns(text: bytearray, view: Bytes, i: int, max_batch: int) -> tuple[dict[str, Any], int]:
+    columns: dict[str, Any] = {}
+    i = skip_space(view, i + 1)
+    if view[i] == ord("}"):
+        return columns, i + 1
+    while True:
+        name = _NAME.match(text, i)
+        if name is None:
+            raise _unreadable(SOUND, i)
+        try:
+            key = orjson.loads(name[0])
+        except ValueError:
+            raise _unreadable(SOUND, i) from None
+        i = skip_space(view, name.end())
+        if view[i] != ord(":"):
+            raise _unreadable(SOUND, i)
+        i = skip_space(view, i + 1)
+        if view[i] == ord("[") and key in FIELDS:
+            columns[key], i = _read_list(text, view, i + 1, key == "k", max_batch)
+        else:
+            end, state = skip_value(view, i)
+            if state != SOUND:
+                raise _unreadable(state, end)
+            columns[key] = _small_value(text, i, end)
+            i = end
+        i = skip_space(view, i)
+        if view[i] == ord("}"):
+            return columns, i + 1
+        if view[i] != ord(","):
+            raise _unreadable(SOUND, i)
+        i = skip_space(view, i + 1)
+
+
+def _columns(body: dict[str, Any]) -> tuple[Cases, dict[str, Any]]:
+    """Check what was read as columns."""
     faults = [
         FieldFault(name, f"unknown field; allowed: {', '.join(KNOWN_FIELDS)}", body[name])
         for name in body
         if name not in KNOWN_FIELDS
     ]
     faults += [FieldFault(name, "is required", bound=BOUNDS[name]) for name in _REQUIRED if name not in body]
-    lengths = {name: len(body[name]) for name in FIELDS if isinstance(body.get(name), list)}
+    lengths = {name: body[name].size for name in FIELDS if isinstance(body.get(name), np.ndarray)}
     if len(set(lengths.values())) > 1:
         given = ", ".join(f"{name}: {length}" for name, length in lengths.items())
         faults += [
-            FieldFault(name, f"lists must have one length; given {given}", body[name])
+            FieldFault(name, f"lists must have one length; given {given}", [])
             for name, length in lengths.items()
             if length != next(iter(lengths.values()))
         ]
+    columns: list[NDArray[np.float64]] = []
     for name in FIELDS:
-        if name in body and name not in lengths:
-            faults += _scalar_faults(name, body[name])
+        column: Any = body.get(name)
+        if name not in lengths:
+            if name in body:
+                faults += _scalar_faults(name, column)
+            number = np.inf if column is None else float(column) if _is_number(column) else np.nan
+            column = np.array([number])
+        columns.append(column)
     if faults:
         raise InvalidFieldsError(f"{safe_value(faults[0].field)}: {faults[0].reason}", faults)
     size = next(iter(lengths.values()), 1)
-    _check_size(size, max_batch)
-    return _batch({name: body.get(name) for name in FIELDS}, size, {})
+    options = {name: body[name] for name in body if name not in FIELDS}
+    return Cases(size, columns, np.zeros(size, dtype=np.uint8), listed=bool(lengths)), options
 
 
-def rows_from_json(rows: Sequence[Any], max_batch: int) -> Batch:
-    """Read rows.  A row that is no object, lacks a field or has an unknown one is a bad case.
-
-    Raises
-    ------
-    BatchTooLargeError
-        Too many cases.
-    """
-    _check_size(len(rows), max_batch)
-    faults: dict[int, CaseFault] = {}
-    checked: list[Mapping[str, Any]] = []
-    sound: set[tuple[str, ...]] = set()  # most rows have the fields of the row before, in the same order
-    for index, row in enumerate(rows):
-        if isinstance(row, dict):
-            names = tuple(row)
-            if names not in sound:
-                fault = _shape_fault(row)
-                if fault is None:
-                    sound.add(names)
-                else:
-                    faults[index] = fault
-            checked.append(row)
-        else:
-            faults[index] = CaseFault(None, "must be an object")
-            checked.append({})
-    columns = {name: [row.get(name) for row in checked] for name in FIELDS}
-    return _batch(columns, len(rows), faults)
-
-
-def encode_columns(answers: Mapping[str, Any], batch: Batch, signature: Mapping[str, Any]) -> bytes:
-    """Write the answers as an object of lists."""
-    return encode({**answers, **_errors(batch), **signature})
-
-
-def encode_rows(answers: Mapping[str, Any], batch: Batch, signature: Mapping[str, Any]) -> bytes:
-    """Write the answers as a list of objects."""
-    columns: dict[str, list[Any]] = {key: answers[key] for key in DEFAULT_KEYS}
-    for name, group in answers.items():
-        if name not in columns:
-            keys = tuple(group)
-            columns[name] = [dict(zip(keys, values, strict=True)) for values in zip(*group.values(), strict=True)]
-    names = tuple(columns)
-    results: list[Any] = [dict(zip(names, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    for index in batch.faults:
-        results[index] = None
-    return encode({"results": results, **_errors(batch), **signature})
-
-
-def encode_case(values: Mapping[str, Any]) -> bytes:
-    """Write one short answer; numbers that are not finite become null."""
-    return to_json(values, inf_nan_mode="null")
-
-
-def encode(values: Mapping[str, Any]) -> bytes:
-    """Write JSON; numbers that are not finite become null.  Long lists are written in slices."""
-    members = (to_json(name) + b":" + _encode_value(value) for name, value in values.items())
-    return b"{" + b",".join(members) + b"}"
-
-
-def _encode_value(value: Any) -> bytes:
-    if isinstance(value, list) and len(value) > _SLICE:
-        slices = (value[start : start + _SLICE] for start in range(0, len(value), _SLICE))
-        return b"[" + b",".join(to_json(part, inf_nan_mode="null")[1:-1] for part in slices) + b"]"
-    if isinstance(value, dict):
-        return encode(value)
-    return to_json(value, inf_nan_mode="null")
-
-
-def _errors(batch: Batch) -> dict[str, Any]:
-    listed = sorted(batch.faults.items())[:MAX_ERRORS]
-    entries = [{"index": index, "field": fault.field, "reason": fault.reason} for index, fault in listed]
-    return {"errors": entries, "n_errors": len(batch.faults)}
-
-
-def _check_size(size: int, max_batch: int) -> None:
-    if size > max_batch:
-        raise BatchTooLargeError(f"a batch may have up to {max_batch} cases, this one has {size}", max_batch=max_batch)
+def _is_number(value: object) -> bool:
+    if type(value) is int:
+        return -(10**308) <= value <= 10**308
+    return type(value) is float
 
 
 def _scalar_faults(name: str, value: Any) -> list[FieldFault]:
@@ -149,57 +259,143 @@ def _scalar_faults(name: str, value: Any) -> list[FieldFault]:
         return []
     if type(value) not in (int, float):
         return [FieldFault(name, "must be a number or a list of numbers", value, BOUNDS[name])]
-    number, _, bad = _numbers([value], name)
-    found = find_faults({name: float(number[0])})
-    reason = bad.get(0) or (found[0].reason if found else None)
-    return [] if reason is None else [FieldFault(name, reason, value, BOUNDS[name])]
+    least = 5e-324 if name in ("mu0", "Fz", "k") else 0.0
+    if _is_number(value) and least <= value <= np.finfo(np.float64).max:
+        return []
+    return [FieldFault(name, f"must be {BOUNDS[name]}", value, BOUNDS[name])]
 
 
-def _shape_fault(row: Mapping[str, Any]) -> CaseFault | None:
-    for name in _REQUIRED:
-        if name not in row:
-            return CaseFault(name, "is required")
-    for name in row:
-        if name not in FIELDS:
-            return CaseFault(str(safe_value(name)), f"unknown field; allowed: {', '.join(FIELDS)}")
-    return None
+# --- writing ------------------------------------------------------------------------------------------
 
 
-def _batch(raw: Mapping[str, Any], size: int, faults: dict[int, CaseFault]) -> Batch:
-    columns: dict[str, Any] = {}
-    rigid: NDArray[np.bool_] | None = None
-    for name, column in raw.items():
-        if not isinstance(column, list):
-            columns[name] = None if column is None else float(column)
-            continue
-        values, missing, bad = _numbers(column, name)
-        for index, reason in bad.items():
-            faults.setdefault(index, CaseFault(name, reason))
-        columns[name] = values
-        if name == "k" and missing is not None:
-            rigid = missing
-            values[missing] = 1.0
-    return Batch(size, columns, rigid, faults)
+@cache
+def _words(names: tuple[str, ...]) -> tuple[Bytes, NDArray[np.int64]]:
+    """The names as JSON strings, one behind the other, and where each begins."""
+    texts = [orjson.dumps(name) for name in names]
+    ends = np.cumsum([0, *map(len, texts)]).astype(np.int64)
+    return np.frombuffer(b"".join(texts), dtype=np.uint8).copy(), ends
 
 
-def _numbers(column: list[Any], name: str) -> tuple[NDArray[np.float64], NDArray[np.bool_] | None, dict[int, str]]:
-    """Return the column as float64, the places of null where null is allowed, and the entries that are no numbers."""
-    if set(map(type, column)) <= {float, int}:  # exact types: bool is an int to isinstance
-        try:
-            return np.array(column, dtype=np.float64), None, {}
-        except OverflowError:
-            pass  # an integer beyond double range: find out which
-    values = np.full(len(column), np.nan)
-    missing = np.zeros(len(column), dtype=np.bool_)
-    bad: dict[int, str] = {}
-    for index, entry in enumerate(column):
-        if type(entry) in (float, int):
-            try:
-                values[index] = entry
-            except OverflowError:
-                bad[index] = f"must be {BOUNDS[name]}"
-        elif entry is None and name == "k":
-            missing[index] = True
+_SOURCE_NAMES = tuple(SOURCES)
+_REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
+_NAME_WIDTH = max(map(len, (*_SOURCE_NAMES, *_REGIME_NAMES))) + 3
+
+
+def columns_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
+    """Write the answers as an object of lists, piece by piece."""
+    opening = b"{"
+    room = np.empty(_SLICE * max(TEXT_WIDTH + 1, _NAME_WIDTH), dtype=np.uint8)
+    for key, column in _default_columns(answers):
+        yield opening + b'"' + key.encode() + b'":['
+        yield from _list_text(room, column, key)
+        opening = b"],"
+    for name, group in answers.extras.items():
+        if isinstance(group, Mapping):
+            opening += orjson.dumps(name) + b":{"
+            for key, column in group.items():
+                yield opening + orjson.dumps(key) + b":["
+                yield from _list_text(room, column, key)
+                opening = b"],"
+            opening = b"]},"
         else:
-            bad[index] = _NOT_A_NUMBER
-    return values, missing if missing.any() else None, bad
+            yield opening + orjson.dumps(name) + b":["
+            yield from _list_text(room, group, name)
+            opening = b"],"
+    yield opening + encode({**errors_of(answers), **signature})[1:]
+
+
+def _default_columns(answers: Answers) -> list[tuple[str, NDArray[Any]]]:
+    return [
+        ("mu_macro", answers.mu_macro),
+        ("mu_ratio", answers.mu_ratio),
+        ("regime", answers.source),
+        ("error_bound", answers.error_bound),
+        ("source", answers.source),
+    ]
+
+
+def _list_text(room: Bytes, column: NDArray[Any], key: str) -> Iterator[bytes]:
+    size = column.size
+    for start in range(0, size, _SLICE):
+        part = column[start : start + _SLICE]
+        if part.dtype == np.int8:
+            end = write_names(room, 0, part, *_words(_REGIME_NAMES if key == "regime" else _SOURCE_NAMES))
+        else:
+            end = write_numbers(room, 0, part)
+        yield room[: end - (start + part.size == size)].tobytes()
+
+
+def rows_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
+    """Write the answers as a list of objects, piece by piece."""
+    numbers = [answers.mu_macro, answers.mu_ratio, answers.error_bound]
+    pieces = [b'{"mu_macro":', b',"mu_ratio":', b',"regime":', b',"error_bound":', b',"source":']
+    closing = b""
+    for name, group in answers.extras.items():
+        if isinstance(group, Mapping):
+            opening = closing + b"," + orjson.dumps(name) + b":{"
+            for key, column in group.items():
+                pieces.append(opening + orjson.dumps(key) + b":")
+                numbers.append(column)
+                opening = b","
+            closing = b"}"
+        else:
+            pieces.append(closing + b"," + orjson.dumps(name) + b":")
+            numbers.append(group)
+            closing = b""
+    pieces.append(closing + b"}")
+    text = np.frombuffer(b"".join(pieces), dtype=np.uint8).copy()
+    ends = np.cumsum([0, *map(len, pieces)]).astype(np.int64)
+    width = text.size + len(numbers) * TEXT_WIDTH + 2 * _NAME_WIDTH
+    step = min(_SLICE, answers.size)
+    room = np.empty(max(step, 1) * width, dtype=np.uint8)
+    yield b'{"results":['
+    for start in range(0, answers.size, _SLICE):
+        part = slice(start, start + _SLICE)
+        table = np.stack([column[part] for column in numbers])
+        flaws = answers.flaws[part]
+        end = write_rows(
+            room, 0, flaws, text, ends, table, answers.source[part], *_words(_REGIME_NAMES), *_words(_SOURCE_NAMES)
+        )
+        yield room[: end - (start + flaws.size == answers.size)].tobytes()
+    yield b"]," + encode({**errors_of(answers), **signature})[1:]
+
+
+def row_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
+    """Write the answer to one good case as an object: plain numbers that are bad refuse what they stand in."""
+    text = b"".join(rows_text(answers, {}))
+    yield text[len(b'{"results":[') : text.rindex(b'],"errors"') - 1] + b"," + encode(signature)[1:]
+
+
+def errors_of(answers: Answers) -> dict[str, Any]:
+    """The bad cases, located: the first MAX_ERRORS of them, and their number."""
+    if answers.n_bad == 0:
+        return {"errors": [], "n_errors": 0}
+    listed = np.flatnonzero(answers.flaws)[:MAX_ERRORS].tolist()
+    return {"errors": [_error(answers, index) for index in listed], "n_errors": answers.n_bad}
+
+
+def _error(answers: Answers, index: int) -> dict[str, Any]:
+    code = int(answers.flaws[index])
+    field: str | None = None
+    if code >= BOUND_FLAW:
+        field = FIELDS[code - BOUND_FLAW]
+        reason = f"must be {BOUNDS[field]}"
+    elif code >= NUMBER_FLAW:
+        field, reason = FIELDS[code - NUMBER_FLAW], _NOT_A_NUMBER
+    elif code >= MISSING_FLAW:
+        field, reason = FIELDS[code - MISSING_FLAW], "is required"
+    elif code == NO_OBJECT:
+        reason = "must be an object"
+    else:
+        field, reason = _unknown_name(answers, index), f"unknown field; allowed: {', '.join(FIELDS)}"
+    return {"index": index, "field": field, "reason": reason}
+
+
+def _unknown_name(answers: Answers, index: int) -> str:
+    cases = answers.cases
+    assert cases.names is not None  # noqa: S101  (only rows can have an unknown name)
+    name = _NAME.match(cases.text, int(cases.names[index]))
+    try:
+        return str(safe_value(orjson.loads(name[0] if name else b'""')))
+    except ValueError:
+        return "a name that is not UTF-8"

@@ -29,6 +29,8 @@ __all__ = [
     "NotReadyError",
     "OverloadedError",
     "RequestError",
+    "SlowClientError",
+    "TookTooLongError",
     "UnauthorizedError",
     "UnsupportedBodyError",
     "problem_of",
@@ -132,7 +134,15 @@ class NotReadyError(RequestError):
 
 
 class OverloadedError(RequestError):
-    """More large batches are waiting than it makes sense to queue."""
+    """More large batches are being answered than the settings allow."""
+
+
+class SlowClientError(RequestError):
+    """The caller sends or takes nothing for too long."""
+
+
+class TookTooLongError(RequestError):
+    """The request is not finished in the time that the settings allow."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +158,7 @@ class Kind:
 PROBLEMS: dict[type[Exception], Kind] = {
     MalformedBodyError: Kind(400, "malformed-body", "The body is not JSON"),
     UnauthorizedError: Kind(401, "unauthorized", "An API key is needed"),
+    SlowClientError: Kind(408, "slow-client", "The request did not come in time"),
     BodyTooLargeError: Kind(413, "body-too-large", "The body is too large"),
     BatchTooLargeError: Kind(413, "batch-too-large", "The batch is too large"),
     UnsupportedBodyError: Kind(415, "unsupported-body", "The body's media type is not supported"),
@@ -156,6 +167,7 @@ PROBLEMS: dict[type[Exception], Kind] = {
     NotReadyError: Kind(503, "not-ready", "The service is not ready", 5),
     TableError: Kind(503, "not-ready", "The service is not ready", 5),
     OverloadedError: Kind(503, "overloaded", "The service is overloaded", 1),
+    TookTooLongError: Kind(503, "took-too-long", "The request took too long", 1),
 }
 
 UNEXPECTED = Kind(500, "unexpected", "An unexpected error")

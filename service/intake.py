@@ -10,35 +10,41 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl
 
-import anyio.to_thread
 from pydantic import ValidationError
-from pydantic_core import from_json
 from starlette.requests import Request
 
 from friction.nondim import BOUNDS, FIELDS
 from service.errors import FieldFault, InvalidFieldsError, MalformedBodyError, UnsupportedBodyError, safe_value
-from service.schemas import INCLUDES, CaseRequest
+from service.schemas import INCLUDES, CaseRequest, InputStd
 
 __all__ = [
+    "ARROW",
+    "JSON",
     "KNOWN_FIELDS",
+    "NDJSON",
+    "STD_PARAMETERS",
     "Options",
     "canonical",
     "case_from_body",
     "case_from_query",
+    "check_std",
+    "media_type",
+    "merged_options",
     "options_from",
     "options_from_query",
-    "parse_json",
     "query_pairs",
     "read_body",
     "refuse_query",
     "table_choice_from_query",
 ]
 
-KNOWN_FIELDS = (*FIELDS, "include", "tolerance")
-_BOUND = {**BOUNDS, "tolerance": "finite and > 0"}
+KNOWN_FIELDS = (*FIELDS, "include", "tolerance", "std")
+STD_PARAMETERS = tuple(f"std_{name}" for name in FIELDS)
+_OPTION_PARAMETERS = ("include", "tolerance", *STD_PARAMETERS)
+_BOUND = {**BOUNDS, "tolerance": "finite and > 0", **dict.fromkeys(STD_PARAMETERS, "finite and >= 0")}
 
-# Above this many bytes a body is parsed in a worker thread.
-_LARGE_BODY = 64 * 1024
+JSON, NDJSON, ARROW = "application/json", "application/x-ndjson", "application/vnd.apache.arrow.stream"
+_ALIASES = {"application/ndjson": NDJSON, "application/jsonl": NDJSON, "application/x-jsonlines": NDJSON}
 _MAX_PARAMETERS = 100
 
 # An unescaped "+" of a query arrives as a space; between "e" and a digit it can be nothing else.
@@ -51,6 +57,29 @@ class Options:
 
     include: tuple[str, ...] = ()
     tolerance: float | None = None
+    std: InputStd | None = None
+
+
+def media_type(request: Request, known: Sequence[str]) -> str:
+    """Return which of the known types the body has; a body without a type is of the first.
+
+    Raises
+    ------
+    UnsupportedBodyError
+        Another media type, another charset than UTF-8, or a compressed body.
+    """
+    given = request.headers.get("content-type")
+    found = known[0]
+    if given is not None:
+        media, _, parameters = given.lower().partition(";")
+        charset = parameters.strip().removeprefix("charset=").strip('"') if "charset=" in parameters else "utf-8"
+        found = _ALIASES.get(media.strip(), media.strip())
+        if found not in known or charset not in ("utf-8", "utf8", "us-ascii"):
+            offer = ", ".join(known)
+            raise UnsupportedBodyError(f"send {offer}, not {given[:80]}", headers={"Accept-Post": offer})
+    if request.headers.get("content-encoding", "identity").lower() != "identity":
+        raise UnsupportedBodyError("send the body without Content-Encoding", headers={"Accept-Encoding": "identity"})
+    return found
 
 
 async def read_body(request: Request) -> bytes:
@@ -61,37 +90,11 @@ async def read_body(request: Request) -> bytes:
     UnsupportedBodyError, MalformedBodyError, BodyTooLargeError
         Another media type or a compressed body; nothing in it; more than the limit.
     """
-    content_type = request.headers.get("content-type")
-    if content_type is not None:
-        media, _, parameters = content_type.lower().partition(";")
-        charset = parameters.strip().removeprefix("charset=").strip('"') if "charset=" in parameters else "utf-8"
-        if media.strip() != "application/json" or charset not in ("utf-8", "utf8", "us-ascii"):
-            shown = content_type[:80]
-            raise UnsupportedBodyError(
-                f"send application/json, not {shown}", headers={"Accept-Post": "application/json"}
-            )
-    if request.headers.get("content-encoding", "identity").lower() != "identity":
-        raise UnsupportedBodyError("send the body without Content-Encoding", headers={"Accept-Encoding": "identity"})
+    media_type(request, (JSON,))
     body = await request.body()
     if not body:
         raise MalformedBodyError("the body is empty")
     return body
-
-
-async def parse_json(body: bytes) -> Any:
-    """Return the parsed body.  NaN and Infinity are read as such: whoever uses the numbers refuses them by name.
-
-    Raises
-    ------
-    MalformedBodyError
-        The body is not JSON in UTF-8.
-    """
-    try:
-        if len(body) > _LARGE_BODY:
-            return await anyio.to_thread.run_sync(from_json, body)
-        return from_json(body)
-    except ValueError as error:
-        raise _unreadable(str(error)) from None
 
 
 def case_from_body(body: bytes) -> CaseRequest:
@@ -103,9 +106,21 @@ def case_from_body(body: bytes) -> CaseRequest:
         Not JSON; bad fields, all of them listed.
     """
     try:
-        return CaseRequest.model_validate_json(body)
+        case = CaseRequest.model_validate_json(body)
     except ValidationError as error:
         raise _refusal(error, "pointer") from None
+    check_std(case.include, case.std, "pointer")
+    return case
+
+
+def check_std(include: Iterable[str] | None, std: InputStd | None, place: str) -> None:
+    """Raise InvalidFieldsError unless standard deviations are given exactly where they are asked for."""
+    asked = include is not None and "std" in include
+    if asked == (std is not None):
+        return
+    name = "std" if place == "pointer" else "std_mu0"
+    reason = "is required where include asks for std" if asked else "is of no use unless include asks for std"
+    raise InvalidFieldsError(f"{name}: {reason}", [FieldFault(name, reason, place=place)])
 
 
 def query_pairs(request: Request) -> list[tuple[str, str]]:
@@ -127,7 +142,7 @@ def case_from_query(request: Request) -> CaseRequest:
     InvalidFieldsError
         Bad, unknown, missing or repeated parameters, all of them listed.
     """
-    values, faults = _read_query(query_pairs(request), KNOWN_FIELDS)
+    values, faults = _read_query(query_pairs(request), (*FIELDS, *_OPTION_PARAMETERS))
     try:
         case = CaseRequest.model_validate(values)
     except ValidationError as error:
@@ -135,6 +150,7 @@ def case_from_query(request: Request) -> CaseRequest:
         raise _refusal(error, "parameter", faults, refused) from None
     if faults:
         raise InvalidFieldsError(_summary(faults), faults)
+    check_std(case.include, case.std, "parameter")
     return case
 
 
@@ -149,7 +165,7 @@ def options_from_query(request: Request) -> Options:
     pairs = query_pairs(request)
     if not pairs:
         return Options()
-    values, faults = _read_query(pairs, ("include", "tolerance"))
+    values, faults = _read_query(pairs, _OPTION_PARAMETERS)
     return options_from(values, "parameter", faults)
 
 
@@ -186,14 +202,37 @@ def options_from(values: dict[str, Any], place: str, faults: Sequence[FieldFault
         A name that is not offered, or a tolerance that is none.
     """
     filler: dict[str, Any] = dict.fromkeys(("mu0", "Fz", "y0", "omega", "v0"), 1.0)
-    wanted = {name: values[name] for name in ("include", "tolerance") if name in values}
+    wanted = {name: values[name] for name in ("include", "tolerance", "std") if name in values}
     try:
         checked = CaseRequest.model_validate({**filler, **wanted})
     except ValidationError as error:
         raise _refusal(error, place, faults, {fault.field for fault in faults}) from None
     if faults:
         raise InvalidFieldsError(_summary(faults), faults)
-    return Options(canonical(checked.include), checked.tolerance)
+    return Options(canonical(checked.include), checked.tolerance, checked.std)
+
+
+def merged_options(query: Options, body: dict[str, Any]) -> tuple[Options, str]:
+    """Return the options of query and body, and the place of the tolerance: "parameter" or "pointer".
+
+    Raises
+    ------
+    InvalidFieldsError
+        One is given in both; a bad one in the body.
+    """
+    if not body:
+        check_std(query.include, query.std, "parameter")
+        return query, "parameter"
+    own = options_from(body, "pointer")
+    given = {"include": query.include, "tolerance": query.tolerance, "std": query.std}
+    twice = [name for name, value in given.items() if value and body.get(name) is not None]
+    if twice:
+        faults = [FieldFault(name, "is given in the query and in the body", body[name]) for name in twice]
+        raise InvalidFieldsError(f"{twice[0]} is given in the query and in the body", faults)
+    place = "pointer" if query.tolerance is None else "parameter"
+    merged = Options(own.include or query.include, own.tolerance or query.tolerance, own.std or query.std)
+    check_std(merged.include, merged.std, "pointer")
+    return merged, place
 
 
 def canonical(include: Iterable[str] | None) -> tuple[str, ...]:
@@ -219,6 +258,9 @@ def _read_query(
             values[name] = float(text.replace(" ", "+"))
         else:
             faults.append(FieldFault(name, _not_a_number(name, text), text, _BOUND[name], "parameter"))
+    std = {name: values.pop(f"std_{name}") for name in FIELDS if f"std_{name}" in values}
+    if std:
+        values["std"] = std
     return values, faults
 
 
@@ -241,6 +283,8 @@ def _refusal(
             return _unreadable(entry["msg"].removeprefix("Invalid JSON: "))
         path = entry["loc"]
         field = str(path[0]) if path else "body"
+        if place == "parameter" and field == "std":
+            field, path = f"std_{path[-1]}", (f"std_{path[-1]}",)
         if field in skip:
             continue
         bound = _BOUND.get(field)
@@ -254,7 +298,7 @@ def _refusal(
 
 def _reason(kind: str, field: str) -> str:
     if kind == "extra_forbidden":
-        return f"unknown field; allowed: {', '.join(KNOWN_FIELDS)}"
+        return f"unknown field; allowed: {', '.join(FIELDS if field == 'std' else KNOWN_FIELDS)}"
     if field == "include":
         return f"must be a list of names out of: {', '.join(INCLUDES)}"
     if kind == "float_type":

@@ -12,13 +12,14 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import BodyTooLargeError, UnauthorizedError, problem_of
-from service.logs import accept_request_id, request_id
+from service.logs import AccessLog, accept_request_id, request_id
+from service.metrics import Metrics
 
-__all__ = ["HEALTH_PATHS", "ApiKeyGate", "BodyLimit", "RequestRecord"]
+__all__ = ["BATCH_PATH", "HEALTH_PATHS", "ApiKeyGate", "BodyLimit", "RequestRecord"]
 
+BATCH_PATH = "/v1/mu-macro/batch"
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 
-_access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
 
 
@@ -33,8 +34,10 @@ def _header(scope: Scope, name: bytes) -> bytes | None:
 class RequestRecord:
     """Gives a request its id, writes its line into the log, and is the last net under an exception."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, metrics: Metrics, log: AccessLog) -> None:
         self.app = app
+        self.metrics = metrics
+        self.log = log
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
@@ -66,24 +69,16 @@ class RequestRecord:
             if status == 0:
                 await problem_of(error, scope["path"])(scope, receive, send_marked)
         finally:
-            self._log(scope, status, time.perf_counter() - started)
+            self._finish(scope, status, time.perf_counter() - started)
             request_id.reset(token)
 
-    @staticmethod
-    def _log(scope: Scope, status: int, seconds: float) -> None:
+    def _finish(self, scope: Scope, status: int, seconds: float) -> None:
+        method, path = scope["method"], scope["path"]
+        self.metrics.count(self.metrics.place(path, method, status), seconds)
         # Probes come every few seconds and say nothing while they succeed.
-        level = logging.DEBUG if status == 200 and scope["path"] in HEALTH_PATHS else logging.INFO
-        if not _access.isEnabledFor(level):
-            return
+        level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
         client = scope.get("client")
-        fields = {
-            "method": scope["method"],
-            "path": scope["path"],
-            "status": status,
-            "duration_ms": round(1e3 * seconds, 3),
-            "client": client[0] if client else None,
-        }
-        _access.log(level, "request", extra={"fields": fields})
+        self.log.record(level, method, path, status, seconds, client[0] if client else None)
 
 
 class ApiKeyGate:
@@ -121,7 +116,8 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request with a counted ``receive``."""
-        if scope["type"] != "http" or scope["method"] in ("GET", "HEAD"):
+        # Batches watch their own size: one that comes as a stream has no end to count to.
+        if scope["type"] != "http" or scope["method"] in ("GET", "HEAD") or scope["path"] == BATCH_PATH:
             await self.app(scope, receive, send)
             return
         length = _header(scope, b"content-length")

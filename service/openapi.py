@@ -10,8 +10,19 @@ from pydantic.json_schema import models_json_schema
 
 from service import __version__, forms
 from service import schemas as models
+from service.intake import ARROW, JSON, NDJSON
 
-__all__ = ["case_parameters", "describe_json", "form_parameters", "install", "option_parameters", "table_parameters"]
+__all__ = [
+    "batch_bodies",
+    "case_parameters",
+    "describe_batch",
+    "describe_json",
+    "describe_problems",
+    "form_parameters",
+    "install",
+    "option_parameters",
+    "table_parameters",
+]
 
 _REF = "#/components/schemas/{model}"
 _DESCRIPTION = (
@@ -20,16 +31,22 @@ _DESCRIPTION = (
     "Errors are problem details (RFC 9457)."
 )
 _WHY = {
-    400: "The body is empty or not JSON",
+    400: "The body is empty or cannot be read",
+    408: "The body did not come in time",
     401: "An API key is in force, and none or a wrong one was sent",
     413: "The body or the batch is too large",
-    415: "The body is not application/json",
+    415: "The body has another media type",
     422: "Invalid, missing or unknown fields",
     503: "Not ready or overloaded; see Retry-After",
 }
 _REQUESTS: tuple[Any, ...] = (
     models.Case, models.CaseRequest, models.BatchColumns, forms.SolveForRequest, forms.LawRequest
 )  # fmt: skip
+_ARROW_BODY = "Arrow IPC stream with number columns mu0, Fz, y0, omega, v0 and, unless contact is rigid, k"
+_ARROW_ANSWER = (
+    "Arrow IPC stream, order kept: mu_macro, mu_ratio, regime, error_bound, source, error; "
+    "null results and a text in error where a case is bad; the table and the version in the schema's metadata"
+)
 _ANSWERS: tuple[Any, ...] = (
     models.CaseAnswer,
     models.ColumnsAnswer,
@@ -49,23 +66,72 @@ def describe_json(answer: str | Sequence[str], *statuses: int) -> dict[int | str
     names = (answer,) if isinstance(answer, str) else tuple(answer)
     refs = [{"$ref": _REF.format(model=name)} for name in names]
     schema = refs[0] if len(refs) == 1 else {"oneOf": refs}
-    problem = {"schema": {"$ref": _REF.format(model="Problem")}}
-    described: dict[int | str, dict[str, Any]] = {
-        200: {"description": "The answer", "content": {"application/json": {"schema": schema}}}
+    return {
+        200: {"description": "The answer", "content": {"application/json": {"schema": schema}}},
+        **describe_problems(*statuses),
     }
-    for status in statuses:
-        described[status] = {"description": _WHY[status], "content": {"application/problem+json": problem}}
+
+
+def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Describe the problems that an endpoint can give."""
+    problem = {"schema": {"$ref": _REF.format(model="Problem")}}
+    return {
+        status: {"description": _WHY[status], "content": {"application/problem+json": problem}} for status in statuses
+    }
+
+
+def batch_bodies() -> dict[str, Any]:
+    """Describe the forms of a batch."""
+    columns, row = {"$ref": _REF.format(model="BatchColumns")}, {"$ref": _REF.format(model="Case")}
+    rows = {"type": "array", "items": row}
+    return {
+        "required": True,
+        "content": {
+            JSON: {"schema": {"oneOf": [columns, rows]}},
+            NDJSON: {"schema": {"oneOf": [columns, rows, row], "description": "One of these a line"}},
+            ARROW: {"schema": {"type": "string", "format": "binary", "description": _ARROW_BODY}},
+        },
+    }
+
+
+def describe_batch() -> dict[int | str, dict[str, Any]]:
+    """Describe the answers to a batch, each in the form of its question."""
+    described = describe_json(("ColumnsAnswer", "RowsAnswer"), 400, 401, 408, 413, 415, 422, 503)
+    content = described[200]["content"]
+    lines = ("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem")
+    content[NDJSON] = {
+        "schema": {
+            "oneOf": [{"$ref": _REF.format(model=name)} for name in lines],
+            "description": "One of these a line, in the order of the lines",
+        }
+    }
+    content[ARROW] = {"schema": {"type": "string", "format": "binary", "description": _ARROW_ANSWER}}
     return described
 
 
 def case_parameters() -> list[dict[str, Any]]:
     """Query parameters of one case, from the model of its JSON form."""
-    return [_parameter(name, name in models.Case.model_fields and name != "k") for name in _PARAMETER_SCHEMAS]
+    names = [name for name in _PARAMETER_SCHEMAS if name != "std"]
+    return [_parameter(name, name in models.Case.model_fields and name != "k") for name in names] + _std_parameters()
 
 
 def option_parameters() -> list[dict[str, Any]]:
     """Query parameters of a batch."""
-    return [_parameter(name, False) for name in ("include", "tolerance")]
+    return [_parameter(name, False) for name in ("include", "tolerance")] + _std_parameters()
+
+
+def _std_parameters() -> list[dict[str, Any]]:
+    schemas = models.InputStd.model_json_schema()["properties"]
+    return [
+        {
+            "name": f"std_{name}",
+            "in": "query",
+            "required": False,
+            "description": f"Standard deviation of {name} {schema['description']}, where include asks for std",
+            "schema": {"type": "number", "minimum": 0},
+        }
+        for name, schema in schemas.items()
+    ]
 
 
 def table_parameters() -> list[dict[str, Any]]:

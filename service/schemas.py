@@ -12,8 +12,10 @@ __all__ = [
     "CaseAnswer",
     "CaseRequest",
     "ColumnsAnswer",
+    "Gradient",
     "Groups",
     "Health",
+    "InputStd",
     "Limits",
     "Problem",
     "Result",
@@ -22,13 +24,15 @@ __all__ = [
     "TableLabel",
 ]
 
-Include = Literal["groups", "limits"]
-INCLUDES: tuple[Include, ...] = ("groups", "limits")
+Include = Literal["groups", "limits", "gradient", "std"]
+INCLUDES: tuple[Include, ...] = ("groups", "limits", "gradient", "std")
+_INCLUDE = f"More to compute: {', '.join(INCLUDES)}"
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 _K = "Tangential contact stiffness [N/m], finite and > 0; left out or null: rigid contact"
+_STD = "Standard deviations of the inputs; needed where include asks for std, and nowhere else"
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
@@ -46,13 +50,27 @@ class Case(BaseModel):
     v0: NotNegative = Field(description="Sliding velocity [m/s], finite and >= 0")
 
 
+class InputStd(BaseModel):
+    """Standard deviations of the inputs, in their units; independent errors are assumed."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    mu0: NotNegative = Field(0.0, description="[-]")
+    Fz: NotNegative = Field(0.0, description="[N]")
+    k: NotNegative = Field(0.0, description="[N/m]; means nothing where contact is rigid")
+    y0: NotNegative = Field(0.0, description="[m]")
+    omega: NotNegative = Field(0.0, description="[rad/s]")
+    v0: NotNegative = Field(0.0, description="[m/s]")
+
+
 class CaseRequest(Case):
     """One case, and what is wanted beside the default answer."""
 
-    include: list[Include] | None = Field(None, description="More to compute: groups, limits")
+    include: list[Include] | None = Field(None, description=_INCLUDE)
     tolerance: Positive | None = Field(
         None, description="Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
     )
+    std: InputStd | None = Field(None, description=_STD)
 
 
 class BatchColumns(BaseModel):
@@ -69,8 +87,9 @@ class BatchColumns(BaseModel):
     y0: float | list[float] = Field(description="[m], finite and >= 0")
     omega: float | list[float] = Field(description="[rad/s], finite and >= 0")
     v0: float | list[float] = Field(description="[m/s], finite and >= 0")
-    include: list[Include] | None = Field(None, description="More to compute: groups, limits")
+    include: list[Include] | None = Field(None, description=_INCLUDE)
     tolerance: Positive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
+    std: InputStd | None = Field(None, description=_STD)
 
 
 class TableLabel(BaseModel):
@@ -96,6 +115,17 @@ class Limits(BaseModel):
     mu_crit: float | None = Field(description="Macroscopic coefficient of friction at that border [-]")
 
 
+class Gradient(BaseModel):
+    """d mu_macro / d input.  null: not finite, or no such input (k of rigid contact)."""
+
+    mu0: float | None = Field(description="[-]")
+    Fz: float | None = Field(description="[1/N]")
+    k: float | None = Field(description="[m/N]")
+    y0: float | None = Field(description="[1/m]")
+    omega: float | None = Field(description="[s/rad]")
+    v0: float | None = Field(description="[s/m]")
+
+
 class Result(BaseModel):
     """What is known of one case."""
 
@@ -106,6 +136,8 @@ class Result(BaseModel):
     source: str = Field(description="Block of the table, or closed-form tail, that the value came from")
     groups: Groups | None = Field(None, description="Only if asked for")
     limits: Limits | None = Field(None, description="Only if asked for")
+    gradient: Gradient | None = Field(None, description="Only if asked for")
+    std: float | None = Field(None, description="Standard deviation of mu_macro [-], to first order; only if asked for")
 
 
 class CaseAnswer(Result):
@@ -140,6 +172,8 @@ class ColumnsAnswer(_BatchEnd):
     source: list[str | None]
     groups: dict[str, list[float | None]] | None = None
     limits: dict[str, list[float | None]] | None = None
+    gradient: dict[str, list[float | None]] | None = None
+    std: list[float | None] | None = None
 
 
 class RowsAnswer(_BatchEnd):

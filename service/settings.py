@@ -12,9 +12,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-__all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
+__all__ = ["PREFIX", "Settings", "SettingsError", "cache_control", "load_settings", "unknown_variables"]
 
 PREFIX = "MUMACRO_"
+_MAX_AGE_S = 3600
 
 
 class SettingsError(ValueError):
@@ -54,10 +55,14 @@ class Settings(BaseSettings):
     workers: int = Field(1, ge=1, le=256, description="an integer from 1 to 256")
     max_body_bytes: int = Field(16 * 2**20, ge=1024, le=2**31, description="an integer from 1024 to 2147483648")
     max_batch: int = Field(100_000, ge=1, le=10_000_000, description="an integer from 1 to 10000000")
+    max_batches: int = Field(16, ge=1, le=1024, description="an integer from 1 to 1024")
+    client_timeout_s: int = Field(30, ge=1, le=3600, description="an integer from 1 to 3600")
+    time_limit_s: int = Field(300, ge=1, le=86400, description="an integer from 1 to 86400")
     api_key: SecretStr | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
     log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
         "info", description="one of debug, info, warning, error, critical"
     )
+    drain_s: float = Field(1.0, ge=0, le=600, description="a number from 0 to 600")
     shutdown_grace_s: int = Field(10, ge=0, le=3600, description="an integer from 0 to 3600")
 
     @field_validator("log_level", mode="before")
@@ -74,6 +79,11 @@ class Settings(BaseSettings):
             if not (1 <= len(text) <= 512 and all("!" <= character <= "~" for character in text)):
                 raise ValueError("unusable key")
         return key
+
+
+def cache_control(settings: Settings) -> str:
+    """How long an answer may be kept, and by whom.  With an API key in force it is for its caller alone."""
+    return f"{'public' if settings.api_key is None else 'private'}, max-age={_MAX_AGE_S}"
 
 
 def load_settings(**chosen: Any) -> Settings:

@@ -3,14 +3,19 @@
 import logging
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from hashlib import blake2b
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+import orjson
 from starlette.requests import Request
 
 from friction import Surrogate, TableError
+from service import API_VERSION, __version__
 from service.errors import FieldFault, InvalidFieldsError, NotReadyError
+from service.metrics import source_place
 
 __all__ = ["LoadedTable", "Shelf", "shelf_of", "table_files"]
 
@@ -50,6 +55,7 @@ class LoadedTable:
 
     surrogate: Surrogate
     stamp: tuple[int, int, int]
+    metrics_place: int = 0  # where its answers are counted
 
     @classmethod
     def open(cls, path: Path) -> Self:
@@ -69,10 +75,26 @@ class LoadedTable:
         surrogate.self_check()
         return cls(surrogate, stamp)
 
-    @property
+    @cached_property
     def label(self) -> dict[str, object]:
         """What every reply says about the table that it came from."""
         return {"id": self.surrogate.id, "tolerance": self.surrogate.tolerance}
+
+    @cached_property
+    def fragment(self) -> orjson.Fragment:
+        """The label as JSON."""
+        return orjson.Fragment(orjson.dumps(self.label))
+
+    @cached_property
+    def tag_key(self) -> bytes:
+        """What entity tags depend on beside the question: this table, this version."""
+        text = repr((self.surrogate.checksum, self.surrogate.id, __version__, API_VERSION))
+        return blake2b(text.encode(), digest_size=32).digest()
+
+    @cached_property
+    def arrays(self) -> tuple[Any, ...]:
+        """The arrays that compiled loops walk through, in the order that ``friction.nondim.dimensional`` takes them."""
+        return self.surrogate._data
 
     @property
     def size_bytes(self) -> int:
@@ -104,6 +126,7 @@ class Shelf:
         self.paths = tuple(paths)
         self.tables: tuple[LoadedTable, ...] = ()
         self.fault: str | None = "the tables are not loaded yet"
+        self.draining = False
 
     def load(self) -> None:
         """Load everything.  A table that is refused makes the service not ready; it never stops the process."""
@@ -120,12 +143,15 @@ class Shelf:
             self.fault = "the tables could not be loaded; the log has the reason"
             _log.exception("no tables")
         else:
-            self.tables = tuple(sorted(tables, key=lambda table: (table.surrogate.tolerance, table.surrogate.id)))
+            tables.sort(key=lambda table: (table.surrogate.tolerance, table.surrogate.id))
+            self.tables = tuple(replace(table, metrics_place=source_place(i)) for i, table in enumerate(tables))
             self.fault = None
             _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in self.tables]}})
 
     def check(self) -> None:
-        """Raise NotReadyError unless every table would answer rightly now."""
+        """Raise NotReadyError unless every table would answer rightly now, and go on doing so."""
+        if self.draining:
+            raise NotReadyError("the service is stopping")
         self._loaded()
         try:
             for table in self.tables:

@@ -1,15 +1,20 @@
 """What the tests share: the committed tables, a service with its client, reference values, solvers, the builder."""
 
 import csv
+import http.client
 import importlib.util
 import os
 import re
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, Queue
 from types import ModuleType
 from typing import Any
 
@@ -24,6 +29,7 @@ from friction import Surrogate
 from service.app import create_app
 from service.settings import Settings
 
+START_S = 180  # a first start compiles the kernels
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
@@ -112,6 +118,84 @@ def live_server(
     finally:
         process.terminate()
         process.wait(timeout=60)
+
+
+class Server:
+    """A service process of this test's own, and what it logged."""
+
+    def __init__(self, repository, tables, arguments, environment):
+        command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(tables), *arguments]
+        variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
+        self.process = subprocess.Popen(
+            command,
+            cwd=repository,
+            env={**variables, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.lines = []
+        self._ports = Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        try:
+            self.port = self._ports.get(timeout=START_S)
+        except Empty:
+            self.port = None
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line)
+            found = re.search(r"running on http://[^ ]+:(\d+) ", line)
+            if found:
+                self._ports.put(int(found[1]))
+        self._ports.put(None)
+
+    def ask(self, method, path, body=None, headers=None, **options):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        try:
+            connection.request(method, path, body, headers or {}, **options)
+            response = connection.getresponse()
+            return response.status, dict(response.getheaders()), response.read()
+        finally:
+            connection.close()
+
+    def wait_for_workers(self):
+        """Wait until somebody listens: with several workers the port is known before that."""
+        deadline = time.monotonic() + START_S
+        while True:
+            try:
+                return self.ask("GET", "/livez")
+            except ConnectionRefusedError:
+                assert time.monotonic() < deadline, "".join(self.lines)
+                time.sleep(0.1)
+
+    def stop(self, number=signal.SIGTERM):
+        self.process.send_signal(number)
+        return self.wait()
+
+    def wait(self):
+        code = self.process.wait(timeout=60)
+        self._reader.join(timeout=60)
+        self.process.stdout.close()
+        return code
+
+
+@pytest.fixture(scope="session")
+def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
+    """A service process of one's own, for as long as the context lasts."""
+
+    @contextmanager
+    def serve(tables: Path, *arguments: str, **environment: str) -> Iterator[Server]:
+        server = Server(repository, tables, arguments, environment)
+        try:
+            assert server.port, "".join(server.lines)
+            yield server
+        finally:
+            if server.process.poll() is None:
+                server.stop(signal.SIGKILL)
+
+    return serve
 
 
 # --- what the numerical tests share -------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, limits of size."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -210,11 +209,19 @@ def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
             assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
 
 
-def test_too_many_waiting_batches_are_turned_away(tables_dir, case, problem):
-    app = create_app(Settings(tables=(tables_dir,)))
+def test_one_batch_too_many_is_turned_away_before_it_is_read(tables_dir, case, problem):
+    app = create_app(Settings(tables=(tables_dir,), max_batches=2))
     with TestClient(app) as client:
-        app.state.batch_limiter = SimpleNamespace(statistics=lambda: SimpleNamespace(tasks_waiting=1000))
-        response = client.post(PATH, json={**case, "v0": [0.1] * 10_000})
+        app.state.batches.running = 2
+
+        def pieces():
+            yield json.dumps({**case, "v0": [0.1] * 10_000}).encode()
+
+        response = client.post(PATH, content=b" " * 70_000)
         problem(response, 503)
         assert response.headers["retry-after"] == "1"
-        assert client.post(PATH, json=[case]).status_code == 200
+        problem(client.post(PATH, content=pieces()), 503)
+        assert client.post(PATH, json=[case]).status_code == 200  # a small one takes no place
+        app.state.batches.running = 0
+        assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
+        assert app.state.batches.running == 0

@@ -23,6 +23,7 @@ PATHS = {
     "/livez": "GET, HEAD",
     "/readyz": "GET, HEAD",
     "/healthz": "GET, HEAD",
+    "/metrics": "GET, HEAD",
     "/docs": "GET, HEAD",
     "/openapi.json": "GET, HEAD",
 }
@@ -187,7 +188,8 @@ def test_the_description_is_whole(client):
         assert unit in schemas["Case"]["properties"][name]["description"]
     parameters = document["paths"]["/v1/mu-macro"]["get"]["parameters"]
     assert {parameter["name"]: parameter["required"] for parameter in parameters} == {
-        "mu0": True, "Fz": True, "k": False, "y0": True, "omega": True, "v0": True, "include": False, "tolerance": False
+        "mu0": True, "Fz": True, "k": False, "y0": True, "omega": True, "v0": True, "include": False,
+        "tolerance": False, **dict.fromkeys(("std_mu0", "std_Fz", "std_k", "std_y0", "std_omega", "std_v0"), False),
     }  # fmt: skip
 
 

@@ -3,95 +3,21 @@
 import http.client
 import json
 import os
-import re
 import signal
 import socket
 import subprocess
 import sys
-import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from queue import Empty, Queue
 
 import pytest
 
-START_S = 180  # a first start compiles the kernels
-
-
-class Server:
-    """A service process of this test's own, and what it logged."""
-
-    def __init__(self, repository, tables, arguments, environment):
-        command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(tables), *arguments]
-        variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
-        self.process = subprocess.Popen(
-            command,
-            cwd=repository,
-            env={**variables, **environment},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.lines = []
-        self._ports = Queue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-        try:
-            self.port = self._ports.get(timeout=START_S)
-        except Empty:
-            self.port = None
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line)
-            found = re.search(r"running on http://[^ ]+:(\d+) ", line)
-            if found:
-                self._ports.put(int(found[1]))
-        self._ports.put(None)
-
-    def ask(self, method, path, body=None, headers=None, **options):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
-        try:
-            connection.request(method, path, body, headers or {}, **options)
-            response = connection.getresponse()
-            return response.status, dict(response.getheaders()), response.read()
-        finally:
-            connection.close()
-
-    def wait_for_workers(self):
-        """Wait until somebody listens: with several workers the port is known before that."""
-        deadline = time.monotonic() + START_S
-        while True:
-            try:
-                return self.ask("GET", "/livez")
-            except ConnectionRefusedError:
-                assert time.monotonic() < deadline, "".join(self.lines)
-                time.sleep(0.1)
-
-    def stop(self, number=signal.SIGTERM):
-        self.process.send_signal(number)
-        code = self.process.wait(timeout=60)
-        self._reader.join(timeout=60)
-        self.process.stdout.close()
-        return code
-
-
-@contextmanager
-def serving(repository, tables, *arguments, **environment):
-    server = Server(repository, tables, arguments, environment)
-    try:
-        assert server.port, "".join(server.lines)
-        yield server
-    finally:
-        if server.process.poll() is None:
-            server.stop(signal.SIGKILL)
+START_S = 180
 
 
 @pytest.fixture(scope="module")
-def server(repository, surrogate):
+def server(serving, surrogate):
     """One server for all tests that do not stop it."""
-    with serving(repository, surrogate.path, MUMACRO_MAX_BODY_BYTES="4096") as started:
+    with serving(surrogate.path, MUMACRO_MAX_BODY_BYTES="4096") as started:
         yield started
 
 
@@ -165,8 +91,8 @@ def test_what_is_no_http_does_not_hurt(server):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stop_that_was_asked_for_is_a_success(repository, surrogate, number):
-    with serving(repository, surrogate.path) as server:
+def test_a_stop_that_was_asked_for_is_a_success(serving, surrogate, number):
+    with serving(surrogate.path) as server:
         assert server.ask("GET", "/readyz")[0] == 200
         server.ask("GET", "/nowhere", headers={"X-Request-ID": "the-last"})
         assert server.stop(number) == 0
@@ -176,8 +102,8 @@ def test_a_stop_that_was_asked_for_is_a_success(repository, surrogate, number):
     assert (access["request_id"], access["status"], access["path"]) == ("the-last", 404, "/nowhere")
 
 
-def test_several_workers_serve_and_stop(repository, surrogate):
-    with serving(repository, surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
+def test_several_workers_serve_and_stop(serving, surrogate):
+    with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
         server.wait_for_workers()
         assert server.ask("GET", "/readyz")[0] == 200
         assert server.ask("GET", "/v1/table")[0] == 401
@@ -186,10 +112,10 @@ def test_several_workers_serve_and_stop(repository, surrogate):
     assert all(json.loads(line) for line in server.lines)
 
 
-def test_batches_at_once_are_all_answered(repository, surrogate, case):
+def test_batches_at_once_are_all_answered(serving, surrogate, case):
     # The layer that numba falls back on without OpenMP ends the process when two threads use it at once.
     body = json.dumps([{**case, "v0": 1e-4 * index} for index in range(2000)])
-    with serving(repository, surrogate.path, NUMBA_THREADING_LAYER="workqueue") as server:
+    with serving(surrogate.path, NUMBA_THREADING_LAYER="workqueue") as server:
         with ThreadPoolExecutor(8) as pool:
             answers = list(pool.map(lambda _: server.ask("POST", "/v1/mu-macro/batch", body), range(60)))
         assert {status for status, _, _ in answers} == {200}
@@ -197,9 +123,9 @@ def test_batches_at_once_are_all_answered(repository, surrogate, case):
         assert server.stop() == 0
 
 
-def test_a_damaged_table_starts_alive_and_not_ready(repository, tmp_path):
+def test_a_damaged_table_starts_alive_and_not_ready(serving, tmp_path):
     (tmp_path / "damaged.nc").write_bytes(b"damaged")
-    with serving(repository, tmp_path) as server:
+    with serving(tmp_path) as server:
         assert server.ask("GET", "/livez")[0] == 200
         status, headers, body = server.ask("GET", "/readyz")
         assert (status, headers["retry-after"]) == (503, "5")

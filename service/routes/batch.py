@@ -1,100 +1,334 @@
-"""Many cases at once: ``POST /v1/mu-macro/batch``, JSON columns or JSON rows."""
+"""Many cases at once: ``POST /v1/mu-macro/batch``, as JSON columns, JSON rows, NDJSON or an Arrow stream.
 
-from collections.abc import Callable
-from typing import Any
+A pure ASGI endpoint: it reads and writes the messages itself, so that an answer can begin before the last of its
+question has come, and so that no more of either is held than is being worked on.
+"""
 
-import anyio.to_thread
+import asyncio
+import zlib
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
 from fastapi import APIRouter
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
+from starlette.types import Message, Receive, Scope, Send
 
-from service.answers import answer_batch, signature
-from service.codecs import columns_from_json, encode_columns, encode_rows, rows_from_json
-from service.errors import FieldFault, InvalidFieldsError, OverloadedError
-from service.intake import Options, options_from, options_from_query, parse_json, read_body
-from service.openapi import describe_json, option_parameters
-from service.shelf import LoadedTable, shelf_of
+from friction.errors import MumacroError
+from friction.regions import SOURCES
+from service.answers import Answers, answer_cases, signature
+from service.codecs import columns_text, is_rows, read_batch, row_text, rows_text, terminated
+from service.errors import (
+    BodyTooLargeError,
+    MalformedBodyError,
+    OverloadedError,
+    RequestError,
+    SlowClientError,
+    TookTooLongError,
+    problem_of,
+)
+from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
+from service.metrics import Metrics
+from service.middleware import BATCH_PATH
+from service.openapi import batch_bodies, describe_batch, option_parameters
+from service.settings import Settings
+from service.shelf import LoadedTable, Shelf
 
-__all__ = ["router"]
+__all__ = ["BatchEndpoint", "router"]
 
 router = APIRouter(tags=["answers"])
+T = TypeVar("T")
 
-# A batch up to this size takes less time than a thread's round trip is worth.
-_SMALL_BATCH = 256
-_MAX_WAITING = 32
+_CLOSE = {"Connection": "close"}
+
+_SMALL = 64 * 1024  # bytes of a batch that is answered at once: it takes less than a millisecond
+_STREAM_SMALL = 256 * 1024
+_PIECE = 256 * 1024  # bytes that are handed to the connection at a time
+_COMPRESS_FROM = 16 * 1024
+
+
+class Budget:
+    """Time that is left for one request, and for the caller's next move."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._total = settings.time_limit_s
+        self._end = self._loop.time() + self._total
+        self.client_s = settings.client_timeout_s
+
+    async def client(self, move: Awaitable[T], deadline: float | None = None) -> T:
+        """Wait for the caller's move, until ``deadline`` or for as long as a caller may take."""
+        try:
+            async with asyncio.timeout_at(min(self._end, deadline or self.deadline())):
+                return await move
+        except TimeoutError:
+            if self._loop.time() >= self._end:
+                raise TookTooLongError(f"a batch may take up to {self._total} s", headers=_CLOSE) from None
+            raise SlowClientError(f"a caller may take up to {self.client_s} s", headers=_CLOSE) from None
+
+    def deadline(self) -> float:
+        """Until when a move that begins now has to be made."""
+        return self._loop.time() + self.client_s
+
+
+class BatchEndpoint:
+    """Answers batches; holds what they share: places, threads, counters."""
+
+    def __init__(self, shelf: Shelf, settings: Settings, metrics: Metrics) -> None:
+        self._shelf = shelf
+        self._settings = settings
+        self._metrics = metrics
+        self._threads: ThreadPoolExecutor | None = None
+        self.running = 0
+
+    def start(self, threads: ThreadPoolExecutor) -> None:
+        """Take over the threads that large batches run in."""
+        self._threads = threads
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Run one request."""
+        request = Request(scope)
+        started = False
+
+        async def send_noted(message: Message) -> None:
+            nonlocal started
+            started = True
+            await send(message)
+
+        try:
+            kind = media_type(request, (JSON, NDJSON, ARROW))
+            options = options_from_query(request)
+            budget = Budget(self._settings)
+            given = request.headers.get("content-length", "")
+            length = int(given) if given.isdigit() else -1
+            async with self._place(length):
+                if kind == NDJSON:
+                    await self._stream(request, receive, send_noted, options, budget)
+                else:
+                    await self._whole(request, receive, send_noted, options, budget, kind, length)
+        except MumacroError as error:
+            if started:
+                raise ClientDisconnect from error  # nothing but the end of the connection can say it now
+            await problem_of(error, scope["path"])(scope, receive, send)
+
+    @asynccontextmanager
+    async def _place(self, length: int) -> AsyncIterator[None]:
+        if 0 <= length <= _SMALL:
+            yield
+            return
+        if self.running >= self._settings.max_batches:
+            raise OverloadedError(f"{self.running} large batches are being answered already", headers=_CLOSE)
+        self.running += 1
+        try:
+            yield
+        finally:
+            self.running -= 1
+
+    async def _run(self, size: int, work: Callable[[], T]) -> T:
+        """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
+        if size <= _SMALL or self._threads is None:
+            return work()
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+
+    # --- bodies that are read whole -------------------------------------------------------------------
+
+    async def _whole(
+        self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget, kind: str, length: int
+    ) -> None:
+        body = await self._body(length, receive, budget)
+        if not body:
+            raise MalformedBodyError("the body is empty")
+        size = len(body)
+        if kind == ARROW:
+            from service.arrow import answer_arrow
+
+            query, place = merged_options(query, {})
+            table = self._shelf.pick(query.tolerance, place)
+            pieces = answer_arrow(body, table, query, self._settings.max_batch, self._count)
+        else:
+            pieces = await self._run(size, lambda: self._answer(body, query))
+        await self._send(request, send, kind, size, _gather(pieces), budget)
+
+    async def _body(self, length: int, receive: Receive, budget: Budget) -> bytearray:
+        body = bytearray()
+        limit = self._settings.max_body_bytes
+        if length > limit:
+            raise BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+        deadline = budget.deadline()
+        more = True
+        while more:
+            message = await budget.client(receive(), deadline)
+            if message["type"] != "http.request":
+                raise ClientDisconnect
+            body += message.get("body", b"")
+            more = message.get("more_body", False)
+            if len(body) > limit:
+                raise BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+        return body
+
+    def _answer(self, body: bytes | bytearray, query: Options, *, line: bool = False) -> Iterator[bytes]:
+        """Answer one JSON text; what is returned writes it, piece by piece."""
+        text, view = terminated(body)
+        rows = is_rows(text)
+        cases, given = read_batch(text, view, self._settings.max_batch)
+        options, place = merged_options(query, given)
+        table = self._shelf.pick(options.tolerance, place)
+        answers = answer_cases(table, cases, options.include, options.std)
+        self._count(table, answers)
+        if line and not rows and not cases.listed:
+            return row_text(answers, signature(table))
+        return (rows_text if rows else columns_text)(answers, signature(table))
+
+    def _count(self, table: LoadedTable, answers: Answers) -> None:
+        by_source = np.bincount(answers.source + 1, minlength=len(SOURCES) + 1)[1:].tolist()
+        self._metrics.count_cases(table.metrics_place, by_source, answers.n_bad)
+
+    async def _send(
+        self, request: Request, send: Send, kind: str, size: int, pieces: Iterator[bytes], budget: Budget
+    ) -> None:
+        """Send the pieces, no faster than the caller takes them."""
+        piece = await self._run(size, lambda: next(pieces, b""))
+        following = await self._run(size, lambda: next(pieces, None))
+        headers = [(b"content-type", kind.encode("ascii"))]
+        packer = Packer() if len(piece) >= _COMPRESS_FROM and _wants_gzip(request) else None
+        if packer is not None:
+            headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
+        elif following is None:
+            headers.append((b"content-length", b"%d" % len(piece)))
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        while True:
+            last = following is None
+            if packer is not None:
+                piece = await self._run(len(piece), partial(packer.pack, piece, last=last))
+            await budget.client(send({"type": "http.response.body", "body": piece, "more_body": not last}))
+            if following is None:
+                return
+            piece = following
+            following = await self._run(size, lambda: next(pieces, None))
+
+    # --- streams --------------------------------------------------------------------------------------
+
+    async def _stream(self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget) -> None:
+        """Answer line by line, each as soon as it is there: what is held does not grow with the stream."""
+        self._shelf.pick(query.tolerance, "parameter")  # refused before the first byte, if at all
+        headers = [(b"content-type", NDJSON.encode("ascii"))]
+        packer = Packer() if _wants_gzip(request) else None
+        if packer is not None:
+            headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        number = 0
+        async for lines in self._lines(receive, budget):
+            work = partial(self._answer_lines, lines, number, query, packer)
+            answer = await self._run(0 if len(lines) <= _STREAM_SMALL else len(lines), work)
+            number += lines.count(b"\n")
+            await budget.client(send({"type": "http.response.body", "body": answer, "more_body": True}))
+        end = b"" if packer is None else packer.pack(b"", last=True)
+        await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
+
+    async def _lines(self, receive: Receive, budget: Budget) -> AsyncIterator[bytes]:
+        """Yield whole lines, one or several at a time."""
+        limit = self._settings.max_body_bytes
+        rest = bytearray()
+        deadline = budget.deadline()
+        more = True
+        while more:
+            message = await budget.client(receive(), deadline)
+            if message["type"] != "http.request":
+                raise ClientDisconnect
+            more = message.get("more_body", False)
+            piece = message.get("body", b"")
+            end = piece.rfind(b"\n") + 1
+            if not end:
+                rest += piece
+                if len(rest) > limit:
+                    raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+                continue
+            rest += piece[:end]
+            yield bytes(rest)
+            rest = bytearray(piece[end:])
+            deadline = budget.deadline()
+        if rest.strip():
+            rest += b"\n"
+            yield bytes(rest)
+
+    def _answer_lines(self, lines: bytes, number: int, query: Options, packer: "Packer | None") -> bytes:
+        answers = bytearray()
+        for line in lines.split(b"\n"):
+            number += 1
+            if line.isspace() or not line:
+                continue
+            try:
+                for piece in self._answer(line, query, line=True):
+                    answers += piece
+            except RequestError as error:
+                answers += bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body)
+            answers += b"\n"
+        return bytes(answers) if packer is None else packer.pack(bytes(answers), flush=True)
+
+
+class Packer:
+    """gzip, at the level that costs least."""
+
+    def __init__(self) -> None:
+        self._packer = zlib.compressobj(1, zlib.DEFLATED, 31)
+
+    def pack(self, piece: bytes, *, last: bool = False, flush: bool = False) -> bytes:
+        """Return what can be sent after this piece."""
+        packed = self._packer.compress(piece)
+        if last or flush:
+            packed += self._packer.flush(zlib.Z_FINISH if last else zlib.Z_SYNC_FLUSH)
+        return packed
+
+
+def _wants_gzip(request: Request) -> bool:
+    for offer in request.headers.get("accept-encoding", "").lower().split(","):
+        name, _, parameters = offer.partition(";")
+        if name.strip() in ("gzip", "*"):
+            return parameters.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
+    return False
+
+
+def _gather(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    """The same bytes in pieces of a size that is worth a message."""
+    gathered = bytearray()
+    for piece in pieces:
+        gathered += piece
+        if len(gathered) >= _PIECE:
+            yield bytes(gathered)
+            gathered.clear()
+    if gathered:
+        yield bytes(gathered)
+
+
+class Direct(Response):
+    """Lets the router's route end in the endpoint itself."""
+
+    def __init__(self, endpoint: BatchEndpoint) -> None:
+        self._endpoint = endpoint
+        self.background = None
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Run the endpoint."""
+        await self._endpoint(scope, receive, send)
 
 
 @router.post(
-    "/v1/mu-macro/batch",
+    BATCH_PATH,
     operation_id="post_mu_macro_batch",
     summary="Macroscopic friction of many cases",
     response_class=Response,
-    openapi_extra={
-        "parameters": option_parameters(),
-        "requestBody": {
-            "required": True,
-            "content": {
-                "application/json": {
-                    "schema": {
-                        "oneOf": [
-                            {"$ref": "#/components/schemas/BatchColumns"},
-                            {"type": "array", "items": {"$ref": "#/components/schemas/Case"}},
-                        ]
-                    }
-                }
-            },
-        },
-    },
-    responses=describe_json(("ColumnsAnswer", "RowsAnswer"), 400, 401, 413, 415, 422, 503),
+    openapi_extra={"parameters": option_parameters(), "requestBody": batch_bodies()},
+    responses=describe_batch(),
 )
 async def post_batch(request: Request) -> Response:
-    """Answer in the form that was asked in, order kept.  A bad case has the result null and an entry in ``errors``."""
-    options = options_from_query(request)
-    body = await parse_json(await read_body(request))
-    place = "parameter"
-    if isinstance(body, dict):
-        options, place = _merged(options, body)
-    elif not isinstance(body, list):
-        fault = FieldFault("body", "must be an object of columns or a list of rows", body, path=())
-        raise InvalidFieldsError("the body must be an object of columns or a list of rows", [fault])
-    table = shelf_of(request).pick(options.tolerance, place)
-    max_batch: int = request.app.state.settings.max_batch
-    content = await _run(request, _size(body), lambda: _answer(table, body, options, max_batch))
-    return Response(content, media_type="application/json")
+    """Answer in the form that was asked in, order kept.  A bad case has the result null and an entry in ``errors``.
 
-
-def _merged(query: Options, body: dict[str, Any]) -> tuple[Options, str]:
-    own = options_from(body, "pointer")
-    given = {"include": query.include, "tolerance": query.tolerance}
-    twice = [name for name, value in given.items() if value and body.get(name) is not None]
-    if twice:
-        faults = [FieldFault(name, "is given in the query and in the body", body[name]) for name in twice]
-        raise InvalidFieldsError(f"{twice[0]} is given in the query and in the body", faults)
-    place = "pointer" if query.tolerance is None else "parameter"
-    return Options(own.include or query.include, own.tolerance or query.tolerance), place
-
-
-def _size(body: Any) -> int:
-    if isinstance(body, list):
-        return len(body)
-    return max((len(column) for column in body.values() if isinstance(column, list)), default=1)
-
-
-def _answer(table: LoadedTable, body: Any, options: Options, max_batch: int) -> bytes:
-    if isinstance(body, list):
-        batch, write = rows_from_json(body, max_batch), encode_rows
-    else:
-        batch, write = columns_from_json(body, max_batch), encode_columns
-    answers = answer_batch(table.surrogate, batch, options.include)
-    return write(answers, batch, signature(table))
-
-
-async def _run(request: Request, size: int, work: Callable[[], bytes]) -> bytes:
-    """Run a large batch in a worker thread, so that short requests are not kept waiting behind it."""
-    if size <= _SMALL_BATCH:
-        return work()
-    limiter = request.app.state.batch_limiter
-    waiting = limiter.statistics().tasks_waiting
-    if waiting >= _MAX_WAITING:
-        raise OverloadedError(f"{waiting} large batches are waiting already")
-    return await anyio.to_thread.run_sync(work, limiter=limiter)
+    A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
+    Read the answer while you send, or the stream stands still.
+    """
+    endpoint: BatchEndpoint = request.app.state.batches
+    return Direct(endpoint)

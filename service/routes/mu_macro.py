@@ -5,16 +5,17 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from service.answers import answer_case, case_etag
-from service.codecs import encode_case
+from service.codecs import encode
 from service.intake import canonical, case_from_body, case_from_query, read_body, refuse_query
+from service.metrics import Metrics
 from service.openapi import case_parameters, describe_json
-from service.shelf import shelf_of
+from service.schemas import CaseRequest
+from service.settings import cache_control
+from service.shelf import LoadedTable, shelf_of
 
 __all__ = ["etag_matches", "router"]
 
 router = APIRouter(tags=["answers"])
-
-_MAX_AGE_S = 3600
 
 
 def etag_matches(request: Request, etag: str) -> bool:
@@ -23,6 +24,13 @@ def etag_matches(request: Request, etag: str) -> bool:
     if offered is None:
         return False
     return offered.strip() == "*" or etag in (part.strip().removeprefix("W/") for part in offered.split(","))
+
+
+def _answer(request: Request, table: LoadedTable, case: CaseRequest) -> bytes:
+    values, source = answer_case(table, case, canonical(case.include))
+    metrics: Metrics = request.app.state.metrics
+    metrics.cells[table.metrics_place + source] += 1.0
+    return encode(values)
 
 
 @router.head("/v1/mu-macro", include_in_schema=False)
@@ -40,12 +48,10 @@ async def get_mu_macro(request: Request) -> Response:
     table = shelf_of(request).pick(case.tolerance, "parameter")
     include = canonical(case.include)
     etag = case_etag(table, case, include)
-    # With an API key in force an answer is for its caller alone.
-    scope = "public" if request.app.state.settings.api_key is None else "private"
-    headers = {"ETag": etag, "Cache-Control": f"{scope}, max-age={_MAX_AGE_S}"}
+    headers = {"ETag": etag, "Cache-Control": cache_control(request.app.state.settings)}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
-    return Response(encode_case(answer_case(table, case, include)), headers=headers, media_type="application/json")
+    return Response(_answer(request, table, case), headers=headers, media_type="application/json")
 
 
 @router.post(
@@ -66,4 +72,4 @@ async def post_mu_macro(request: Request) -> Response:
     refuse_query(request)
     case = case_from_body(await read_body(request))
     table = shelf_of(request).pick(case.tolerance)
-    return Response(encode_case(answer_case(table, case, canonical(case.include))), media_type="application/json")
+    return Response(_answer(request, table, case), media_type="application/json")

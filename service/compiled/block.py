@@ -1,0 +1,167 @@
+"""The compiled middle of a batch: columns -> answers and faults, answers -> text; without the interpreter's lock."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from friction.nondim import dimensional
+from service.compiled.digits import Bytes, write_number
+from service.compiled.scan import MISSING, NOT_A_NUMBER
+
+__all__ = [
+    "BOUND_FLAW",
+    "MISSING_FLAW",
+    "NUMBER_FLAW",
+    "evaluate_cases",
+    "write_names",
+    "write_numbers",
+    "write_rows",
+]
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+Flaws = NDArray[np.uint8]
+
+#: what is wrong with a case, plus the index of its field: not there, no number, out of bounds
+MISSING_FLAW, NUMBER_FLAW, BOUND_FLAW = 10, 20, 30
+
+
+@njit(cache=True, nogil=True)
+def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -> int:
+    """First fault of a case that has one: what is missing before what is no number before what is out of bounds."""
+    values = (mu0, fz, k, y0, omega, v0)
+    for field in range(6):
+        if np.float64(values[field]).view(np.uint64) == MISSING:
+            return MISSING_FLAW + field
+    for field in range(6):
+        if np.float64(values[field]).view(np.uint64) == NOT_A_NUMBER:
+            return NUMBER_FLAW + field
+    for field in range(6):
+        x = values[field]
+        if not (x > 0.0 or (x == 0.0 and field > 2)) or (x == np.inf and field != 2):
+            return BOUND_FLAW + field
+    return 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def evaluate_cases(
+    mu0: Array, fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+    mu_macro: Array, mu_ratio: Array, bound: Array, source: Codes, v_tilde: Array, y_tilde: Array, flaws: Flaws,
+) -> int:  # fmt: skip
+    """Answer n cases; return how many are bad.
+
+    Columns have the size n, or 1 where one value holds for all; k = inf is rigid contact.  A bad case gets its code in
+    ``flaws`` unless it has one already, NaN in the answers and -1 in ``source``.
+    """
+    s0, s1, s2 = min(mu0.size - 1, 1), min(fz.size - 1, 1), min(k.size - 1, 1)
+    s3, s4, s5 = min(y0.size - 1, 1), min(omega.size - 1, 1), min(v0.size - 1, 1)
+    bad = 0
+    inf = np.inf
+    for i in range(flaws.size):
+        a, b, c, d, e, f = mu0[i * s0], fz[i * s1], k[i * s2], y0[i * s3], omega[i * s4], v0[i * s5]
+        if (
+            flaws[i] == 0
+            and 0.0 < a < inf
+            and 0.0 < b < inf
+            and c > 0.0
+            and 0.0 <= d < inf
+            and 0.0 <= e < inf
+            and 0.0 <= f < inf
+        ):
+            mu, eps, code, v, y = dimensional(a, b, c, d, e, f, coef, meta, bcoef, bmeta)
+            mu_macro[i] = a * mu
+            mu_ratio[i] = mu
+            bound[i] = a * eps
+            source[i] = code
+            v_tilde[i] = v
+            y_tilde[i] = y
+        else:
+            bad += 1
+            if flaws[i] == 0:
+                flaws[i] = _flaw(a, b, c, d, e, f)
+            mu_macro[i] = np.nan
+            mu_ratio[i] = np.nan
+            bound[i] = np.nan
+            source[i] = -1
+            v_tilde[i] = np.nan
+            y_tilde[i] = np.nan
+    return bad
+
+
+@njit(cache=True, nogil=True)
+def _copy(out: Bytes, p: int, text: Bytes, start: int, stop: int) -> int:
+    for i in range(start, stop):
+        out[p] = text[i]
+        p += 1
+    return p
+
+
+@njit(cache=True, nogil=True)
+def write_numbers(out: Bytes, p: int, values: Array) -> int:
+    """Write the values with a comma behind each; null for what is not finite."""
+    for i in range(values.size):
+        p = write_number(out, p, values[i])
+        out[p] = 44
+        p += 1
+    return p
+
+
+@njit(cache=True, nogil=True)
+def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np.int64]) -> int:
+    """Write ``names[ends[c]:ends[c + 1]]`` of each code with a comma behind it; null for a negative code."""
+    for i in range(codes.size):
+        c = codes[i]
+        if c < 0:
+            out[p], out[p + 1], out[p + 2], out[p + 3] = 110, 117, 108, 108
+            p += 4
+        else:
+            p = _copy(out, p, names, ends[c], ends[c + 1])
+        out[p] = 44
+        p += 1
+    return p
+
+
+@njit(cache=True, nogil=True)
+def write_rows(
+    out: Bytes,
+    p: int,
+    flaws: Flaws,
+    pieces: Bytes,
+    piece_ends: NDArray[np.int64],
+    numbers: NDArray[np.float64],
+    codes: Codes,
+    regimes: Bytes,
+    regime_ends: NDArray[np.int64],
+    sources: Bytes,
+    source_ends: NDArray[np.int64],
+) -> int:
+    """Write one object a case with a comma behind it, null for a bad case.
+
+    ``pieces`` is the constant text: before mu_macro, mu_ratio, regime, error_bound and source, before each further
+    number, and at the end.  ``numbers`` (columns, n): mu_macro, mu_ratio, error_bound, further numbers.
+    """
+    for i in range(flaws.size):
+        if flaws[i] != 0:
+            out[p], out[p + 1], out[p + 2], out[p + 3] = 110, 117, 108, 108
+            p += 4
+        else:
+            p = _copy(out, p, pieces, piece_ends[0], piece_ends[1])
+            p = write_number(out, p, numbers[0, i])
+            p = _copy(out, p, pieces, piece_ends[1], piece_ends[2])
+            p = write_number(out, p, numbers[1, i])
+            p = _copy(out, p, pieces, piece_ends[2], piece_ends[3])
+            c = codes[i]
+            p = _copy(out, p, regimes, regime_ends[c], regime_ends[c + 1])
+            p = _copy(out, p, pieces, piece_ends[3], piece_ends[4])
+            p = write_number(out, p, numbers[2, i])
+            p = _copy(out, p, pieces, piece_ends[4], piece_ends[5])
+            p = _copy(out, p, sources, source_ends[c], source_ends[c + 1])
+            for j in range(3, numbers.shape[0]):
+                p = _copy(out, p, pieces, piece_ends[j + 2], piece_ends[j + 3])
+                p = write_number(out, p, numbers[j, i])
+            last = piece_ends.size - 2
+            p = _copy(out, p, pieces, piece_ends[last], piece_ends[last + 1])
+        out[p] = 44
+        p += 1
+    return p

@@ -1,0 +1,331 @@
+"""Decimal text <-> double, compiled: exactly rounded both ways, without the interpreter's lock.
+
+Reading is the algorithm of Eisel and Lemire (D. Lemire, "Number parsing at a gigabyte per second", Software: Practice
+and Experience 51, 2021), writing is Schubfach (R. Giulietti, "The Schubfach way to render doubles", 2020): the
+shortest text that reads back as the same number.  Text is a uint8 array that ends in a 0 byte, which is part of no
+JSON token: every loop here stops there at the latest.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = [
+    "HARD",
+    "MALFORMED",
+    "NO_NUMBER",
+    "NUMBER",
+    "OUT_OF_RANGE",
+    "TEXT_WIDTH",
+    "Bytes",
+    "read_number",
+    "write_digits",
+    "write_number",
+]
+
+Bytes = NDArray[np.uint8]
+
+#: what :func:`read_number` met: a number; NaN, Infinity or beyond double range; more digits than 64 bits hold
+#: (left to the caller); no number at all; something that JSON has not
+NUMBER, OUT_OF_RANGE, HARD, NO_NUMBER, MALFORMED = 0, 1, 2, 3, 4
+#: bytes that :func:`write_number` writes at most
+TEXT_WIDTH = 25
+
+_U = np.uint64
+_U0, _U1, _U2, _U3, _U4, _U10, _U11 = _U(0), _U(1), _U(2), _U(3), _U(4), _U(10), _U(11)
+_S52, _S53, _S63, _S64 = _U(52), _U(53), _U(63), _U(64)
+_U40, _U100 = _U(40), _U(100)
+_LOW32, _S32 = _U(0xFFFFFFFF), _U(32)
+_HIDDEN, _FRACTION, _EXPONENT = _U(1 << 52), _U((1 << 52) - 1), _U(0x7FF)
+_MASK9 = _U(0x1FF)
+
+_SMALLEST, _LARGEST = -342, 308  # decimal exponents of reading
+_FIRST, _LAST = -292, 324  # decimal exponents of writing
+
+
+def _powers_of_five() -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """5^q for reading, 128 bits with the first one set, truncated; reciprocals one unit above."""
+    rows = []
+    for q in range(_SMALLEST, _LARGEST + 1):
+        power = 5 ** abs(q)
+        if q < 0:
+            bits = (power - 1).bit_length()
+            value = 2 ** (bits + 127 if q >= -27 else 2 * bits + 128) // power + 1
+        else:
+            value = power << 128 >> 1
+        value = value << 128 >> value.bit_length() if value.bit_length() < 128 else value >> (value.bit_length() - 128)
+        rows.append((value >> 64, value & (2**64 - 1)))
+    table = np.array(rows, dtype=np.uint64)
+    return table[:, 0].copy(), table[:, 1].copy()
+
+
+def _powers_of_ten() -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """10^k for writing, 128 bits with the first one set, rounded up."""
+    rows = []
+    for k in range(_FIRST, _LAST + 1):
+        value = -(-(1 << (129 + (10**-k).bit_length())) // 10**-k) if k < 0 else 10**k << 128
+        shift = value.bit_length() - 128
+        value = -(-value >> shift)
+        rows.append((value >> 64, value & (2**64 - 1)))
+    table = np.array(rows, dtype=np.uint64)
+    return table[:, 0].copy(), table[:, 1].copy()
+
+
+_FIVE_HIGH, _FIVE_LOW = _powers_of_five()
+_TEN_HIGH, _TEN_LOW = _powers_of_ten()
+_PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).copy()
+
+
+@njit(cache=True, nogil=True)
+def _high(a: np.uint64, b: np.uint64) -> np.uint64:
+    """Upper 64 bits of the product."""
+    a0, a1, b0, b1 = a & _LOW32, a >> _S32, b & _LOW32, b >> _S32
+    low, cross, other = a0 * b0, a1 * b0, a0 * b1
+    middle = (low >> _S32) + (cross & _LOW32) + (other & _LOW32)
+    return a1 * b1 + (cross >> _S32) + (other >> _S32) + (middle >> _S32)
+
+
+@njit(cache=True, nogil=True)
+def _leading_zeros(w: np.uint64) -> int:
+    n = 0
+    for step in (32, 16, 8, 4, 2, 1):
+        if w >> _U(64 - step) == _U0:
+            n += step
+            w = w << _U(step)
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _double(w: np.uint64, q: int) -> np.uint64:
+    """Bits of w 10^q, w > 0, rounded to nearest even; those of infinity when it is beyond range."""
+    if q < _SMALLEST:
+        return _U0
+    if q > _LARGEST:
+        return _EXPONENT << _S52
+    shift = _leading_zeros(w)
+    w = w << _U(shift)
+    row = q - _SMALLEST
+    low, high = w * _FIVE_HIGH[row], _high(w, _FIVE_HIGH[row])
+    if high & _MASK9 == _MASK9:  # only then can the lower half of the power matter
+        more = _high(w, _FIVE_LOW[row])
+        low = low + more
+        if more > low:
+            high = high + _U1
+    upper = high >> _S63
+    down = upper + _U(9)
+    mantissa = high >> down
+    exponent = ((217706 * q) >> 16) + 63 + int(upper) - shift + 1023
+    if exponent <= 0:
+        if exponent <= -63:
+            return _U0
+        mantissa = mantissa >> _U(1 - exponent)
+        return (mantissa + (mantissa & _U1)) >> _U1  # reaching 2^52 it is the smallest normal number by itself
+    if low <= _U1 and -4 <= q <= 23 and mantissa & _U3 == _U1 and mantissa << down == high:
+        mantissa = mantissa ^ _U1  # exactly between two doubles: to the even one
+    mantissa = (mantissa + (mantissa & _U1)) >> _U1
+    if mantissa >= _HIDDEN << _U1:
+        mantissa = _HIDDEN
+        exponent += 1
+    if exponent >= 0x7FF:
+        return _EXPONENT << _S52
+    return (mantissa & _FRACTION) | (_U(exponent) << _S52)
+
+
+@njit(cache=True, nogil=True)
+def _significant(text: Bytes, i: int, end: int) -> int:
+    """Digits of the number in text[i:end] from the first that is not 0, up to its exponent."""
+    count = 0
+    while i < end:
+        c = text[i]
+        if c == 101 or c == 69:
+            break
+        if 48 <= c <= 57 and (count > 0 or c != 48):
+            count += 1
+        i += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _matches(text: Bytes, i: int, word: bytes) -> bool:
+    # One byte after another: the text's last 0 differs from every word, so nothing behind it is looked at.
+    for j in range(len(word)):  # noqa: SIM110  (compiled code has no generators)
+        if text[i + j] != word[j]:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
+    """(bits of the double, index behind it, what it was) of the JSON number that begins at ``i``.
+
+    NaN, Infinity and -Infinity count as numbers out of range.  Bits are meaningful for NUMBER only.
+    """
+    start = i
+    negative = text[i] == 45
+    if negative:
+        i += 1
+    c = text[i]
+    w = _U0
+    if c == 48:
+        i += 1
+        if 48 <= text[i] <= 57:
+            return _U0, i, MALFORMED
+    elif 49 <= c <= 57:
+        while 48 <= text[i] <= 57:
+            w = w * _U10 + _U(text[i] - 48)
+            i += 1
+    elif c == 78 and not negative and _matches(text, i, b"NaN"):
+        return _U0, i + 3, OUT_OF_RANGE
+    elif c == 73 and _matches(text, i, b"Infinity"):
+        return _U0, i + 8, OUT_OF_RANGE
+    else:
+        return _U0, i, MALFORMED if negative else NO_NUMBER
+    q = 0
+    if text[i] == 46:
+        i += 1
+        first = i
+        while 48 <= text[i] <= 57:
+            w = w * _U10 + _U(text[i] - 48)
+            i += 1
+        if i == first:
+            return _U0, i, MALFORMED
+        q = first - i
+    many = i - start > 19
+    if text[i] == 101 or text[i] == 69:
+        i += 1
+        minus = text[i] == 45
+        if minus or text[i] == 43:
+            i += 1
+        if not 48 <= text[i] <= 57:
+            return _U0, i, MALFORMED
+        exponent = 0
+        while 48 <= text[i] <= 57:
+            if exponent < 100_000_000:
+                exponent = 10 * exponent + int(text[i] - 48)
+            i += 1
+        q += -exponent if minus else exponent
+    if many and _significant(text, start, i) > 19:
+        return _U0, i, HARD
+    bits = _U0 if w == _U0 else _double(w, q)
+    if bits >> _S52 == _EXPONENT:
+        return _U0, i, OUT_OF_RANGE
+    if negative:
+        bits = bits | (_U1 << _S63)
+    return bits, i, NUMBER
+
+
+@njit(cache=True, nogil=True)
+def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
+    y0 = high * c + _high(low, c)
+    y1 = _high(high, c)
+    if y0 < high * c:
+        y1 = y1 + _U1
+    return y1 | (_U1 if y0 > _U1 else _U0)
+
+
+@njit(cache=True, nogil=True)
+def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
+    """(digits, k) with the shortest digits 10^k that round to the positive, finite double of these bits."""
+    fraction, biased = bits & _FRACTION, int((bits >> _S52) & _EXPONENT)
+    if biased != 0:
+        c, q = fraction | _HIDDEN, biased - 1075
+        if 0 <= -q < 53 and c & ((_U1 << _U(-q)) - _U1) == _U0:
+            return c >> _U(-q), 0
+    else:
+        c, q = fraction, -1074
+    odd = c & _U1
+    closer = fraction == _U0 and biased > 1
+    k = (q * 1262611 - (524031 if closer else 0)) >> 22
+    h = _U(q + ((-k * 1741647) >> 19) + 1)
+    high, low = _TEN_HIGH[-k - _FIRST], _TEN_LOW[-k - _FIRST]
+    left = _U4 * c - (_U1 if closer else _U2)
+    lower = _round_to_odd(high, low, left << h) + odd
+    middle = _round_to_odd(high, low, (_U4 * c) << h)
+    upper = _round_to_odd(high, low, (_U4 * c + _U2) << h) - odd
+    s = middle >> _U2
+    if s >= _U10:
+        tens = s // _U10
+        below, above = lower <= _U40 * tens, _U40 * tens + _U40 <= upper
+        if below != above:
+            return (tens + _U1 if above else tens), k + 1
+    below, above = lower <= _U4 * s, _U4 * s + _U4 <= upper
+    if below != above:
+        return (s + _U1 if above else s), k
+    half = _U4 * s + _U2
+    return (s + _U1 if middle > half or (middle == half and s & _U1 == _U1) else s), k
+
+
+@njit(cache=True, nogil=True)
+def write_digits(out: Bytes, p: int, value: np.uint64, count: int) -> int:
+    """Write ``value`` with ``count`` digits; return the index behind them."""
+    i = p + count
+    while i > p + 1:
+        pair = int(value % _U100) * 2
+        value = value // _U100
+        i -= 2
+        out[i], out[i + 1] = _PAIRS[pair], _PAIRS[pair + 1]
+    if i > p:
+        out[p] = np.uint8(48 + value)
+    return p + count
+
+
+@njit(cache=True, nogil=True)
+def write_number(out: Bytes, p: int, x: float) -> int:
+    """Write one number, or null for what is not finite; return the index behind it."""
+    bits = np.float64(x).view(np.uint64)
+    if (bits >> _S52) & _EXPONENT == _EXPONENT:
+        out[p], out[p + 1], out[p + 2], out[p + 3] = 110, 117, 108, 108
+        return p + 4
+    if bits >> _S63 == _U1:
+        out[p] = 45
+        p += 1
+        bits = bits ^ (_U1 << _S63)
+    if bits == _U0:
+        out[p], out[p + 1], out[p + 2] = 48, 46, 48
+        return p + 3
+    digits, k = _shortest(bits)
+    while digits % _U10 == _U0:
+        digits = digits // _U10
+        k += 1
+    count, bound = 1, _U10
+    while count < 19 and digits >= bound:
+        count += 1
+        bound = bound * _U10
+    point = count + k  # digits before the decimal point
+    if 0 < point <= 16:
+        if k >= 0:
+            p = write_digits(out, p, digits, count)
+            for _ in range(k):
+                out[p] = 48
+                p += 1
+            out[p], out[p + 1] = 46, 48
+            return p + 2
+        # write one place to the right, then move what belongs before the point
+        write_digits(out, p + 1, digits, count)
+        for i in range(point):
+            out[p + i] = out[p + i + 1]
+        out[p + point] = 46
+        return p + count + 1
+    if -4 < point <= 0:
+        out[p], out[p + 1] = 48, 46
+        p += 2
+        for _ in range(-point):
+            out[p] = 48
+            p += 1
+        return write_digits(out, p, digits, count)
+    if count == 1:
+        out[p] = np.uint8(48 + digits)
+        p += 1
+    else:
+        write_digits(out, p + 1, digits, count)
+        out[p] = out[p + 1]
+        out[p + 1] = 46
+        p += count + 1
+    out[p] = 101
+    p += 1
+    exponent = point - 1
+    if exponent < 0:
+        out[p] = 45
+        p += 1
+        exponent = -exponent
+    return write_digits(out, p, _U(exponent), 3 if exponent >= 100 else 2 if exponent >= 10 else 1)

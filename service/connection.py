@@ -1,0 +1,142 @@
+"""The server's side of a connection: the shortest way to an answer, and an end for callers who stand still.
+
+Under any other ASGI server the service does the same without these two: answers take a little longer, and standing
+callers are that server's business.
+"""
+
+import asyncio
+import time
+from typing import Any
+from weakref import WeakSet
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from service.wire import CASE_PATH, Application, ShortWay
+
+__all__ = ["Connection", "sweep"]
+
+_EVERY_S = 1.0
+_open: "WeakSet[Connection]" = WeakSet()
+
+
+class Connection(HttpToolsProtocol):
+    """A connection that answers one good case as soon as it has come in, and else starts the application.
+
+    It knows since when its caller owes a move: the server ends idle connections, but would wait for ever for the rest
+    of a request, and for a caller who does not read.  A sweep once a second costs a request nothing.
+    """
+
+    paused_since = 0.0
+    owed_since = 0.0
+    owed: object = None
+    _short: ShortWay | None = None
+    _held: tuple[Any, Any] | None = None
+    _date: tuple[Any, bytes] = (None, b"")
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        app: Any = self.app
+        while app is not None and not isinstance(app, Application):  # what the server wraps around it
+            app = getattr(app, "app", None)
+        if app is not None and not self.root_path:
+            self._short = app.short
+
+    def _start_asgi_task(self, cycle: Any, app: Any) -> None:
+        """Start the application, unless the rest of a short request is worth waiting for."""
+        scope = cycle.scope
+        if self._short is not None and scope["path"] == CASE_PATH and cycle is self.cycle and app is self.app:
+            headers = dict(scope["headers"])
+            if (
+                (scope["method"] == "GET" or (scope["method"] == "POST" and self._short.is_short(scope, headers)))
+                and cycle.more_body
+                and cycle.keep_alive
+                and not cycle.waiting_for_100_continue
+                and b"x-forwarded-for" not in headers
+            ):
+                self._held = cycle, headers
+                return
+        super()._start_asgi_task(cycle, app)
+
+    def on_message_complete(self) -> None:
+        """Answer what was held back, or start the application after all."""
+        super().on_message_complete()
+        if self._held is not None:
+            (cycle, headers), self._held = self._held, None
+            if cycle.disconnected or not self._reply(cycle, headers):
+                super()._start_asgi_task(cycle, self.app)
+
+    def _reply(self, cycle: Any, headers: dict[bytes, bytes]) -> bool:
+        short = self._short
+        if short is None or not cycle.keep_alive or self.flow.write_paused:
+            return False
+        started = time.perf_counter()
+        try:
+            reply = short.reply(cycle.scope, headers, bytes(cycle.body))
+        except Exception:
+            return False  # the application will meet it again, and log it
+        if reply is None:
+            return False
+        identity, etag, content = reply
+        self.transport.write(b"".join((self._status_line(), short.head(identity, etag, len(content)), content)))
+        cycle.response_started = cycle.response_complete = True
+        cycle.message_event.set()
+        cycle.on_response()
+        cycle.on_response = _nothing
+        short.finish(cycle.scope, identity, time.perf_counter() - started)
+        return True
+
+    def _status_line(self) -> bytes:
+        """The status line and the server's own fields; those change once a second."""
+        fields = self.server_state.default_headers
+        known, text = Connection._date
+        if known is not fields:
+            text = b"HTTP/1.1 200 OK\r\n" + b"".join(b"%b: %b\r\n" % field for field in fields)
+            Connection._date = fields, text
+        return text
+
+    def connection_made(self, transport: Any) -> None:
+        """Join those that are swept."""
+        super().connection_made(transport)
+        _open.add(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Leave them."""
+        _open.discard(self)
+        super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """Note since when the caller does not read."""
+        self.paused_since = time.monotonic()
+        super().pause_writing()
+
+    def stands_still(self, now: float, limit_s: float) -> bool:
+        """Whether the caller has owed a move for longer than the limit: reading, or the rest of a request."""
+        if self.flow.write_paused:
+            return now - self.paused_since > limit_s
+        cycle = self.cycle
+        answered = cycle is None or cycle.response_complete
+        between_two = answered and self.timeout_keep_alive_task is not None  # the server's own clock runs
+        # All is here, or the answer has begun: the move is ours, or a stream watches its own clock.
+        ours = not answered and (not cycle.more_body or cycle.response_started)
+        if between_two or ours:
+            self.owed = None
+            return False
+        owed = id(cycle), answered
+        if self.owed != owed:
+            self.owed, self.owed_since = owed, now
+        return now - self.owed_since > limit_s
+
+
+def _nothing() -> None:
+    pass
+
+
+async def sweep(limit_s: float) -> None:
+    """Cut, for ever, what stands still."""
+    while True:
+        await asyncio.sleep(_EVERY_S)
+        now = time.monotonic()
+        for connection in list(_open):
+            # Also one that is closing: it would wait for its caller to read the rest.
+            if connection.stands_still(now, limit_s):
+                connection.transport.abort()

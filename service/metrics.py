@@ -1,0 +1,216 @@
+"""Counters of one worker, and their sum over all workers for ``/metrics``.
+
+Counting is adding to a list of numbers, cheap enough for every request.  Several workers leave copies of their lists in
+a folder that the parent process made; whoever is asked adds them up.  A worker that ended keeps its share, so that no
+counter ever falls.
+"""
+
+import asyncio
+import os
+import shutil
+import tempfile
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from friction.regions import REGIMES, SOURCES
+from friction.surrogate import REGIME_OF_SOURCE
+
+__all__ = ["CONTENT_TYPE", "FOLDER_VARIABLE", "Metrics", "shared_folder", "source_place"]
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+#: names the folder to the workers; not a setting
+FOLDER_VARIABLE = "_MUMACRO_METRICS_FOLDER"
+
+ROUTES = (
+    "/v1/mu-macro", "/v1/mu-macro/batch", "/v1/table", "/v1/table.nc", "/livez", "/readyz", "/healthz", "/metrics",
+    "/docs", "/openapi.json", "other",
+)  # fmt: skip
+METHODS = ("GET", "HEAD", "POST", "other")
+STATUSES = (200, 206, 304, 400, 401, 404, 405, 408, 413, 415, 416, 422, 499, 500, 503, 0)
+BUCKETS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+
+_ROUTE = {name: index for index, name in enumerate(ROUTES)}
+_METHOD = {name: index for index, name in enumerate(METHODS)}
+_STATUS = {code: index for index, code in enumerate(STATUSES)}
+_REQUESTS = 0
+_DURATIONS = _REQUESTS + len(ROUTES) * len(METHODS) * len(STATUSES)
+_WIDTH = len(BUCKETS_S) + 2  # of one histogram: buckets, the rest, the sum
+_CASES = _DURATIONS + len(ROUTES) * _WIDTH
+_PER_TABLE = len(SOURCES) + 1  # by source; bad cases
+_SHARE_EVERY_S = 0.25
+
+Place = tuple[int, int]
+
+
+@contextmanager
+def shared_folder() -> Iterator[None]:
+    """Make the folder that the workers share, in memory where there is such a place; remove it in the end."""
+    for place in ("/dev/shm", None):  # noqa: S108  (mkdtemp makes a folder of its own there)
+        try:
+            folder = tempfile.mkdtemp(prefix="mumacro-metrics-", dir=place)
+            break
+        except OSError:
+            continue
+    else:  # nowhere to write: every worker tells its own numbers
+        yield
+        return
+    os.environ[FOLDER_VARIABLE] = folder
+    try:
+        yield
+    finally:
+        os.environ.pop(FOLDER_VARIABLE, None)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def source_place(table: int) -> int:
+    """Where cases of the first source of a table are counted; the others follow, bad cases are last."""
+    return _CASES + table * _PER_TABLE
+
+
+class Metrics:
+    """What one worker counted."""
+
+    def __init__(self) -> None:
+        self.cells: list[float] = [0.0] * _CASES
+        self._file: Path | None = None
+        self._saved: list[float] = []
+        self._tables: list[dict[str, Any]] = []
+        self._pending: dict[Place, list[float]] = {}
+
+    def start(self, tables: list[dict[str, Any]]) -> None:
+        """Make room for the cases of each table; find the shared folder.  The same tables in every worker."""
+        self._tables = tables
+        self.cells.extend([0.0] * (_CASES + len(tables) * _PER_TABLE - len(self.cells)))
+        folder = os.environ.get(FOLDER_VARIABLE)
+        if folder is not None:
+            self._file = Path(folder) / f"{os.getpid()}-{os.urandom(4).hex()}"
+
+    @staticmethod
+    def place(route: str, method: str, status: int) -> Place:
+        """Where requests and durations of a kind are counted."""
+        r = _ROUTE.get(route, len(ROUTES) - 1)
+        m = _METHOD.get(method, len(METHODS) - 1)
+        s = _STATUS.get(status, len(STATUSES) - 1)
+        return _REQUESTS + (r * len(METHODS) + m) * len(STATUSES) + s, _DURATIONS + r * _WIDTH
+
+    def count(self, place: Place, seconds: float) -> None:
+        """Count one request."""
+        cells = self.cells
+        request, durations = place
+        cells[request] += 1.0
+        cells[durations + bisect_left(BUCKETS_S, seconds)] += 1.0
+        cells[durations + _WIDTH - 1] += seconds
+
+    def pending(self, place: Place) -> list[float]:
+        """A list that durations of a kind may simply be appended to; :meth:`settle` counts them."""
+        return self._pending.setdefault(place, [])
+
+    def settle(self) -> None:
+        """Count what is pending."""
+        for place, durations in self._pending.items():
+            taken = durations.copy()
+            del durations[: len(taken)]
+            if taken:
+                request, first = place
+                numbers = np.bincount(np.searchsorted(BUCKETS_S, taken), minlength=_WIDTH - 1).tolist()
+                self.cells[request] += len(taken)
+                for index, number in enumerate(numbers):
+                    self.cells[first + index] += number
+                self.cells[first + _WIDTH - 1] += sum(taken)
+
+    def count_cases(self, first: int, by_source: list[int], bad: int) -> None:
+        """Count the cases of a batch; ``first`` is the source_place of the table."""
+        for index, number in enumerate(by_source):
+            self.cells[first + index] += number
+        self.cells[first + _PER_TABLE - 1] += bad
+
+    async def share(self) -> None:
+        """Settle, and leave copies in the shared folder if there is one, for ever."""
+        while True:
+            self.save()
+            await asyncio.sleep(_SHARE_EVERY_S)
+
+    def save(self) -> None:
+        """Leave a copy in the shared folder.  Replacing the file is atomic: nobody reads half a copy."""
+        self.settle()
+        if self._file is None or self.cells == self._saved:
+            return
+        self._saved = self.cells.copy()
+        draft = self._file.with_suffix(".draft")
+        try:
+            draft.write_bytes(array("d", self._saved).tobytes())
+            draft.replace(self._file)
+        except OSError:
+            self._saved = []  # the folder is gone or full; the next time may do better
+
+    def total(self) -> list[float]:
+        """Sum over all workers; of the others, what they last left, at most a quarter of a second ago."""
+        self.settle()
+        cells = self.cells.copy()
+        if self._file is None:
+            return cells
+        try:
+            others = [path for path in self._file.parent.iterdir() if path != self._file and not path.suffix]
+        except OSError:
+            return cells
+        for path in others:
+            values = array("d")
+            try:
+                values.frombytes(path.read_bytes())
+            except (OSError, ValueError):
+                continue
+            if len(values) == len(cells):
+                cells = [mine + theirs for mine, theirs in zip(cells, values, strict=True)]
+        return cells
+
+    def collect(self) -> Iterator[Any]:
+        """Yield the families of metrics, in the form that prometheus_client's registries ask for."""
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
+
+        cells = self.total()
+        requests = CounterMetricFamily("mumacro_requests", "Finished requests", labels=("route", "method", "status"))
+        durations = HistogramMetricFamily(
+            "mumacro_request_duration_seconds", "From the head of a request to the end of its answer", labels=("route",)
+        )
+        for r, route in enumerate(ROUTES):
+            for m, method in enumerate(METHODS):
+                for s, status in enumerate(STATUSES):
+                    number = cells[_REQUESTS + (r * len(METHODS) + m) * len(STATUSES) + s]
+                    if number:
+                        requests.add_metric((route, method, str(status) if status else "other"), number)
+            first = _DURATIONS + r * _WIDTH
+            buckets, running = [], 0.0
+            for index, bound in enumerate((*map(str, BUCKETS_S), "+Inf")):
+                running += cells[first + index]
+                buckets.append((bound, running))
+            if running:
+                durations.add_metric((route,), buckets, cells[first + _WIDTH - 1])
+        yield requests
+        yield durations
+        cases = CounterMetricFamily("mumacro_cases", "Answered cases", labels=("table", "source", "regime"))
+        bad = CounterMetricFamily("mumacro_bad_cases", "Cases of batches that were refused", labels=("table",))
+        info = GaugeMetricFamily("mumacro_table_info", "Loaded tables", labels=("id", "tolerance"))
+        for index, table in enumerate(self._tables):
+            first = source_place(index)
+            for code, source in enumerate(SOURCES):
+                if cells[first + code]:
+                    cases.add_metric((table["id"], source, REGIMES[REGIME_OF_SOURCE[code]]), cells[first + code])
+            bad.add_metric((table["id"],), cells[first + _PER_TABLE - 1])
+            info.add_metric((table["id"], format(table["tolerance"], "g")), 1)
+        yield cases
+        yield bad
+        yield info
+
+    def text(self) -> bytes:
+        """The exposition format of Prometheus."""
+        from prometheus_client import CollectorRegistry, generate_latest
+
+        registry = CollectorRegistry(auto_describe=False)
+        registry.register(self)
+        return generate_latest(registry)

@@ -1,0 +1,311 @@
+"""What keeps one caller from being everybody's trouble: on a live server, with callers who misbehave."""
+
+import http.client
+import json
+import signal
+import socket
+import threading
+import time
+
+import pytest
+
+BATCH = "/v1/mu-macro/batch"
+LIMIT_S = 2  # of the client's moves, in these tests
+PATIENCE_S = 60  # until a test that waits for something gives up
+
+
+@pytest.fixture(scope="module")
+def server(serving, surrogate):
+    """A server that is impatient and takes two batches at a time."""
+    settings = {
+        "CLIENT_TIMEOUT_S": str(LIMIT_S),
+        "MAX_BATCHES": "2",
+        "MAX_BATCH": "1000000",
+        "MAX_BODY_BYTES": "200000000",
+    }
+    with serving(surrogate.path, **{f"MUMACRO_{name}": value for name, value in settings.items()}) as started:
+        yield started
+
+
+def connect(server, receive_buffer=None):
+    raw = socket.socket()
+    if receive_buffer is not None:
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+    raw.settimeout(PATIENCE_S)
+    raw.connect(("127.0.0.1", server.port))
+    return raw
+
+
+def head(path, length=None, kind="application/json", extra=""):
+    size = "Transfer-Encoding: chunked" if length is None else f"Content-Length: {length}"
+    return f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\n{size}\r\n{extra}\r\n".encode()
+
+
+def read_to_end(raw):
+    """Everything until the server closes; fails the test if it never does."""
+    received = b""
+    try:
+        while piece := raw.recv(65536):
+            received += piece
+    except ConnectionResetError:
+        pass
+    return received
+
+
+def drip(raw, byte=b" "):
+    """Send a byte at a time until the connection is cut; fails the test if it never is."""
+    deadline = time.monotonic() + PATIENCE_S
+    raw.settimeout(0.2)
+    while time.monotonic() < deadline:
+        try:
+            raw.sendall(byte)
+            if raw.recv(4096) == b"":
+                return
+        except TimeoutError:
+            continue
+        except OSError:
+            return
+    pytest.fail("the connection was never cut")
+
+
+@pytest.mark.parametrize("path", ["/v1/mu-macro", BATCH])
+@pytest.mark.parametrize("length", [150, 5000, 100_000, None])
+def test_a_body_that_never_ends_is_given_up(server, path, length):
+    with connect(server) as raw:
+        raw.sendall(head(path, length))
+        drip(raw, b"1\r\n \r\n" if length is None else b" ")
+    assert server.ask("GET", "/livez")[0] == 200
+
+
+@pytest.mark.parametrize("start", [b"", b"G", b"GET /livez HTTP/1.1\r\nX-Slow: "])
+def test_a_head_that_never_ends_is_given_up(server, start):
+    with connect(server) as raw:
+        raw.sendall(start)
+        if start:
+            drip(raw, b"x")
+        else:
+            assert read_to_end(raw) == b""
+
+
+def test_a_head_that_stops_after_an_answer_is_given_up(server):
+    with connect(server) as raw:
+        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+        assert raw.recv(4096).startswith(b"HTTP/1.1 200")
+        raw.sendall(b"GET /livez")
+        drip(raw, b"x")
+
+
+def test_a_line_that_never_ends_is_given_up(server, case):
+    with connect(server) as raw:
+        line = json.dumps(case).encode() + b"\n"
+        raw.sendall(head(BATCH, None, "application/x-ndjson") + b"%x\r\n%b\r\n" % (len(line), line))
+        assert raw.recv(65536).startswith(b"HTTP/1.1 200")
+        drip(raw, b"1\r\n \r\n")
+
+
+def test_a_caller_who_does_not_read_is_cut_and_holds_little(server, case):
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 300_001)]}).encode()
+    with connect(server, receive_buffer=4096) as raw:
+        raw.sendall(head(BATCH, len(body)) + body)
+        time.sleep(3 * LIMIT_S)
+        received = read_to_end(raw)
+    assert received.startswith(b"HTTP/1.1 200")
+    assert not received.endswith(b"0\r\n\r\n")  # the answer, of some 20 MB, was not finished
+    assert len(received) < 8_000_000
+
+
+def memory(server):
+    with open(f"/proc/{server.process.pid}/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmRSS")) * 1024
+
+
+def stream(server, line, count):
+    """Send the line so many times while another thread reads; return lines and largest memory that were seen."""
+    raw = connect(server)
+    block = b"%x\r\n%b\r\n" % (len(line), line)
+    sizes, received = [], [0, b""]
+
+    def read():
+        while piece := raw.recv(1 << 20):
+            received[0] += piece.count(b"mu_macro")
+            received[1] = piece[-5:]
+            if received[1] == b"0\r\n\r\n":
+                return
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    raw.sendall(head(BATCH, None, "application/x-ndjson"))
+    for index in range(count):
+        raw.sendall(block)
+        if index % 50 == 0:
+            sizes.append(memory(server))
+    raw.sendall(b"0\r\n\r\n")
+    reader.join(PATIENCE_S)
+    raw.close()
+    return received[0], max(sizes)
+
+
+def test_a_stream_holds_no_more_the_longer_it_gets(server, case):
+    line = json.dumps({**case, "v0": [1e-4 * i for i in range(1, 1001)]}).encode() + b"\n"
+    stream(server, line, 50)
+    lines, short = stream(server, line, 200)
+    assert lines == 200
+    lines, long = stream(server, line, 2000)
+    assert lines == 2000
+    assert long < short + 16e6  # the answers alone are 150 MB
+
+
+def test_answers_come_while_the_question_is_still_being_sent(server, case):
+    line = json.dumps(case).encode() + b"\n"
+    with connect(server) as raw:
+        raw.sendall(head(BATCH, None, "application/x-ndjson"))
+        for _ in range(3):
+            raw.sendall(b"%x\r\n%b\r\n" % (len(line), line))
+            received = b""
+            while b'"mu_macro"' not in received:
+                received += raw.recv(65536)
+        raw.sendall(b"0\r\n\r\n")
+
+
+def test_no_piece_of_a_stream_is_lost(server, case):
+    # The pieces are cut so that lines end within them and between them, and both directions are busy at once.
+    lines = b"".join(json.dumps({**case, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))
+    answers = []
+    with connect(server) as raw:
+
+        def read():
+            reply = http.client.HTTPResponse(raw, method="POST")
+            reply.begin()
+            answers.extend(json.loads(line)["mu_macro"] for line in reply.read().splitlines())
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        raw.sendall(head(BATCH, None, "application/x-ndjson"))
+        for start in range(0, len(lines), 777):
+            piece = lines[start : start + 777]
+            raw.sendall(b"%x\r\n%b\r\n" % (len(piece), piece))
+        raw.sendall(b"0\r\n\r\n")
+        reader.join(PATIENCE_S)
+    assert len(answers) == 3000
+    assert answers == sorted(answers)
+
+
+def test_short_requests_are_answered_while_a_large_batch_is(server, case):
+    v0 = [1e-7 * i for i in range(1, 1_000_001)]
+    body = json.dumps({**{name: [value] * len(v0) for name, value in case.items()}, "v0": v0}).encode()
+    done = threading.Event()
+    result = []
+
+    def ask():
+        result.append(server.ask("POST", BATCH, body, {"Content-Type": "application/json"}))
+        done.set()
+
+    worker = threading.Thread(target=ask)
+    worker.start()
+    between = 0
+    while not done.is_set():
+        assert server.ask("GET", "/livez")[0] == 200
+        assert server.ask("POST", "/v1/mu-macro", json.dumps(case), {"Content-Type": "application/json"})[0] == 200
+        between += 1
+    worker.join()
+    assert between >= 10
+    status, _, answer = result[0]
+    assert (status, len(json.loads(answer)["mu_macro"])) == (200, 1_000_000)
+
+
+def test_a_third_batch_is_turned_away_unread(server, case):
+    held = [connect(server) for _ in range(2)]
+    for raw in held:
+        raw.sendall(head(BATCH, 100_000) + b"[")
+    with connect(server) as third:
+        deadline = time.monotonic() + PATIENCE_S
+        while True:
+            third.sendall(head(BATCH, 100_000_000))
+            answer = third.recv(65536)
+            if answer.startswith(b"HTTP/1.1 503"):
+                break
+            assert time.monotonic() < deadline
+    assert b"retry-after: 1\r\n" in answer.lower()
+    assert b"application/problem+json" in answer
+    assert server.ask("POST", BATCH, json.dumps([case]), {"Content-Type": "application/json"})[0] == 200
+    for raw in held:
+        raw.close()
+
+
+def test_a_declared_length_over_the_limit_is_a_problem_document(server):
+    for path in ("/v1/mu-macro", BATCH):
+        with connect(server) as raw:
+            raw.sendall(head(path, 300_000_000))
+            answer = read_to_end(raw)
+        assert answer.startswith(b"HTTP/1.1 413")
+        assert b"content-type: application/problem+json" in answer
+
+
+def test_a_stop_lets_readiness_fall_first_and_requests_finish(serving, surrogate, case):
+    with serving(surrogate.path, MUMACRO_DRAIN_S="3", MUMACRO_SHUTDOWN_GRACE_S="20") as server:
+        assert server.ask("GET", "/readyz")[0] == 200
+        with connect(server) as raw:
+            body = json.dumps([case]).encode()
+            raw.sendall(head(BATCH, len(body)) + body[:10])
+            server.process.send_signal(signal.SIGTERM)
+            deadline = time.monotonic() + PATIENCE_S
+            while server.ask("GET", "/readyz")[0] == 200:
+                assert time.monotonic() < deadline
+            assert server.ask("GET", "/livez")[0] == 200  # still listening
+            assert server.ask("POST", "/v1/mu-macro", json.dumps(case))[0] == 200
+            while True:  # until it listens no more
+                try:
+                    server.ask("GET", "/livez")
+                except OSError:
+                    break
+                assert time.monotonic() < deadline
+            raw.sendall(body[10:])
+            answer = read_to_end(raw)
+        assert answer.startswith(b"HTTP/1.1 200")
+        assert b'"n_errors":0' in answer
+        assert server.wait() == 0
+
+
+def test_a_second_signal_does_not_wait(serving, surrogate):
+    with serving(surrogate.path, MUMACRO_DRAIN_S="600") as server:
+        server.process.send_signal(signal.SIGTERM)
+        while server.ask("GET", "/readyz")[0] == 200:
+            pass
+        server.process.send_signal(signal.SIGTERM)
+        assert server.wait() == 0
+
+
+def test_pipelined_requests_are_answered_in_order(server, case):
+    query = "&".join(f"{name}={value}" for name, value in case.items() if name != "v0")
+    bodies = [json.dumps({**case, "v0": 0.01 * i}).encode() for i in range(1, 6)]
+    asked = b""
+    for i, body in enumerate(bodies, 1):
+        asked += f"GET /v1/mu-macro?{query}&v0={0.01 * i:.2f} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
+        asked += head("/v1/mu-macro", len(body)) + body
+    with connect(server) as raw:
+        raw.sendall(asked + b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        received = read_to_end(raw)
+    documents = [json.loads(part.split(b"\r\n\r\n")[1]) for part in received.split(b"HTTP/1.1 200 OK\r\n")[1:]]
+    values = [document["mu_macro"] for document in documents[:-1]]
+    assert documents[-1]["status"] == "alive"
+    assert values[::2] == values[1::2] == sorted(values[::2])
+    assert len(values) == 10
+
+
+@pytest.mark.parametrize(
+    "extra", ["Expect: 100-continue\r\n", "Connection: close\r\n", "X-Forwarded-For: 10.1.2.3\r\n", ""]
+)
+def test_the_short_way_and_the_long_way_give_one_answer(server, case, extra):
+    body = json.dumps(case).encode()
+    with connect(server) as raw:
+        raw.sendall(head("/v1/mu-macro", len(body), extra=extra))
+        if "Expect" in extra:
+            assert raw.recv(4096).startswith(b"HTTP/1.1 100")
+        raw.sendall(body)
+        reply = http.client.HTTPResponse(raw, method="POST")
+        reply.begin()
+        answer = json.loads(reply.read())
+        names = {name.lower() for name in reply.headers}
+    _, _, other = server.ask("GET", "/v1/mu-macro?" + "&".join(f"{name}={value}" for name, value in case.items()))
+    assert answer == json.loads(other)
+    assert {"content-length", "content-type", "date", "x-request-id", "x-content-type-options"} <= names

@@ -1,0 +1,127 @@
+"""Decimal text and doubles: exact both ways, and the grammar of JSON to the letter."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numba import njit
+
+from service.compiled.digits import HARD, NUMBER, OUT_OF_RANGE, TEXT_WIDTH, read_number, write_number
+
+
+@njit
+def read_all(text, count, bits, kinds):
+    i = 0
+    for index in range(count):
+        bits[index], i, kinds[index] = read_number(text, i)
+        i += 1
+
+
+@njit
+def write_all(out, values, ends):
+    p = 0
+    for index in range(values.size):
+        p = write_number(out, p, values[index])
+        ends[index] = p
+
+
+def read(text):
+    bits, end, kind = read_number(np.frombuffer(text.encode() + b"\0", dtype=np.uint8), 0)
+    return float(np.uint64(bits).view(np.float64)), end, kind
+
+
+def written(values):
+    out, ends = np.zeros(TEXT_WIDTH * values.size, dtype=np.uint8), np.zeros(values.size, dtype=np.int64)
+    write_all(out, values, ends)
+    starts = [0, *ends[:-1].tolist()]
+    assert np.diff([0, *ends]).max() <= TEXT_WIDTH
+    return [out[a:b].tobytes().decode() for a, b in zip(starts, ends.tolist(), strict=True)]
+
+
+def plain(text):
+    """Python's repr in the spelling that is used here."""
+    return text.replace("e-0", "e-").replace("e+", "e")
+
+
+def samples():
+    rng = np.random.default_rng(20180301)
+    bits = rng.integers(0, 2**64, 200_000, dtype=np.uint64).view(np.float64)
+    yield bits[np.isfinite(bits)]
+    yield rng.uniform(-1, 1, 100_000)
+    yield rng.integers(1, 2**52, 20_000, dtype=np.uint64).view(np.float64)  # subnormal
+    yield np.ldexp(1.0, np.arange(-1074, 1024))
+    yield np.nextafter(np.ldexp(1.0, np.arange(-1074, 1024)), 0)
+    yield np.array([float(f"1e{k}") for k in range(-323, 309)])
+    yield np.arange(0, 50_000) / 64
+    yield np.array([0.0, -0.0, 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, 9007199254740993.0, 0.1, 1e22])
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_a_double_is_written_as_short_as_python_writes_it_and_read_back(index):
+    values = list(samples())[index]
+    texts = written(values)
+    assert texts == [plain(repr(value)) for value in values.tolist()]
+    bits, kinds = np.zeros(values.size, dtype=np.uint64), np.zeros(values.size, dtype=np.int64)
+    read_all(np.frombuffer(",".join(texts).encode() + b"\0", dtype=np.uint8), values.size, bits, kinds)
+    assert not kinds.any()
+    assert np.array_equal(bits, values.view(np.uint64))
+
+
+@pytest.mark.parametrize("form", [".18e", ".17e", ".16e", ".15e", ".3f"])
+def test_a_text_of_any_length_is_read_to_the_nearest_double(form):
+    rng = np.random.default_rng(1)
+    values = rng.uniform(0, 10, 50_000) * 10.0 ** (rng.integers(-300, 300, 50_000) if "e" in form else 3)
+    texts = [format(value, form) for value in values.tolist()]
+    bits, kinds = np.zeros(values.size, dtype=np.uint64), np.zeros(values.size, dtype=np.int64)
+    read_all(np.frombuffer(",".join(texts).encode() + b"\0", dtype=np.uint8), values.size, bits, kinds)
+    assert not kinds.any()
+    assert bits.view(np.float64).tolist() == [float(text) for text in texts]
+
+
+def test_halfway_cases_go_to_the_even_double():
+    for text in ("9007199254740993", "9007199254740995", "9007199254740993.0", "4503599627370496.5", "0.5e-323"):
+        assert read(text)[0] == float(text)
+        assert read(text)[2] == NUMBER
+
+
+def test_what_is_not_finite_is_written_as_null():
+    assert written(np.array([math.nan, math.inf, -math.inf, 1.0])) == ["null", "null", "null", "1.0"]
+
+
+@pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e309", "-1e400", "1" + "0" * 18 + "e300"])
+def test_what_no_double_holds_is_out_of_range(text):
+    assert read(text)[1:] == (len(text), OUT_OF_RANGE)
+
+
+@pytest.mark.parametrize("text", ["12345678901234567890", "0.12345678901234567890", "1" * 400, "1" * 30 + "e-30"])
+def test_more_than_nineteen_digits_are_left_to_the_caller(text):
+    assert read(text)[1:] == (len(text), HARD)
+
+
+@pytest.mark.parametrize("text", ["0.00000000000000000000012", "-0.000000000000000000000000001e10", "0." + "0" * 40])
+def test_leading_zeros_are_no_digits(text):
+    assert read(text) == (float(text), len(text), NUMBER)
+
+
+@settings(max_examples=1000, deadline=None)
+@given(text=st.text(alphabet="0123456789.eE+-", min_size=1, max_size=12))
+@example(text="-")
+@example(text="01")
+@example(text="1.")
+@example(text="1e")
+@example(text="-0")
+def test_the_grammar_is_that_of_json(text):
+    try:
+        expected = json.loads(text)
+    except ValueError:
+        expected = None
+    value, end, kind = read(text)
+    if expected is None:
+        assert kind not in (NUMBER, OUT_OF_RANGE, HARD) or end < len(text)
+    else:
+        assert end == len(text)
+        assert kind == (NUMBER if math.isfinite(float(expected)) else OUT_OF_RANGE)
+        assert kind == OUT_OF_RANGE or value == float(expected)

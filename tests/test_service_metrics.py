@@ -1,0 +1,112 @@
+"""Counters: what they count, over all ways to an answer and over all workers."""
+
+import json
+import re
+import time
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+from starlette.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+
+PATH = "/v1/mu-macro"
+PATIENCE_S = 60
+
+
+def samples(text):
+    return {
+        (sample.name, *sorted(sample.labels.values())): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+@pytest.fixture
+def fresh(tables_dir):
+    """A client of an application that has counted nothing yet."""
+    with TestClient(create_app(Settings(tables=(tables_dir,)))) as started:
+        yield started
+
+
+def scrape(fresh):
+    response = fresh.get("/metrics")
+    assert response.status_code == 200
+    assert response.headers["content-type"] == "text/plain; version=0.0.4; charset=utf-8"
+    return samples(response.text)
+
+
+def test_requests_are_counted_by_route_method_and_status(fresh, case):
+    for _ in range(3):
+        fresh.post(PATH, json=case)
+    fresh.get(PATH, params=case)
+    fresh.post(PATH, json={**case, "mu0": -1})
+    fresh.post(f"{PATH}/batch", json=[case])
+    fresh.get("/nowhere/at/all")
+    fresh.request("BREW", "/livez")
+    found = scrape(fresh)
+    count = "mumacro_requests_total"
+    assert found[count, *sorted((PATH, "POST", "200"))] == 3
+    assert found[count, *sorted((PATH, "GET", "200"))] == 1
+    assert found[count, *sorted((PATH, "POST", "422"))] == 1
+    assert found[count, *sorted((f"{PATH}/batch", "POST", "200"))] == 1
+    assert found[count, *sorted(("other", "GET", "404"))] == 1
+    assert found[count, *sorted(("/livez", "other", "405"))] == 1
+    assert found["mumacro_request_duration_seconds_count", PATH] == 5
+    assert found["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
+    assert 0 < found["mumacro_request_duration_seconds_sum", PATH] < 60
+
+
+def test_cases_are_counted_by_source_and_regime(fresh, case, surrogate):
+    rows = [{**case, "v0": v0} for v0 in (0, 1e-4, 0.01, 0.1, 10.0)] + [{**case, "v0": -1}] * 4
+    answers = [fresh.post(PATH, json=row).json() for row in rows[:5]]
+    fresh.post(f"{PATH}/batch", json=rows)
+    fresh.get(PATH, params=rows[1])
+    fresh.post(PATH, json={**rows[2], "include": ["limits"]})
+    fresh.post(f"{PATH}/batch", content="\n".join(map(json.dumps, rows)), headers={"Content-Type": "application/jsonl"})
+    found = scrape(fresh)
+    expected = {}
+    for answer in [*answers * 3, answers[1], answers[2]]:
+        key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
+        expected[key] = expected.get(key, 0) + 1
+    assert {key: value for key, value in found.items() if key[0] == "mumacro_cases_total"} == expected
+    assert found["mumacro_bad_cases_total", surrogate.id] == 4  # a line of one bad case is a problem of its own
+    assert found["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
+
+
+def test_the_longer_way_counts_the_same(fresh, case, surrogate):
+    answer = fresh.get(PATH, params=case)
+    fresh.get(PATH, params=case, headers={"If-None-Match": answer.headers["etag"]})
+    fresh.get(PATH, params={**case, "include": "groups"})
+    found = scrape(fresh)
+    key = sorted((surrogate.id, answer.json()["source"], answer.json()["regime"]))
+    assert found["mumacro_cases_total", *key] == 2  # what the caller had already was not computed again
+    assert found["mumacro_requests_total", *sorted((PATH, "GET", "304"))] == 1
+
+
+def test_counters_are_described_and_under_the_key(tables_dir, problem):
+    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="k3y"))) as closed:
+        problem(closed.get("/metrics"), 401)
+        text = closed.get("/metrics", headers={"Authorization": "Bearer k3y"}).text
+    for name in ("mumacro_requests", "mumacro_request_duration_seconds", "mumacro_cases", "mumacro_bad_cases"):
+        assert re.search(rf"^# HELP {name}(_total)? \w", text, re.MULTILINE)
+        assert re.search(rf"^# TYPE {name}(_total)? (counter|histogram)$", text, re.MULTILINE)
+
+
+def test_every_worker_tells_the_sum_of_all(serving, surrogate, case):
+    body = json.dumps(case)
+    asked = 40
+    with serving(surrogate.path, "--workers", "2") as server:
+        server.wait_for_workers()
+        for _ in range(asked):
+            assert server.ask("POST", PATH, body)[0] == 200
+        key = ("mumacro_requests_total", *sorted((PATH, "POST", "200")))
+        deadline = time.monotonic() + PATIENCE_S
+        in_a_row = 0
+        while in_a_row < 20:  # more scrapes than one worker would get by chance alone
+            found = samples(server.ask("GET", "/metrics")[2].decode())
+            assert found.get(key, 0) <= asked
+            in_a_row = in_a_row + 1 if found.get(key) == asked else 0
+            assert time.monotonic() < deadline
+        assert server.stop() == 0

@@ -1,0 +1,231 @@
+"""Lines in and out, Arrow in and out, compression: over HTTP, in this process."""
+
+import gzip
+import json
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from starlette.testclient import TestClient
+
+from friction.nondim import FIELDS
+from service.app import create_app
+from service.settings import Settings
+
+PATH = "/v1/mu-macro/batch"
+LINES = {"Content-Type": "application/x-ndjson"}
+ARROW = "application/vnd.apache.arrow.stream"
+VALUES = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+
+
+def lines_of(response):
+    assert response.status_code == 200, response.text
+    assert response.headers["content-type"] == "application/x-ndjson"
+    assert response.text.endswith("\n")
+    return [json.loads(line) for line in response.text.splitlines()]
+
+
+def test_a_line_is_answered_like_a_batch_or_a_case_of_its_own(client, case):
+    columns, rows = {**case, "v0": [0.1, -1, 0.2]}, [case, 17]
+    body = "\n".join(map(json.dumps, (columns, rows, case))) + "\n"
+    first, second, third = lines_of(client.post(PATH, content=body, headers=LINES))
+    assert first == client.post(PATH, json=columns).json()
+    assert second == client.post(PATH, json=rows).json()
+    assert third == client.post("/v1/mu-macro", json=case).json()
+
+
+def test_a_bad_line_spoils_only_itself(client, case, surrogate):
+    good = json.dumps(case)
+    body = "\n".join([good, "{", "", '{"mu0": 1}', json.dumps({**case, "v0": -1}), "17", good])
+    answers = lines_of(client.post(PATH, content=body, headers=LINES))
+    assert [answer.get("status") for answer in answers] == [None, 400, 422, 422, 422, None]
+    assert answers[0] == answers[5]
+    assert answers[1]["instance"] == f"{PATH}#line=2"
+    assert answers[2]["instance"] == f"{PATH}#line=4"
+    assert answers[1]["type"].endswith("malformed-body")
+    listed = json.dumps({**case, "v0": [-1]})
+    (answer,) = lines_of(client.post(PATH, content=listed, headers=LINES))
+    assert (answer["errors"][0]["field"], answer["table"]["id"]) == ("v0", surrogate.id)
+
+
+def test_lines_keep_their_order_however_they_arrive(client, case):
+    text = "".join(json.dumps({**case, "v0": [0.001 * i, 0.002 * i]}) + "\r\n" for i in range(1, 200)).encode()
+    whole = lines_of(client.post(PATH, content=text, headers=LINES))
+    for size in (1, 7, 1000, 100_000):
+        pieces = (text[start : start + size] for start in range(0, len(text), size))
+        assert lines_of(client.post(PATH, content=pieces, headers=LINES)) == whole
+    assert len(whole) == 199
+
+
+def test_options_of_a_stream_come_with_its_query_or_its_lines(client, case):
+    body = json.dumps(case) + "\n" + json.dumps({**case, "include": ["limits"]}) + "\n"
+    plain, extended = lines_of(client.post(PATH, content=body, headers=LINES))
+    assert ("limits" in plain, "limits" in extended) == (False, True)
+    first, second = lines_of(client.post(PATH, params={"include": "groups"}, content=body, headers=LINES))
+    assert "groups" in first
+    assert second["status"] == 422  # given twice
+
+
+def test_a_stream_that_nothing_can_answer_is_refused_as_a_whole(client, case, problem):
+    body = json.dumps(case)
+    problem(client.post(PATH, params={"tolerance": 1e-30}, content=body, headers=LINES), 422)
+    problem(client.post(PATH, params={"nonsense": 1}, content=body, headers=LINES), 422)
+
+
+def test_an_empty_stream_has_an_empty_answer(client):
+    response = client.post(PATH, content=b"\n\n", headers=LINES)
+    assert (response.status_code, response.content) == (200, b"")
+
+
+def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(tables_dir, case):
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_body_bytes=1024, max_batch=3))) as client:
+        line = json.dumps(case) + "\n"
+        assert len(lines_of(client.post(PATH, content=line * 100, headers=LINES))) == 100
+        over = json.dumps({**case, "v0": [0.1] * 4})
+        (answer,) = lines_of(client.post(PATH, content=over, headers=LINES))
+        assert (answer["status"], answer["max_batch"]) == (413, 3)
+        pieces = iter([line.encode(), *[b" " * 600] * 3])
+        cut = client.post(PATH, content=pieces, headers=LINES)  # its answer had begun: it just ends
+        assert len(cut.text.splitlines()) <= 1
+
+
+# --- Arrow --------------------------------------------------------------------------------------------
+
+
+def stream_of(*batches):
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, batches[0].schema) as writer:
+        for batch in batches:
+            writer.write_batch(batch)
+    return sink.getvalue().to_pybytes()
+
+
+def ask_arrow(client, body, **options):
+    response = client.post(PATH, content=body, headers={"Content-Type": ARROW}, params=options)
+    assert response.status_code == 200, response.text
+    assert response.headers["content-type"] == ARROW
+    return pa.ipc.open_stream(response.content).read_all()
+
+
+def columns_of(case, n):
+    v0 = np.geomspace(1e-6, 1e3, n)
+    return {**{name: np.full(n, value) for name, value in case.items()}, "v0": v0}
+
+
+def test_arrow_columns_are_answered_like_json_columns(client, case, surrogate):
+    columns = columns_of(case, 1000)
+    table = ask_arrow(client, stream_of(pa.record_batch(columns)), include="groups,limits,gradient")
+    body = {name: values.tolist() for name, values in columns.items()}
+    expected = client.post(PATH, json={**body, "include": ["groups", "limits", "gradient"]}).json()
+    for name in VALUES:
+        assert table[name].to_pylist() == expected[name]
+    for group in ("groups", "limits", "gradient"):
+        for key, values in expected[group].items():
+            assert table[f"{group}.{key}"].to_pylist() == values
+    assert table["error"].null_count == 1000
+    assert json.loads(table.schema.metadata[b"table"])["id"] == surrogate.id
+    assert table.schema.metadata[b"api_version"] == b"1"
+
+
+def test_arrow_keeps_order_over_record_batches_and_slices(client, case):
+    columns = columns_of(case, 150_000)
+    whole = pa.record_batch(columns)
+    settings = Settings(tables=client.app.state.settings.tables, max_batch=200_000)
+    with TestClient(create_app(settings)) as large:
+        answered = ask_arrow(large, stream_of(whole.slice(0, 10), whole.slice(10, 1), whole.slice(11)))
+        assert answered["mu_macro"].to_numpy().tolist() == sorted(answered["mu_macro"].to_numpy().tolist())
+        first = client.post(PATH, json={**case, "v0": columns["v0"][:20].tolist()}).json()
+    assert answered["mu_macro"].to_pylist()[:20] == first["mu_macro"]
+    assert answered.num_rows == 150_000
+
+
+def test_a_bad_arrow_case_spoils_only_itself(client, case):
+    n = 6
+    columns = {name: pa.array([value] * n) for name, value in case.items()}
+    columns["v0"] = pa.array([0.1, -1.0, None, float("nan"), 0.1, 0.1])
+    columns["k"] = pa.array([1e6, 1e6, 1e6, 1e6, None, float("inf")])
+    table = ask_arrow(client, stream_of(pa.record_batch(columns)))
+    assert [value is None for value in table["mu_macro"].to_pylist()] == [False, True, True, True, False, True]
+    assert table["error"].to_pylist() == [
+        None,
+        "v0: must be finite and >= 0",
+        "v0: must be a number",
+        "v0: must be finite and >= 0",
+        None,
+        "k: must be finite and > 0",
+    ]
+    rigid = client.post("/v1/mu-macro", json={**case, "k": None, "v0": 0.1}).json()
+    assert table["mu_macro"][4].as_py() == rigid["mu_macro"]
+
+
+def test_arrow_numbers_of_other_types_are_numbers(client, case):
+    columns = {name: pa.array([value], type=pa.float32()) for name, value in case.items() if name != "k"}
+    columns["Fz"] = pa.array([10], type=pa.int16())
+    table = ask_arrow(client, stream_of(pa.record_batch(columns)))
+    body = {name: float(np.float32(value)) for name, value in case.items() if name != "k"}
+    assert table["mu_macro"][0].as_py() == client.post("/v1/mu-macro", json={**body, "Fz": 10}).json()["mu_macro"]
+
+
+def test_an_empty_arrow_stream_has_an_empty_answer(client):
+    schema = pa.schema([(name, pa.float64()) for name in FIELDS])
+    sink = pa.BufferOutputStream()
+    pa.ipc.new_stream(sink, schema).close()
+    table = ask_arrow(client, sink.getvalue().to_pybytes())
+    assert (table.num_rows, table.schema.names[:5]) == (0, list(VALUES))
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [({"v0": None}, "v0"), ({"speed": [1.0]}, "speed"), ({"v0": ["0.1"]}, "v0"), ({"mu0": [True]}, "mu0")],
+)
+def test_arrow_columns_that_do_not_fit_are_refused(client, case, problem, change, field):
+    columns = {**{name: [value] for name, value in case.items()}, **change}
+    body = stream_of(
+        pa.record_batch({name: pa.array(values) for name, values in columns.items() if values is not None})
+    )
+    response = client.post(PATH, content=body, headers={"Content-Type": ARROW})
+    assert problem(response, 422)["errors"][0]["field"] == field
+
+
+def test_what_is_no_arrow_stream_is_malformed(client, case, problem):
+    good = stream_of(pa.record_batch({name: [value] for name, value in case.items()}))
+    for body in (b"nonsense", b"\xff" * 100, good[:100], good[: len(good) // 2]):
+        problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 400)
+
+
+def test_an_arrow_batch_over_the_limit_is_refused(tables_dir, case, problem):
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3))) as client:
+        body = stream_of(pa.record_batch({name: [value] * 4 for name, value in case.items()}))
+        assert problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 413)["max_batch"] == 3
+
+
+# --- compression --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("offer", "taken"),
+    [("gzip", True), ("br, gzip;q=0.5", True), ("*", True), ("identity", False), ("gzip;q=0", False), ("br", False)],
+)
+def test_a_large_answer_is_compressed_where_that_is_wanted(client, case, offer, taken):
+    body = json.dumps({**case, "v0": [0.001 * i for i in range(20_000)]})
+    with client.stream("POST", PATH, content=body, headers={"Accept-Encoding": offer}) as response:
+        raw = b"".join(response.iter_raw())
+    assert (response.headers.get("content-encoding") == "gzip") == taken
+    plain = client.post(PATH, content=body, headers={"Accept-Encoding": "identity"}).content
+    assert (gzip.decompress(raw) if taken else raw) == plain
+    if taken:
+        assert response.headers["vary"] == "accept-encoding"
+        assert len(raw) < len(plain) / 1.5
+
+
+def test_a_small_answer_is_not_compressed(client, case):
+    response = client.post(PATH, json=[case], headers={"Accept-Encoding": "gzip"})
+    assert "content-encoding" not in response.headers
+    assert int(response.headers["content-length"]) == len(response.content)
+
+
+def test_a_stream_is_compressed_line_by_line(client, case):
+    body = (json.dumps(case) + "\n") * 50
+    assert lines_of(client.post(PATH, content=body, headers={**LINES, "Accept-Encoding": "gzip"})) == lines_of(
+        client.post(PATH, content=body, headers={**LINES, "Accept-Encoding": "identity"})
+    )
