@@ -116,8 +116,8 @@ def plot(tables: list[Built], grids: list[Plain], path: Path) -> None:
     theirs = ([g.n**2 for g in grids], [8 * g.n**2 for g in grids])
     labels = ("solves, verification included", "bytes of the file")
     for axes, mine, other, label in zip(panels, ours, theirs, labels, strict=True):
-        axes.plot(error, mine, "o-", color=RED, lw=2, label="this table, the whole quadrant")
-        axes.plot(grid_error, other, "s-", color=BLUE, lw=1.2, label="plain grid, cubic spline, the square alone")
+        axes.plot(error, mine, "o-", color=RED, lw=2, label="table of the whole quadrant")
+        axes.plot(grid_error, other, "s-", color=BLUE, lw=1.2, label="plain grid of the square")
         for g, value in zip(grids, other, strict=True):
             axes.annotate(f"{g.n}²", (g.max_abs, value), (8, -3), textcoords="offset points", ha="left", color=BLUE)
         axes.set_xscale("log")

@@ -1,8 +1,9 @@
 """What it takes to evaluate one polynomial patch: vector code, scalar rows, one plain Horner chain after another.
 
-    python benchmarks/kernel.py [--points 1000000] [--rounds 9]
+    python benchmarks/kernel.py [--points 1000000] [--rounds 9] [--write]
 
-One thread, processor time, random patches of a set as large as that of a fine table.  Prints times and their ratios.
+One thread, processor time, random patches of a set as large as that of a fine table.  Prints times and their ratios;
+``--write`` puts them into docs/decisions/0003-vector-patch.md.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from friction.kernels import FUSE, WIDTH
 from friction.patch_simd import patch_value
 
 Array = NDArray[np.float64]
+PAGE = measuring.ROOT / "docs" / "decisions" / "0003-vector-patch.md"
+BEGIN, END = "<!-- begin kernel -->\n", "<!-- end kernel -->"
 PATCHES = {"as many as mumacro-1e-10 has": 1004, "as many as mumacro-1e-12 has": 3150}
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": FUSE}
 
@@ -63,12 +66,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--write", action="store_true", help="put the table into the decision")
     given = parser.parse_args()
     if given.points < 1 or given.rounds < 1:
         parser.error("--points and --rounds must be at least 1")
     rng = np.random.default_rng(1)
     u, w = rng.uniform(-1.0, 1.0, given.points), rng.uniform(-1.0, 1.0, given.points)
-    print(measuring.machine("llvmlite") + "\n")
     lines = []
     for name, patches in PATCHES.items():
         coef = rng.standard_normal((patches, WIDTH, WIDTH))
@@ -85,15 +88,22 @@ def main() -> None:
         cells += [quantity(ns["rows"] / ns["vector"]), quantity(ns["plain"] / ns["vector"]), quantity(apart)]
         lines.append([f"{patches:,}, {name}", *cells])
     header = (
-        "set",
+        "patches",
         "vector, ns",
         "scalar rows, ns",
         "plain Horner, ns",
         "rows / vector",
         "plain / vector",
-        "max abs distance",
+        "apart",
     )
-    print(markdown(header, lines))
+    text = measuring.machine("llvmlite") + "\n\n" + markdown(header, lines)
+    print(text)
+    if given.write:
+        page = PAGE.read_text(encoding="utf-8")
+        if page.count(BEGIN) != 1 or page.count(END) != 1:
+            parser.error(f"{PAGE} must hold {BEGIN.strip()!r} and {END!r} once each")
+        before, _, rest = page.partition(BEGIN)
+        PAGE.write_text(f"{before}{BEGIN}\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ def _dress(top: Any, low: Any) -> None:
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
     top.set_ylim(1e4, 1e9)
-    low.set_ylim(9, 1100)
+    low.set_ylim(9, 2000)
     low.set_xlim(2e-17, 3)
     low.set_xticks([10.0**e for e in range(-16, 1, 2)])
     low.set_xlabel(r"largest error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000")
