@@ -1,0 +1,140 @@
+"""The examples do what they say, each where its tool is installed."""
+
+import csv
+import importlib.util
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+import urllib.request
+
+import numpy as np
+import pytest
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+EXAMPLES = {"README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "uncertainty.py", "least_power.py"}
+
+
+def run(repository, *command):
+    environment = {**os.environ, "PYTHONPATH": str(repository), "OPENMDAO_REPORTS": "0"}
+    done = subprocess.run(
+        [str(word) for word in command], cwd=repository, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def need(name, *modules):
+    """Skip unless a program, or Python packages, are there."""
+    if name is not None and shutil.which(name) is None:
+        pytest.skip(f"{name} is not installed")
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f"the Python package {module} is not installed")
+
+
+def number(pattern, text):
+    found = re.search(pattern, text)
+    assert found, text
+    return float(found[1])
+
+
+def test_every_example_is_listed_and_tested(repository):
+    there = {path.name for path in (repository / "examples").iterdir() if not path.name.startswith(("_", "."))}
+    assert there == EXAMPLES
+    readme = (repository / "examples" / "README.md").read_text("utf-8")
+    assert all(f"`{name}" in readme for name in EXAMPLES - {"README.md"})
+
+
+def test_curl(repository, live_server, surrogate):
+    need("curl")
+    version = run(repository, "curl", "--version").split()[1]
+    if tuple(map(int, version.split(".")[:2])) < (7, 82):
+        pytest.skip(f"curl {version} has no --json, which came with 7.82")
+    text = run(repository, "sh", "examples/curl.sh", live_server.url)
+    expected = surrogate.evaluate(**CASE).mu_macro
+    assert number(r'^\{"mu_macro":([0-9.e-]+)', text.split("\n", 1)[1]) == expected
+    assert number(r'"output": \[\[([0-9.e-]+)\]\]', text) == expected
+    assert number(r'"roots":\[\{"value":([0-9.e-]+)', text) == pytest.approx(2.857e-6, rel=1e-3)
+    rows = [line for line in text.splitlines() if line.endswith(("_low", "corner"))]
+    assert [float(row.split(",")[0]) for row in rows] == [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0]
+
+
+def test_python(repository, live_server, surrogate):
+    text = run(repository, sys.executable, "examples/client.py", live_server.url)
+    assert number(r"mu_macro = ([\d.]+) \+-", text) == pytest.approx(surrogate.evaluate(**CASE).mu_macro, abs=1e-6)
+    for v0, mu in re.findall(r"v0 =\s+([\d.]+) m/s: mu_macro = ([\d.]+)", text):
+        assert float(mu) == pytest.approx(surrogate.evaluate(**{**CASE, "v0": float(v0)}).mu_macro, abs=1e-6)
+    for target, y0 in re.findall(r"mu_macro = ([\d.]+) needs y0 = ([\d.]+) um", text):
+        answer = surrogate.evaluate(**{**CASE, "y0": 1e-6 * float(y0)})
+        assert answer.mu_macro == pytest.approx(float(target), abs=2e-5)
+
+
+def test_the_spreadsheets_addresses(repository, live_server, surrogate):
+    text = (repository / "examples" / "spreadsheet.md").read_text("utf-8")
+    addresses = re.findall(r"^ {4}(http://127\.0\.0\.1:8000/\S+)$", text, re.MULTILINE)
+    joined = re.search(r'address = "([^"]+)" & y0', text)
+    assert joined
+    addresses.append(joined[1] + "2E-06")
+    assert len(addresses) == 3
+    for address in addresses:
+        with urllib.request.urlopen(address.replace("http://127.0.0.1:8000", live_server.url), timeout=60) as response:
+            header, *rows = csv.reader(io.StringIO(response.read().decode()))
+        assert len(rows) == 50
+        along = header[0].split(" ")[0]
+        for row in rows[::7]:
+            expected = surrogate.evaluate(**{**CASE, along: float(row[0])}).mu_macro
+            assert float(row[1]) == pytest.approx(expected, rel=1e-14)
+    for column in re.findall(r'\{"([^"]+)", type number\}', text):
+        assert column in ("v0 [m/s]", "mu_macro [-]")
+
+
+def test_octave(repository, live_server, surrogate):
+    need("octave-cli")
+    text = run(repository, "octave-cli", "--norc", "examples/octave.m", live_server.url)
+    assert number(r"mu_macro = ([\d.]+), stick_slip", text) == pytest.approx(
+        surrogate.evaluate(**CASE).mu_macro, abs=1e-6
+    )
+    low, high = surrogate.evaluate(**{**CASE, "v0": np.array([1e-4, 10.0])}).mu_macro
+    assert number(r"from ([\d.]+) at 0.0001 m/s", text) == pytest.approx(low, abs=1e-6)
+    assert number(r"to ([\d.]+) at 10 m/s", text) == pytest.approx(high, abs=1e-6)
+    assert 0.02 < number(r"steepest near ([\d.]+) m/s", text) < 0.04
+
+
+def test_uncertainty(repository, live_server, surrogate):
+    need(None, "umbridge", "scipy")
+    text = run(repository, sys.executable, "examples/uncertainty.py", live_server.url)
+    sampled = number(r"points: mean [\d.]+, standard deviation ([\d.]+)", text)
+    first_order = number(r"first order: standard deviation ([\d.]+)", text)
+    gradient = surrogate.evaluate(**CASE, gradient=True).gradient
+    spreads = {"mu0": 1.03, "Fz": 1.02, "y0": 1.05}
+    expected = sum((gradient[name] * CASE[name] * np.log(spread)) ** 2 for name, spread in spreads.items()) ** 0.5
+    assert first_order == pytest.approx(expected, abs=1e-5)
+    assert sampled == pytest.approx(first_order, rel=0.02)
+
+
+def test_least_power(repository, tables_dir):
+    need(None, "openmdao", "scipy")
+    table = tables_dir / "mumacro-1e-10.nc"
+    text = run(repository, sys.executable, "examples/least_power.py", table)
+    assert number(r"mu_macro = ([\d.]+)", text) == pytest.approx(0.15, abs=1e-6)
+    found = number(r"power ([\d.]+) mW", text)
+    script = (
+        "import sys; sys.path.insert(0, 'examples'); import least_power as example; from friction import Surrogate;"
+        "from friction.inverse import solve_for; import numpy as np;"
+        "s = Surrogate.open(sys.argv[1]); p = example.optimise(s);"
+        "checked = p.check_partials(out_stream=None, method='fd', form='central', step=1e-6, step_calc='rel');"
+        "print('WORST', max(np.max(np.abs(pair['J_fwd'] - pair['J_fd']) / (1e-300 + np.abs(pair['J_fd'])))"
+        " for part in checked.values() for pair in part.values() if np.max(np.abs(pair['J_fd'])) > 0));"
+        "case = {n: v for n, v in example.INPUTS.items() if n not in ('y0', 'omega')};"
+        "power = example.Power(surrogate=s)._powers;"
+        "amplitude = lambda w: solve_for(s, 'y0', example.TARGET, {**case, 'omega': w}).roots[0][0].value;"
+        "grid = [power({**case, 'omega': w, 'y0': amplitude(w)})[1] for w in np.geomspace(1e3, 1e6, 400)];"
+        "print('GRID', 1e3 * min(grid))"
+    )
+    text = run(repository, sys.executable, "-c", script, table)
+    assert number(r"WORST ([\d.e-]+)", text) < 1e-4
+    # the best of 400 frequencies, each with the amplitude that just meets the target
+    assert found == pytest.approx(number(r"GRID ([\d.e-]+)", text), rel=1e-4)
