@@ -15,7 +15,7 @@ from friction.regions import REGIMES, SOURCES
 from friction.surrogate import REGIME_OF_SOURCE
 from service import API_VERSION
 from service.compiled.block import evaluate_cases
-from service.limits import groups, limits
+from service.limits import groups, limits, power, stick_fraction
 from service.schemas import CaseRequest, Groups, InputStd, Limits
 from service.shelf import LoadedTable
 
@@ -159,6 +159,8 @@ _KEYS: dict[str, tuple[str, ...] | None] = {
     "limits": tuple(Limits.model_fields),
     "gradient": FIELDS,
     "std": None,
+    "stick_fraction": None,
+    "power": None,
 }
 
 
@@ -177,6 +179,10 @@ def _extras(
             values[name] = limits(surrogate, case, answer)
         elif name == "gradient":
             values[name] = {field: gradient.get(field, np.nan) for field in FIELDS}
+        elif name == "stick_fraction":
+            values[name] = stick_fraction(surrogate, answer)
+        elif name == "power":
+            values[name] = power(surrogate, case, answer)
         elif std is not None:
             total: Any = 0.0
             with np.errstate(over="ignore", invalid="ignore"):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from friction import Answer, Surrogate
 
-__all__ = ["groups", "limits"]
+__all__ = ["groups", "limits", "power", "stick_fraction"]
 
 Values = Mapping[str, Any]
 
@@ -66,3 +66,23 @@ def limits(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, NDAr
         "v0_crit": np.where(at_rest, 0.0, np.where(usable, v0_crit, np.nan)),
         "mu_crit": np.where(at_rest, mu0, np.where(usable, mu0 * ratio, np.nan)),
     }
+
+
+def power(surrogate: Surrogate, case: Values, answer: Answer) -> Any:
+    """Mean power that keeps up the oscillation [W]; the drive adds v0 mu_macro Fz to it.
+
+    NaN for rigid contact, whose l0 = 0 is no unit, and where the groups are beyond double range.
+    """
+    mu0, load, omega = (np.asarray(case[name], dtype=np.float64) for name in ("mu0", "Fz", "omega"))
+    at_rest = (np.asarray(case["y0"]) == 0.0) | (omega == 0.0)
+    usable = np.isfinite(answer.v_tilde) & np.isfinite(answer.y_tilde) & ~at_rest
+    v, y = (np.where(usable, group, 1.0) for group in (answer.v_tilde, answer.y_tilde))
+    with np.errstate(over="ignore", under="ignore"):
+        unit = mu0 * load * (np.asarray(answer.length_scale) * omega)
+        found = np.asarray(surrogate.power(v, y)) * unit
+    return np.where(at_rest, 0.0, np.where(usable, found, np.nan))
+
+
+def stick_fraction(surrogate: Surrogate, answer: Answer) -> Any:
+    """Share of the period during which the contact sticks [-]; 0 where nothing oscillates, and for rigid contact."""
+    return np.asarray(surrogate.stick_fraction(np.asarray(answer.v_tilde), np.asarray(answer.y_tilde)))

@@ -24,8 +24,8 @@ __all__ = [
     "TableLabel",
 ]
 
-Include = Literal["groups", "limits", "gradient", "std"]
-INCLUDES: tuple[Include, ...] = ("groups", "limits", "gradient", "std")
+Include = Literal["groups", "limits", "gradient", "std", "stick_fraction", "power"]
+INCLUDES: tuple[Include, ...] = ("groups", "limits", "gradient", "std", "stick_fraction", "power")
 _INCLUDE = f"More to compute: {', '.join(INCLUDES)}"
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -33,6 +33,8 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 _K = "Tangential contact stiffness [N/m], finite and > 0; left out or null: rigid contact"
 _STD = "Standard deviations of the inputs; needed where include asks for std, and nowhere else"
+_STICK = "Share of the period during which the contact sticks [-]; only if asked for"
+_POWER = "Mean power that keeps up the oscillation [W]; null for rigid contact; only if asked for"
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
@@ -138,6 +140,8 @@ class Result(BaseModel):
     limits: Limits | None = Field(None, description="Only if asked for")
     gradient: Gradient | None = Field(None, description="Only if asked for")
     std: float | None = Field(None, description="Standard deviation of mu_macro [-], to first order; only if asked for")
+    stick_fraction: float | None = Field(None, description=_STICK)
+    power: float | None = Field(None, description=_POWER)
 
 
 class CaseAnswer(Result):
@@ -174,6 +178,8 @@ class ColumnsAnswer(_BatchEnd):
     limits: dict[str, list[float | None]] | None = None
     gradient: dict[str, list[float | None]] | None = None
     std: list[float | None] | None = None
+    stick_fraction: list[float | None] | None = None
+    power: list[float | None] | None = None
 
 
 class RowsAnswer(_BatchEnd):

@@ -20,7 +20,7 @@ _TEXTS = (
     {**_CASE, "v0": [0.01, True, None], "k": [1e6, None, 0.0]},
     True,
 )
-_INCLUDE = ("groups", "limits", "gradient")
+_INCLUDE = ("groups", "limits", "gradient", "stick_fraction", "power")
 
 
 def prepare(shelf: Shelf) -> None:

@@ -1,4 +1,4 @@
-"""Gradient and standard deviation: against finite differences, in every form, and how they are refused."""
+"""Gradient, standard deviation, power and stick fraction: what they say, in every form, and how they are refused."""
 
 import math
 
@@ -90,3 +90,38 @@ def test_a_query_is_held_to_the_same(client, case, problem, query, parameter):
     (fault,) = problem(client.get(PATH, params={**case, **query}), 422)["errors"]
     assert fault["parameter"] == parameter
     problem(client.post(f"{PATH}/batch", params=query, json=[case]), 422)
+
+
+@pytest.mark.parametrize("v0", [0, 1e-4, 0.01, 0.3, 5.0])
+@pytest.mark.parametrize("y0", [1e-7, 2e-6, 1e-4])
+def test_power_and_stick_fraction_are_the_surrogates(client, case, surrogate, v0, y0):
+    at = {**case, "v0": v0, "y0": y0}
+    answer = ask(client, at, include=["groups", "power", "stick_fraction", "limits"])
+    v, y, l0 = (answer["groups"][name] for name in ("v_tilde", "y_tilde", "l0"))
+    unit = case["mu0"] * case["Fz"] * l0 * case["omega"]
+    assert answer["power"] == pytest.approx(surrogate.power(v, y) * unit, rel=1e-12)
+    assert answer["stick_fraction"] == pytest.approx(surrogate.stick_fraction(v, y), rel=1e-12)
+    assert (answer["stick_fraction"] > 0) == (v0 < answer["limits"]["v0_crit"])
+    # what both drives put in is lost where the contact slips, so neither is more than the friction force can take
+    speed = v0 + y0 * case["omega"]
+    assert 0 <= answer["power"] + v0 * answer["mu_macro"] * case["Fz"] <= case["mu0"] * case["Fz"] * speed * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(("change", "power"), [({"y0": 0}, 0.0), ({"omega": 0}, 0.0), ({"k": None}, None)])
+def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, power):
+    answer = ask(client, {**case, **change}, include=["power", "stick_fraction"])
+    assert (answer["power"], answer["stick_fraction"]) == (power, 0.0)
+
+
+def test_power_and_stick_fraction_come_in_batches(client, case):
+    rows = [{**case, "v0": v0, "k": k} for v0 in (0, 1e-3, 0.1) for k in (1e6, None)] + [17]
+    query = {"include": "stick_fraction,power,gradient"}
+    results = client.post(f"{PATH}/batch", params=query, json=rows).json()["results"]
+    for row, result in zip(rows[:-1], results, strict=False):
+        single = ask(client, row, include=["stick_fraction", "power"])
+        assert result["stick_fraction"] == pytest.approx(single["stick_fraction"], rel=1e-12)
+        if single["power"] is None:
+            assert result["power"] is None
+        else:
+            assert result["power"] == pytest.approx(single["power"], rel=1e-12)
+    assert results[-1] is None

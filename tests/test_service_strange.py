@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0", "include", "tolerance")
+from service.schemas import INCLUDES
+
+FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0", "include", "tolerance", "std")
 POST_PATHS = ("/v1/mu-macro", "/v1/mu-macro/batch")
 
 leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.just(0.5) | st.just(10**400)
@@ -14,10 +16,11 @@ values = st.recursive(
     leaves, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner, max_size=2)
 )
 names = st.sampled_from(FIELDS) | st.text(max_size=4)
+stds = st.dictionaries(st.sampled_from(["mu0", "k", "v0"]), st.just(0.5) | leaves)
 objects = st.dictionaries(names, values, max_size=8)
 likely = st.fixed_dictionaries(
     {name: st.just(1.0) | st.lists(st.floats() | leaves, min_size=2, max_size=2) for name in FIELDS[:6]},
-    optional={"include": st.lists(st.sampled_from(["groups", "limits"])), "tolerance": leaves},
+    optional={"include": st.lists(st.sampled_from(INCLUDES)), "tolerance": leaves, "std": leaves | stds},
 )
 documents = values | objects | likely | st.lists(objects | likely | values, max_size=4)
 
