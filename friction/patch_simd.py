@@ -1,7 +1,7 @@
 """One polynomial patch as eight-lane vector code: plain Python to read and to test, LLVM vectors when compiled.
 
-LLVM does not turn eight scalar Horner chains into one vector chain by itself; written out, it is two to three times
-faster (benchmarks/kernel.py), on any processor: LLVM splits the vectors where the hardware has shorter ones.
+LLVM does not turn eight scalar Horner chains into one vector chain by itself; written out, it is twice as
+fast (benchmarks/kernel.py), on any processor: LLVM splits the vectors where the hardware has shorter ones.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class Answer:
 class Surrogate:
     """mu~(v~, y~) from one table; open it once, share it between threads.
 
-    >>> s = Surrogate.open("tables/mumacro-1e-8.nc")                           # doctest: +SKIP
+    >>> s = Surrogate.open("tables/mumacro-1e-10.nc")                           # doctest: +SKIP
     >>> s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01).regime  # doctest: +SKIP
     'stick_slip'
     """

@@ -160,7 +160,7 @@ def _fill(root: Any, table: Table) -> None:
         _put(group, coordinate, (coordinate,), piece.nodes, _COORDINATES[coordinate])
         _put(group, "value", (coordinate,), piece.values, quantity)
         group.setncatts({"range": np.array(span), "cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error})
-    # inside the border, which they are fitted to: the CF checker takes a second group at the root for a time series
+    # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
     blocks = border.createGroup("blocks")
     for spec, block in zip(regions.BLOCKS, table.blocks, strict=True):
         group = blocks.createGroup(spec.name)
