@@ -406,6 +406,21 @@ def stick_slip(
 
 
 @njit(cache=True, error_model="numpy")
+def _sliding(out: np.ndarray, res: np.ndarray) -> None:
+    """Results of continuous sliding but the smallest slip speed, from what :func:`continuous` left in ``out``."""
+    mean = 1.0 / math.pi
+    res[0] = out[4] * mean
+    res[1] = out[5] * mean
+    res[2] = 0.0
+    res[3] = 0.0
+    res[4] = out[7] * mean
+    res[5] = out[6] * mean
+    res[7] = 4e-16
+    if res[1] < 0.5:
+        res[0] = 1.0 - res[1]
+
+
+@njit(cache=True, error_model="numpy")
 def _unshrink(res: np.ndarray, shrink: float, v: float, solved: float) -> None:
     """From the amplitude SMALLEST_Y back to ``shrink`` times it; ``solved`` is the v~ that stood in for ``v``."""
     if shrink != 1.0:
@@ -474,20 +489,18 @@ def solve_raw(
             return status
         res[6] = out[8]
         if out[8] >= 0.0:
-            mean = 1.0 / math.pi
-            res[0] = out[4] * mean
-            res[1] = out[5] * mean
-            res[2] = 0.0
-            res[3] = 0.0
-            res[4] = out[7] * mean
-            res[5] = out[6] * mean
-            res[7] = 4e-16
-            if res[1] < 0.5:
-                res[0] = 1.0 - res[1]
+            _sliding(out, res)
             _unshrink(res, shrink, given, v)
             return OK
         hint = out[9]
     status, spread = stick_slip(v, y, eta, hint, w, out, orbit)
+    if status != OK and res[6] > -1e-13 * v:
+        # the last digit below the border: the section ends where its root lies, and the two orbits are one to rounding
+        status = continuous(v, y, w, out)
+        if status == OK:
+            _sliding(out, res)
+            _unshrink(res, shrink, given, v)
+        return status
     if status != OK and status != NOT_CONVERGED:
         return status
     d, cth, deficit = orbit[0], orbit[1], orbit[2]
