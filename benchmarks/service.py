@@ -1,0 +1,580 @@
+"""What a question over HTTP costs: processor time of the server, ours beside others.
+
+    python benchmarks/service.py                                 prints the tables, takes about ten minutes
+    python benchmarks/service.py --write                         and puts them, with the plot, into docs/service.md
+    python benchmarks/service.py --peers /path/to/other/python   an interpreter that has umbridge or mlserver
+
+Needs ``wrk``, ``curl``, Linux, and two processors: the servers get one, who asks the other.  Servers run side by side
+and are asked in turn, so that a busy neighbour slows all of them; of the rounds the median counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import http.client
+import json
+import os
+import shutil
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+# Before this folder, where this file would pass for the package of its name.
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import numpy as np
+import orjson
+from measuring import IMAGES, ROOT, machine, markdown, progress, quantity
+
+from friction.nondim import FIELDS
+from service.answers import answer_cases
+from service.codecs import read_batch, terminated
+from service.shelf import LoadedTable
+
+PAGE = ROOT / "docs" / "service.md"
+TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
+TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+SERVER_CORE, CLIENT_CORE = 0, 1
+BATCH = "/v1/mu-macro/batch"
+SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
+ENOUGH_S = 0.6  # processor time that a figure should rest on: the clock ticks in hundredths
+KINDS = {
+    "columns": "application/json",
+    "rows": "application/json",
+    "lines": "application/x-ndjson",
+    "arrow": "application/vnd.apache.arrow.stream",
+}
+LABELS = {
+    "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
+}  # fmt: skip
+
+
+# --- processes ----------------------------------------------------------------------------------------
+
+
+@dataclass
+class Server:
+    """A server process that listens on ``port``."""
+
+    name: str
+    process: subprocess.Popen[bytes]
+    port: int
+
+    def cpu(self) -> float:
+        """Processor time so far [s], all threads."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) * TICK_S
+
+    def memory(self, key: str = "VmRSS") -> float:
+        """Resident memory [MB]."""
+        for line in Path(f"/proc/{self.process.pid}/status").read_text().splitlines():
+            if line.startswith(key):
+                return int(line.split()[1]) / 1000.0
+        raise ValueError(key)
+
+    def ask(self, method: str, path: str, body: bytes = b"", kind: str = "application/json") -> tuple[int, bytes]:
+        """One exchange on a new connection; sends and reads at the same time, as a stream wants it."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=120) as raw:
+            head = f"{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
+            sender = threading.Thread(target=raw.sendall, args=(head.encode() + body,))
+            sender.start()
+            reply = http.client.HTTPResponse(raw, method=method)
+            reply.begin()
+            received = reply.read()
+            sender.join()
+            return reply.status, received
+
+
+def free_port() -> int:
+    """A port that nobody has now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def running(name: str, command: Sequence[str], port: int, path: str) -> Iterator[Server]:
+    """Start a server on its core; yield it when ``path`` answers."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("MUMACRO_")}
+    environment |= {"MUMACRO_MAX_BATCH": "1000000", "MUMACRO_MAX_BODY_BYTES": str(2**30), "PYTHONPATH": str(ROOT)}
+    words = ["taskset", "-c", str(SERVER_CORE), *command]
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(words, cwd=ROOT, env=environment, stdout=log, stderr=log)
+        server = Server(name, process, port)
+        try:
+            deadline = time.monotonic() + 120
+            while True:
+                try:
+                    server.ask("GET", path)
+                    break
+                except OSError:
+                    if process.poll() is not None or time.monotonic() > deadline:
+                        log.seek(0)
+                        raise RuntimeError(f"{name} did not start: {log.read()[-2000:].decode()}") from None
+                    time.sleep(0.01)
+            yield server
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+                try:
+                    process.wait(20)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
+
+
+def ours() -> Any:
+    """Our service on one worker, with logs and counters on, as it comes."""
+    port = free_port()
+    command = [sys.executable, "-m", "service", "--port", str(port), "--tables", str(TABLE)]
+    return running("mumacro", command, port, "/readyz")
+
+
+def peer(name: str, python: str = sys.executable) -> Any:
+    """One of benchmarks/service_peers.py."""
+    port = free_port()
+    command = [python, str(ROOT / "benchmarks" / "service_peers.py"), name, str(port)]
+    return running(name, command, port, "/v2/health/live" if name == "mlserver" else "/Info")
+
+
+def has(python: str, module: str) -> bool:
+    """Whether that interpreter finds the module."""
+    code = f"import importlib.util as u, sys; sys.exit(u.find_spec({module!r}) is None)"
+    return subprocess.run([python, "-c", code], check=False).returncode == 0
+
+
+# --- one case -----------------------------------------------------------------------------------------
+
+_SCRIPT = """
+local paths, bodies, n = {%s}, {%s}, 0
+wrk.headers["Content-Type"] = "application/json"
+request = function()
+  n = n %% #paths + 1
+  return wrk.format("%s", paths[n], nil, bodies[n])
+end
+"""
+
+
+@dataclass
+class Question:
+    """A kind of request, in some varieties of it."""
+
+    method: str
+    paths: list[str]
+    bodies: list[str]
+
+    def script(self, folder: Path) -> Path:
+        """The question as wrk wants it."""
+        quote = json.dumps
+        text = _SCRIPT % (", ".join(map(quote, self.paths)), ", ".join(map(quote, self.bodies)), self.method)
+        path = folder / f"{abs(hash(text))}.lua"
+        path.write_text(text)
+        return path
+
+
+def cases(n: int = 64) -> list[dict[str, float]]:
+    """Cases around a piezo actuator on steel."""
+    return [
+        {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": round(1e-3 * (i + 1) + 1.23e-4, 6)}
+        for i in range(n)
+    ]
+
+
+def post(path: str = "/v1/mu-macro", **options: Any) -> Question:
+    """One case in a body."""
+    return Question("POST", [path] * 64, [json.dumps({**case, **options}) for case in cases()])
+
+
+def get() -> Question:
+    """One case in a query."""
+    paths = ["/v1/mu-macro?" + "&".join(f"{k}={v}" for k, v in case.items()) for case in cases()]
+    return Question("GET", paths, [""] * 64)
+
+
+def umbridge_question() -> Question:
+    """The same numbers in the protocol of UM-Bridge."""
+    bodies = [json.dumps({"name": "mu_macro", "input": [list(case.values())], "config": {}}) for case in cases()]
+    return Question("POST", ["/Evaluate"] * 64, bodies)
+
+
+def mlserver_question() -> Question:
+    """The same numbers in the Open Inference Protocol."""
+    bodies = [
+        json.dumps({"inputs": [{"name": "x", "shape": [1, 6], "datatype": "FP64", "data": list(case.values())}]})
+        for case in cases()
+    ]
+    return Question("POST", ["/v2/models/mu_macro/infer"] * 64, bodies)
+
+
+def load(server: Server, script: Path, seconds: float) -> tuple[float, float]:
+    """Processor time [us] a request, and requests a second, under 16 connections that never pause."""
+    before = server.cpu()
+    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", "-c16", f"-d{seconds:g}s", "-s", str(script)]
+    done = subprocess.run(
+        [*command, f"http://127.0.0.1:{server.port}"], capture_output=True, text=True, check=True
+    ).stdout
+    spent = server.cpu() - before
+    if "Non-2xx" in done or "Socket errors" in done:
+        raise RuntimeError(f"{server.name}: {done}")
+    words = done.split()
+    requests = int(words[words.index("requests") - 1])
+    return 1e6 * spent / requests, float(words[words.index("Requests/sec:") + 1])
+
+
+def measure_single(peers: dict[str, str], rounds: int, seconds: float, folder: Path) -> dict[str, tuple[float, float]]:
+    """Median processor time [us] and rate for every server and kind of question."""
+    asked: dict[str, list[tuple[str, Question]]] = {
+        "mumacro": [("POST", post()), ("GET", get())],
+        "raw": [("POST", post()), ("GET", get())],
+        "fastapi": [("POST", post())],
+        "fastapi_sync": [("POST", post())],
+        "umbridge": [("POST", umbridge_question())],
+        "mlserver": [("POST", mlserver_question())],
+    }
+    found: dict[str, list[tuple[float, float]]] = {}
+    contexts = [ours(), peer("raw"), peer("fastapi"), peer("fastapi_sync")]
+    contexts += [peer(name, python) for name, python in peers.items()]
+    with _all(contexts) as servers:
+        scripts = [
+            (server, f"{server.name} {name}", question.script(folder))
+            for server in servers
+            for name, question in asked[server.name]
+        ]
+        for server, _, script in scripts:
+            load(server, script, 1)
+        for number in range(rounds):
+            progress(f"single cases, round {number + 1} of {rounds}")
+            for server, name, script in scripts:
+                found.setdefault(name, []).append(load(server, script, seconds))
+    return {name: tuple(map(statistics.median, zip(*values, strict=True))) for name, values in found.items()}  # type: ignore[misc]
+
+
+@contextmanager
+def _all(contexts: list[Any]) -> Iterator[list[Server]]:
+    if not contexts:
+        yield []
+        return
+    with contexts[0] as first, _all(contexts[1:]) as rest:
+        yield [first, *rest]
+
+
+# --- batches ------------------------------------------------------------------------------------------
+
+
+def columns(n: int) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """n random cases, every input different in every one, all digits used."""
+    rng = np.random.default_rng(n)
+    return {
+        "mu0": rng.uniform(0.1, 0.9, n),
+        "Fz": 10 ** rng.uniform(0, 2, n),
+        "k": 10 ** rng.uniform(5, 7, n),
+        "y0": 10 ** rng.uniform(-8, -4, n),
+        "omega": 10 ** rng.uniform(4, 6, n),
+        "v0": 10 ** rng.uniform(-4, 1, n),
+    }
+
+
+def body_of(form: str, n: int) -> bytes:
+    """n cases on the wire."""
+    table = columns(n)
+    if form == "columns":
+        return orjson.dumps(table, option=orjson.OPT_SERIALIZE_NUMPY)
+    if form == "rows":
+        return orjson.dumps(
+            [dict(zip(FIELDS, row, strict=True)) for row in zip(*(table[f].tolist() for f in FIELDS), strict=True)]
+        )
+    if form == "lines":
+        blocks = ({name: column[start : start + 1000] for name, column in table.items()} for start in range(0, n, 1000))
+        return b"".join(orjson.dumps(block, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for block in blocks)
+    import pyarrow as pa
+
+    sink = pa.BufferOutputStream()
+    batch = pa.record_batch(table)
+    with pa.ipc.new_stream(sink, batch.schema) as writer:
+        writer.write_batch(batch)
+    return bytes(sink.getvalue())
+
+
+def measure_batches(rounds: int) -> dict[str, dict[int, float]]:
+    """Million cases a second of processor time by form and size."""
+    rates: dict[str, dict[int, float]] = {form: {} for form in (*KINDS, "fastapi")}
+    with ours() as server, peer("fastapi") as plain:
+        for n in SIZES:
+            progress(f"batches of {n}")
+            for form in KINDS:
+                body = body_of(form, n)
+                rates[form][n] = _rate(server, BATCH, body, KINDS[form], n, rounds)
+            if n <= 100_000:
+                rates["fastapi"][n] = _rate(plain, BATCH, body_of("rows", n), KINDS["rows"], n, rounds)
+    return rates
+
+
+def _rate(server: Server, path: str, body: bytes, kind: str, n: int, rounds: int) -> float:
+    status, _ = server.ask("POST", path, body, kind)
+    if status != 200:
+        raise RuntimeError(f"{server.name}: {status}")
+    found = []
+    for _ in range(rounds):
+        before, asked = server.cpu(), 0
+        while server.cpu() - before < ENOUGH_S:
+            server.ask("POST", path, body, kind)
+            asked += 1
+        found.append(asked * n / (server.cpu() - before) / 1e6)
+    return statistics.median(found)
+
+
+def limits(rounds: int) -> dict[str, float]:
+    """Million cases a second of the parts alone, in this process, one thread: parsing, evaluating."""
+    n = 100_000
+    body = body_of("columns", n)
+    table = LoadedTable.open(TABLE)
+    batch, _ = read_batch(*terminated(body), n)
+    work: dict[str, Callable[[], object]] = {
+        "orjson.loads": lambda: orjson.loads(body),
+        "json.loads": lambda: json.loads(body),
+        "our scanner": lambda: read_batch(*terminated(body), n),
+        "evaluation": lambda: answer_cases(table, batch, ()),
+    }
+    try:
+        import simdjson
+    except ImportError:
+        pass
+    else:
+        parser = simdjson.Parser()
+        work["simdjson"] = lambda: [parser.parse(body)[name].as_buffer(of_type="d") for name in FIELDS]
+    found: dict[str, list[float]] = {name: [] for name in work}
+    for _ in range(rounds + 1):
+        for name, call in work.items():
+            before = time.process_time()
+            call()
+            found[name].append(n / (time.process_time() - before) / 1e6)
+    return {name: statistics.median(values[1:]) for name, values in found.items()}
+
+
+# --- the rest -----------------------------------------------------------------------------------------
+
+
+def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
+    """What each included name adds, to one case and to a case of a batch."""
+    std = {"mu0": 0.01, "v0": 1e-4}
+    wanted: dict[str, dict[str, Any]] = {
+        "nothing": {},
+        **{name: {"include": [name]} for name in ("groups", "limits", "gradient", "stick_fraction", "power")},
+        "std": {"include": ["std"], "std": std},
+    }
+    n = 100_000
+    table = {name: column.tolist() for name, column in columns(n).items()}
+    rows = []
+    with ours() as server:
+        for name, options in wanted.items():
+            progress(f"include {name}")
+            script = post(**options).script(folder)
+            load(server, script, 0.5)
+            single = statistics.median(load(server, script, 2)[0] for _ in range(rounds))
+            rate = _rate(server, BATCH, orjson.dumps({**table, **options}), "application/json", n, rounds)
+            rows.append([name, quantity(single, 3), quantity(1e3 / rate, 3)])
+    return rows
+
+
+def measure_start(rounds: int) -> list[list[str]]:
+    """Seconds until ready, and memory then and after work."""
+    seconds, fresh, worked = [], [], []
+    body = body_of("columns", 100_000)
+    for _ in range(rounds):
+        started = time.monotonic()
+        with ours() as server:
+            seconds.append(time.monotonic() - started)
+            fresh.append(server.memory())
+            for _ in range(5):
+                server.ask("POST", BATCH, body)
+            worked.append(server.memory())
+    return [
+        ["ready after [s]", quantity(statistics.median(seconds))],
+        ["memory when ready [MB]", quantity(statistics.median(fresh), 3)],
+        ["memory after five batches of 100,000 [MB]", quantity(statistics.median(worked), 3)],
+    ]
+
+
+def measure_waiting() -> list[list[str]]:
+    """Longest wait for short requests while large batches run, and what long streams hold."""
+    rows = []
+    case = json.dumps(cases(1)[0]).encode()
+    with ours() as server:
+        for form in KINDS:
+            progress(f"short requests beside {form}")
+            body = body_of(form, 1_000_000)
+            waits: dict[str, list[float]] = {"GET": [], "POST": []}
+            done = threading.Event()
+
+            def large(form: str = form, body: bytes = body, done: threading.Event = done) -> None:
+                _in_another_process(server.port, body, KINDS[form])
+                done.set()
+
+            thread = threading.Thread(target=large)
+            thread.start()
+            while not done.is_set():
+                for method, path, content in (("GET", "/livez", b""), ("POST", "/v1/mu-macro", case)):
+                    begun = time.perf_counter()
+                    server.ask(method, path, content)
+                    waits[method].append(time.perf_counter() - begun)
+            thread.join()
+            both = waits["GET"] + waits["POST"]
+            middle = statistics.median(both)
+            rows.append(
+                [
+                    LABELS[form],
+                    quantity(1e3 * middle),
+                    quantity(1e3 * max(waits["GET"])),
+                    quantity(1e3 * max(waits["POST"])),
+                ]
+            )
+    return rows
+
+
+def _in_another_process(port: int, body: bytes, kind: str) -> None:
+    """Ask from another process: threads of one would wait for each other, not for the server."""
+    with tempfile.NamedTemporaryFile() as file:
+        file.write(body)
+        file.flush()
+        command = ["curl", "--silent", "--show-error", "--fail", "--output", os.devnull, "--noproxy", "*"]
+        command += ["--header", f"Content-Type: {kind}", "--header", "Expect:", "--data-binary", f"@{file.name}"]
+        subprocess.run(["taskset", "-c", str(CLIENT_CORE), *command, f"http://127.0.0.1:{port}{BATCH}"], check=True)
+
+
+def measure_streams() -> list[list[str]]:
+    """Memory of the server over the length of a stream."""
+    rows = []
+    with ours() as server:
+        line = body_of("lines", 1000)
+        server.ask("POST", BATCH, line * 10, KINDS["lines"])
+        base = server.memory()
+        for blocks in (100, 1000, 5000):
+            progress(f"a stream of {blocks} blocks")
+            server.ask("POST", BATCH, line * blocks, KINDS["lines"])
+            rows.append([f"{1000 * blocks:,}", quantity(server.memory("VmHWM") - base, 3)])
+    return rows
+
+
+def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path) -> None:
+    """Million cases and requests a second over the size of a batch."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    colours = {"columns": "#c1272d", "rows": "#e08214", "lines": "#7b4fa3", "arrow": "#1f5fa8", "fastapi": "#7f7f7f"}
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
+    for form, values in rates.items():
+        sizes = np.array(list(values))
+        cases_a_second = 1e6 * np.array(list(values.values()))
+        label = LABELS.get(form, "FastAPI, list of models")
+        left.loglog(sizes, cases_a_second / sizes, "o-", color=colours[form], label=label, ms=4)
+        right.loglog(sizes, cases_a_second / 1e6, "o-", color=colours[form], label=label, ms=4)
+    for name, style in (("orjson.loads", ":"), ("evaluation", "--")):
+        right.axhline(alone[name], color="#222222", ls=style, lw=1, label=f"{name} alone")
+    left.set_ylabel("requests per second of processor time")
+    right.set_ylabel("million cases per second of processor time")
+    for axes in (left, right):
+        axes.set_xlabel("cases in a batch")
+        axes.grid(True, color="#e4e4e4")
+        axes.spines[["top", "right"]].set_visible(False)
+    right.legend(frameon=False, fontsize=8)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+NAMES = {
+    "mumacro POST": "mumacro, `POST`, checked, logged, counted",
+    "mumacro GET": "mumacro, `GET`, the same, with entity tag",
+    "raw POST": "raw ASGI and orjson, `POST`, nothing checked",
+    "raw GET": "raw ASGI and orjson, `GET`, nothing checked",
+    "fastapi POST": "FastAPI, models in and out, `async def`",
+    "fastapi_sync POST": "FastAPI, models in and out, `def`",
+    "umbridge POST": "UM-Bridge's Python server, a constant",
+    "mlserver POST": "MLServer, its first input",
+}
+
+
+def report(
+    options: argparse.Namespace, folder: Path
+) -> tuple[dict[str, str], dict[str, dict[int, float]], dict[str, float]]:
+    """Measure everything; return the sections of the page."""
+    peers = {
+        name: python
+        for python in [sys.executable, *options.peers]
+        for name in ("umbridge", "mlserver")
+        if has(python, name)
+    }
+    single = measure_single(peers, options.rounds, options.seconds, folder)
+    table = []
+    for name, (spent, rate) in single.items():
+        floor = single["raw GET" if name.endswith("GET") else "raw POST"][0]
+        table.append([NAMES[name], quantity(spent, 3), quantity(rate, 3), f"{floor / spent:.2f}"])
+    sections = {
+        "single": markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table),
+    }
+    rates = measure_batches(options.rounds)
+    alone = limits(options.rounds)
+    rows = [
+        [
+            LABELS.get(form, "FastAPI, list of models in and out"),
+            *(quantity(rates[form][n]) if n in rates[form] else "-" for n in SIZES),
+        ]
+        for form in rates
+    ]
+    sections["batches"] = markdown(["million cases/s", *(f"{n:,}" for n in SIZES)], rows)
+    sections["alone"] = markdown(
+        ["alone, in one thread", "million cases/s"], [[k, quantity(v)] for k, v in alone.items()]
+    )
+    sections["includes"] = markdown(
+        ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
+    )
+    sections["waiting"] = markdown(
+        ["beside a batch of 1,000,000 as", "median [ms]", "longest `/livez` [ms]", "longest case [ms]"],
+        measure_waiting(),
+    )
+    sections["streams"] = markdown(["cases in a stream", "memory above the start [MB]"], measure_streams())
+    sections["start"] = markdown(["one worker, one table", ""], measure_start(options.rounds))
+    note = machine("fastapi", "uvicorn", "orjson", "pydantic", "pyarrow")
+    sections["machine"] = note
+    return sections, rates, alone
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--peers", nargs="*", default=[], metavar="PYTHON")
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+    for program in ("wrk", "taskset", "curl"):
+        if shutil.which(program) is None:
+            raise SystemExit(f"{program} is not installed")
+    os.sched_setaffinity(0, {CLIENT_CORE})
+    with tempfile.TemporaryDirectory() as name:
+        sections, rates, alone = report(options, Path(name))
+    for text in sections.values():
+        print(text, end="\n\n")
+    if options.write:
+        page = PAGE.read_text(encoding="utf-8")
+        for name, text in sections.items():
+            begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+            before, _, rest = page.partition(begin)
+            page = before + begin + "\n" + text + "\n\n" + end + rest.partition(end)[2]
+        PAGE.write_text(page, encoding="utf-8")
+        plot(rates, alone, IMAGES / "service.png")
+
+
+if __name__ == "__main__":
+    main()
