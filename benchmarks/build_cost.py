@@ -22,7 +22,7 @@ import peers
 from measuring import markdown, progress, quantity
 from scipy.interpolate import RectBivariateSpline
 
-from builder.assemble import build_table
+from builder.assemble import MAX_TOLERANCE, build_table
 from builder.sweep import Sweep
 from friction import regions
 
@@ -149,6 +149,9 @@ def main() -> None:
         parser.error(f"--workers must be at least 1, got {given.workers}")
     tables = []
     with tempfile.TemporaryDirectory() as folder:
+        if not given.quick:
+            progress("compiling")
+            build(MAX_TOLERANCE, given.workers, Path(folder))
         for tolerance in TOLERANCES[:1] if given.quick else TOLERANCES:
             progress(f"building for {tolerance:.0e}")
             tables.append(build(tolerance, given.workers, Path(folder)))

@@ -7,6 +7,7 @@ installed are named in :data:`MISSING` with the command that installs them, and 
 from __future__ import annotations
 
 import math
+import os
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -240,7 +241,7 @@ def yardstick(points: int, rounds: int, build: bool = True) -> Yardstick | None:
         MISSING["CoolProp"] = "its tables are not built yet; a full run builds them"
         return None
     folder.mkdir(exist_ok=True)
-    settings.set_config_string(settings.ALTERNATIVE_TABLES_DIRECTORY, str(folder))
+    settings.set_config_string(settings.ALTERNATIVE_TABLES_DIRECTORY, f"{folder}{os.sep}")
     table, exact = CoolProp.AbstractState("BICUBIC&HEOS", "Water"), CoolProp.AbstractState("HEOS", "Water")
     table.update(CoolProp.HmolarP_INPUTS, 5e4, 1e5)  # builds the tables, or reads them
     rng = np.random.default_rng(5)
