@@ -61,6 +61,8 @@ def build(
         )
     if not out.parent.is_dir():
         raise typer.BadParameter(f"folder {str(out.parent)!r} does not exist", param_hint="--out")
+    if out.is_dir():
+        raise typer.BadParameter(f"{str(out)!r} is a folder", param_hint="--out")
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:<32}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     try:

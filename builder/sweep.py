@@ -135,8 +135,9 @@ class Sweep:
         failed = np.flatnonzero(out[:, 5] != OK)
         if failed.size:
             i = failed[0]
+            v_bad, y_bad = points[i, :2].tolist()
             raise SolveError(
-                f"{failed.size} of {points.shape[0]} points failed, first v~={points[i, 0]!r}, y~={points[i, 1]!r}: "
+                f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, y~={y_bad!r}: "
                 + steady.ADVICE[int(out[i, 5])]
             )
         return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
@@ -148,7 +149,7 @@ class Sweep:
         else:
             assert self._pool is not None  # noqa: S101 (one of the two is always there)
             done = list(self._pool.map(lambda c: solve_chunk(kind, c), chunks))
-        return np.concatenate(done)
+        return np.concatenate([np.empty((0, len(COLUMNS))), *done])
 
     def _file(self, kind: str, points: Array) -> Path | None:
         if self.checkpoint is None:

@@ -70,7 +70,7 @@ def test_report_of_a_sound_table(sound: Surrogate, sweep: Sweep) -> None:
     assert report == verify(sound, sweep, 1000, seed=3)
 
 
-@pytest.mark.parametrize("block", ["continuous_mid_1", "stick_slip_low", "corner", "stick_slip_tail"])
+@pytest.mark.parametrize("block", ["continuous_mid_1", "corner"])
 def test_a_block_off_by_a_millionth_is_found_and_named(block: str, sweep: Sweep) -> None:
     wrong = damaged(block, 1.0 + 1e-6)
     report = verify(wrong, sweep, 1000, seed=3)
@@ -88,9 +88,9 @@ def test_a_jump_at_a_seam_is_found(sound: Surrogate) -> None:
 
 
 def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
-    assert monotony(sound) <= 1e-7
-    # mu~ of the middle block too low: it falls where v~ rises into it
-    assert monotony(damaged("stick_slip_mid", 0.99)) >= 1e-3
+    assert monotony(sound, n=2000, lines=40) <= 1e-7
+    # mu~ too high below the border: it falls where v~ rises across it
+    assert monotony(damaged("stick_slip_mid_2", 1.01), n=2000, lines=40) >= 1e-3
 
 
 def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None:

@@ -1,0 +1,131 @@
+"""``python -m builder`` beyond the plain cases: whole builds, failures while working, help."""
+
+import importlib.util
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import pytest
+
+from builder.assemble import ABS_TO_REL
+from friction import Surrogate
+from friction.table import read_table, write_table
+
+Run = Callable[..., "CompletedProcess[str]"]
+
+
+def refused(done: Any, *parts: str) -> None:
+    """The command failed with a message that holds ``parts``, and without a traceback."""
+    assert done.returncode not in (0, None)
+    assert "Traceback" not in done.stderr + done.stdout
+    message = " ".join(done.stderr.replace("│", " ").split())
+    for part in parts:
+        assert part in message
+
+
+def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) -> None:
+    out = tmp_path / "rough.nc"
+    done = run_builder("build", "--tolerance", "1e-3", "--out", out, "--workers", 2)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)  # nothing but JSON: the progress bar goes to stderr
+    opened = Surrogate.open(out)
+    assert report["table"] == str(out)
+    assert report["content_sha256"] == opened.checksum
+    assert report["tolerance"] == opened.tolerance == 1e-3
+    assert report["verified_max_abs_error"] == opened.max_abs_error <= 1e-3
+    assert report["verified_max_rel_error"] == opened.max_rel_error <= ABS_TO_REL * 1e-3
+    assert report["bytes"] == out.stat().st_size
+    assert report["n_solves"] == opened.attributes["n_solves"] > 10_000
+    assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]  # no checkpoint, no partial file
+
+    verified = run_builder("verify", out, "--points", 300, "--seed", 5)
+    assert verified.returncode == 0, verified.stderr
+    assert json.loads(verified.stdout)["holds"] is True
+
+
+def test_build_cannot_write_where_a_folder_stands(run_builder: Run, tmp_path: Path) -> None:
+    (tmp_path / "taken.nc").mkdir()
+    refused(run_builder("build", "--tolerance", "1e-2", "--out", tmp_path / "taken.nc"), "--out", "is a folder")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.nc"]
+
+
+def test_build_needs_dask_for_a_scheduler(run_builder: Run, tmp_path: Path) -> None:
+    if importlib.util.find_spec("distributed") is not None:
+        pytest.skip("dask is installed")
+    done = run_builder("build", "--tolerance", "1e-2", "--out", tmp_path / "x.nc", "--scheduler", "tcp://127.0.0.1:1")
+    refused(done, "--scheduler", "dask")
+    assert done.returncode == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_solve_that_fails_says_so_and_gives_advice(run_builder: Run) -> None:
+    done = run_builder("solve", "--v", "1e15", "--y", "1e-3")
+    assert done.returncode == 1
+    answer = json.loads(done.stdout)
+    assert answer["mu_ratio"] is None  # NaN is no JSON
+    assert answer["status"] != 0
+    assert "tail" in answer["advice"]
+    assert "Traceback" not in done.stderr
+
+
+def test_solve_far_below_the_border_leaves_out_what_it_did_not_compute(run_builder: Run) -> None:
+    done = run_builder("solve", "--v", "1e-9", "--y", "0.5")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["regime"] == "stick_slip"
+    assert answer["min_slip_speed"] is None
+    assert answer["stick_fraction"] > 0.99
+
+
+def test_verify_rejects_a_table_that_misses_its_tolerance(run_builder: Run, tables_dir: Path, tmp_path: Path) -> None:
+    table = read_table(tables_dir / "mumacro-1e-4.nc")
+    table.attributes["tolerance"] = 1e-9  # it promises what it cannot hold
+    write_table(table, tmp_path / "boast.nc")
+    done = run_builder("verify", tmp_path / "boast.nc", "--points", 300)
+    refused(done, "boast.nc", "misses its tolerance of 1e-09")
+    report = json.loads(done.stdout)
+    assert report["holds"] is False
+    assert report["max_abs_error"] > 1e-9
+
+
+def test_verify_refuses_a_damaged_table(run_builder: Run, tables_dir: Path, tmp_path: Path) -> None:
+    cut = Path(shutil.copy(tables_dir / "mumacro-1e-4.nc", tmp_path / "cut.nc"))
+    cut.write_bytes(cut.read_bytes()[:60_000])
+    refused(run_builder("verify", cut), "cut.nc", "not a readable netCDF-4 table")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("build", "--tolerance", "0.5", "--out", "x.nc"), ("--tolerance", "must be from 1e-12 to 0.01")),
+        (("build", "--tolerance", "-1e-8", "--out", "x.nc"), ("--tolerance",)),
+        (("build", "--tolerance", "1e-3"), ("--out",)),
+        (("build", "--tolerance", "1e-3", "--out", "x.nc", "--workers", "2000"), ("--workers",)),
+        (("build", "--tolerance", "1e-3", "--out", "x.nc", "--sideways"), ("--sideways",)),
+        (("verify", "x.nc", "--points", "99999999"), ("--points",)),
+        (("verify", "x.nc", "--seed", "-1"), ("--seed",)),
+        (("verify", "x.nc", "--workers", "0"), ("--workers",)),
+        (("verify",), ("Missing argument",)),
+        (("solve", "--v", "", "--y", "1"), ("--v",)),
+        (("solve", "--v", "1", "--y", "-inf"), ("--y", "finite and > 0")),
+        (("solve", "--v", "1e999", "--y", "1"), ("--v", "finite and > 0")),
+        (("solve", "1", "2"), ()),
+    ],
+)  # fmt: skip
+def test_bad_arguments_are_refused_before_any_work(
+    run_builder: Run, arguments: Any, parts: Any, repository: Path
+) -> None:
+    refused(run_builder(*arguments), *parts)
+    assert not (repository / "x.nc").exists()
+    assert not (repository / "x.nc.checkpoint").exists()
+
+
+@pytest.mark.parametrize("command", [(), ("build",), ("solve",), ("verify",)])
+def test_every_command_explains_itself(run_builder: Run, command: tuple[str, ...]) -> None:
+    done = run_builder(*command, "--help")
+    assert done.returncode == 0
+    assert "Usage" in done.stdout
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,116 @@
+"""Many solves at once: the same numbers however the work is cut, resumed where it stopped, and no silent hole."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from builder import sweep as module
+from builder.steady import border, solve
+from builder.sweep import CHUNK, COLUMNS, SolveError, Sweep, solve_chunk
+
+
+def points(n: int) -> tuple[Any, Any]:
+    rng = np.random.default_rng(1)
+    return 10.0 ** rng.uniform(-3.0, 3.0, n), 10.0 ** rng.uniform(-3.0, 3.0, n)
+
+
+def test_values_do_not_depend_on_workers_or_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    v, y = points(3 * CHUNK + 17)
+    with Sweep(1) as one, Sweep(4) as four:
+        expected = one.solve("full", v, y)
+        found = four.solve("full", v, y)
+    monkeypatch.setattr(module, "CHUNK", 7)
+    with Sweep(2) as small:
+        again = small.solve("full", v, y)
+    for name in COLUMNS:
+        assert np.array_equal(found[name], expected[name])
+        assert np.array_equal(again[name], expected[name])
+
+
+def test_every_kind_says_what_a_single_solve_says() -> None:
+    v, y = points(40)
+    with Sweep(2) as sweep:
+        full = sweep.solve("full", v, y)
+        crit = sweep.solve("border", np.ones_like(y), y)
+        assert sweep.n_solves == 80
+    for i in range(40):
+        single = solve(v[i], y[i])
+        assert full["mu_ratio"][i] == single.mu_ratio
+        assert full["deficit"][i] == single.deficit
+        assert full["stick_fraction"][i] == single.stick_fraction
+        assert full["power"][i] == single.power
+        assert full["error_estimate"][i] == single.error_estimate
+        assert (crit["deficit"][i], crit["mu_ratio"][i]) == border(y[i])
+
+
+def test_shapes_broadcast_and_nothing_gives_nothing() -> None:
+    with Sweep(1) as sweep:
+        plane = sweep.solve("full", np.geomspace(0.1, 1.0, 3)[:, None], np.geomspace(0.5, 5.0, 4))
+        assert plane["mu_ratio"].shape == (3, 4)
+        assert sweep.solve("full", np.empty(0), np.empty(0))["mu_ratio"].shape == (0,)
+        assert sweep.n_solves == 12
+
+
+def test_amplitude_excess_is_passed_on() -> None:
+    v, y, eta = np.array([1e-27]), np.array([1.0]), np.array([1e-18])
+    with Sweep(1) as sweep:
+        exact, rounded = sweep.solve("full", v, y, eta)["mu_ratio"], sweep.solve("full", v, y)["mu_ratio"]
+    assert exact[0] == solve(1e-27, 1.0, 1e-18).mu_ratio
+    assert exact[0] < 0.8 * rounded[0]
+
+
+def test_a_point_that_fails_is_named_with_advice() -> None:
+    with Sweep(1) as sweep, pytest.raises(SolveError) as caught:
+        sweep.solve("full", np.array([0.1, -1.0, math.nan]), np.array([0.5, 0.5, 0.5]))
+    assert str(caught.value) == (
+        "2 of 3 points failed, first v~=-1.0, y~=0.5: v~ must be finite and > 0, y~ must be finite and > 0"
+    )
+
+
+def test_unknown_kind_is_refused() -> None:
+    with pytest.raises(KeyError):
+        solve_chunk("easy", np.ones((1, 3)))
+
+
+def test_finished_work_is_kept_and_taken_up_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    v, y = points(50)
+    folder = tmp_path / "work.checkpoint"
+    with Sweep(1, checkpoint=folder) as sweep:
+        expected = sweep.solve("full", v, y)
+    assert len(list(folder.iterdir())) == 1
+
+    def not_again(*_: object) -> None:
+        raise AssertionError("solved again")
+
+    with Sweep(1, checkpoint=folder) as sweep:
+        monkeypatch.setattr(sweep, "_run", not_again)
+        found = sweep.solve("full", v, y)
+        assert sweep.n_solves == 50  # what a build counts is the same, resumed or not
+        with pytest.raises(AssertionError, match="solved again"):
+            sweep.solve("continuous", v, y)
+        with pytest.raises(AssertionError, match="solved again"):
+            sweep.solve("full", v * (1.0 + 1e-15), y)
+        monkeypatch.setattr(module, "source_digest", lambda: "of another program")
+        with pytest.raises(AssertionError, match="solved again"):
+            sweep.solve("full", v, y)
+    assert all(np.array_equal(found[name], expected[name]) for name in COLUMNS)
+
+
+@pytest.mark.parametrize("damage", [b"", b"no array", b"\x93NUMPY\x01\x00", None])
+def test_a_damaged_checkpoint_is_solved_again(tmp_path: Path, damage: bytes | None) -> None:
+    v, y = points(20)
+    folder = tmp_path / "work.checkpoint"
+    with Sweep(1, checkpoint=folder) as sweep:
+        expected = sweep.solve("full", v, y)["mu_ratio"]
+        (file,) = folder.iterdir()
+        whole = file.read_bytes()
+        if damage is None:
+            np.save(file, np.zeros((3, 2)))  # an array, of another shape
+        else:
+            file.write_bytes(damage)
+        assert np.array_equal(sweep.solve("full", v, y)["mu_ratio"], expected)
+    assert file.read_bytes() == whole
+    assert list(folder.iterdir()) == [file]
