@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from builder.blocks import build_block, build_border
+from builder.rounding import bits, round_block, to_bits
 from builder.sweep import Sweep
 from builder.verify import block_errors, verify
 from friction import Surrogate
@@ -27,6 +28,7 @@ SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
+ERROR_BITS = 3  # digits of the plain grid's errors
 REFERENCE = (
     "Benad J., Nakano K., Popov V. L., Popov M.: Active control of friction by transverse oscillations. Friction (2018)"
 )
@@ -50,14 +52,21 @@ def stages() -> int:
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
-    """The log-spaced grid that a person plots; finer for finer tables, nodes solved, not interpolated."""
+    """The log-spaced grid that a person plots; finer for finer tables, nodes solved, not interpolated.
+
+    mu~ and the stick fraction keep as many digits as the table's tolerance needs; ``error_estimate`` is the solver's
+    and that of the rounding.
+    """
     n = 31 if tolerance > 1e-5 else (61 if tolerance > 1e-9 else 121)
     v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)
     solved = sweep.solve("full", v[:, None], y[None, :])
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    mu = to_bits(solved["mu_ratio"], bits(tolerance))
+    stick = to_bits(solved["stick_fraction"], bits(tolerance))
+    error = to_bits(solved["error_estimate"] + np.abs(mu - solved["mu_ratio"]), ERROR_BITS, up=True)
     return {
-        "v_tilde": v, "y_tilde": y, "mu_ratio": solved["mu_ratio"], "stick_fraction": solved["stick_fraction"],
-        "error_estimate": solved["error_estimate"], "v_tilde_crit": crit,
+        "v_tilde": v, "y_tilde": y, "mu_ratio": mu, "stick_fraction": stick, "error_estimate": error,
+        "v_tilde_crit": crit,
     }  # fmt: skip
 
 
@@ -93,7 +102,8 @@ def build_table(
     targets = [tolerance] * len(BLOCKS)
     blocks: list[Block] = []
     for spec, target in zip(BLOCKS, targets, strict=True):
-        blocks.append(build_block(spec, border, sweep, target, lambda text: progress(text, False)))
+        block = build_block(spec, border, sweep, target, lambda text: progress(text, False))
+        blocks.append(round_block(block, target))
         progress(spec.name, True)
     grid = plain_grid(sweep, tolerance)
     progress("plain grid", True)
@@ -111,7 +121,8 @@ def build_table(
             break
         for i in late:
             targets[i] /= 3.0
-            blocks[i] = build_block(BLOCKS[i], border, sweep, targets[i], lambda text: progress(text, False))
+            block = build_block(BLOCKS[i], border, sweep, targets[i], lambda text: progress(text, False))
+            blocks[i] = round_block(block, targets[i])
     progress("errors of the blocks", True)
     surrogate = Surrogate(table, out)
     report = verify(surrogate, sweep, FINAL_POINTS)

@@ -1,5 +1,7 @@
 """The table file: netCDF-4 with CF-1.11 conventions; written atomically, read with suspicion.
 
+:mod:`friction.table_writer` lays it out; a reader needs the netCDF library only.
+
 Layout (all quantities dimensionless, units "1"):
 
 * root: the plain log-spaced grid a person plots first, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
@@ -28,42 +30,8 @@ from friction.errors import TableError
 
 __all__ = ["FORMAT_VERSION", "Block", "BorderPiece", "Table", "read_table", "write_table"]
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 Array = NDArray[np.float64]
-
-_LONG = {
-    "mu_ratio": "macroscopic friction coefficient over Coulomb friction coefficient, mu_macro/mu0",
-    "stick_fraction": "share of the period during which the contact sticks",
-    "error_estimate": "estimated absolute error of mu_ratio",
-    "v_tilde_crit": "border of continuous sliding: smallest dimensionless speed without stick",
-    "v_tilde": "dimensionless sliding speed, v0 k/(mu0 Fz omega)",
-    "y_tilde": "dimensionless oscillation amplitude, y0 k/(mu0 Fz)",
-}
-_COORDINATES = {
-    "y_squared": "square of the dimensionless amplitude",
-    "v_squared_share": "v_tilde^2/(1 + v_tilde^2)",
-    "ln_y": "natural logarithm of y_tilde",
-    "ln_kappa": "natural logarithm of v_tilde/sqrt(y_tilde)",
-    "inverse_y": "1/y_tilde",
-    "s": "s with v_tilde = v_tilde_crit sin^2(pi s/2)",
-    "y": "dimensionless amplitude y_tilde",
-    "radius": "distance R from the corner y_tilde = 1, v_tilde = 0 in normal-form coordinates",
-    "angle": "polar angle of the normal form, 2 psi/pi",
-}
-_COMPANIONS = {
-    "power": "mean power of the shaker over mu0 Fz l0 omega, scaled as in friction.companions",
-    "stick": "stick fraction, scaled as in friction.companions",
-}
-_QUANTITIES = {
-    "deficit_low": "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2",
-    "hypotenuse": "mu_ratio sqrt(1 + y_tilde^2/v_tilde^2)",
-    "layer": "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))",
-    "layer_log": "(mu_ratio - outer) y_tilde/v_tilde - (2/pi) ln(v_tilde/sqrt(y_tilde))",
-    "deficit": "(1 - mu_ratio)/y_tilde^2",
-    "mu_ratio": "mu_ratio",
-    "normal_form": "mu_ratio/phi, phi^3 + 2 (y_tilde - 1) phi = pi v_tilde",
-    "slope": "mu_ratio y_tilde/v_tilde",
-}
 
 
 @dataclass
@@ -131,60 +99,6 @@ def _digest(table: Table) -> str:
     return h.hexdigest()
 
 
-def _put(group: Any, name: str, dims: tuple[str, ...], data: Array, long_name: str, **attributes: object) -> None:
-    small = data.size <= 64  # a chunked, filtered variable costs more than it saves on a handful of numbers
-    extra = {} if small else {"zlib": True, "shuffle": True, "complevel": 9, "chunksizes": data.shape}
-    variable = group.createVariable(name, "f8", dims, fill_value=False, **extra)
-    variable.long_name = long_name
-    variable.units = "1"
-    for key, value in attributes.items():
-        variable.setncattr(key, value)
-    variable[...] = data
-
-
-def _fill(root: Any, table: Table) -> None:
-    for key, value in table.attributes.items():
-        root.setncattr(key, value)
-    for name, values in (("v_tilde", table.v_tilde), ("y_tilde", table.y_tilde)):
-        root.createDimension(name, values.size)
-        _put(root, name, (name,), values, _LONG[name])
-    plane = ("v_tilde", "y_tilde")
-    _put(root, "mu_ratio", plane, table.mu_ratio, _LONG["mu_ratio"], ancillary_variables="error_estimate")
-    _put(root, "stick_fraction", plane, table.stick_fraction, _LONG["stick_fraction"])
-    _put(root, "error_estimate", plane, table.error_estimate, _LONG["error_estimate"])
-    _put(root, "v_tilde_crit", ("y_tilde",), table.v_tilde_crit, _LONG["v_tilde_crit"])
-    border = root.createGroup("border")
-    for (name, coordinate, span, quantity), piece in zip(regions.BORDER_PIECES, table.border, strict=True):
-        group = border.createGroup(name)
-        group.createDimension(coordinate, piece.nodes.size)
-        _put(group, coordinate, (coordinate,), piece.nodes, _COORDINATES[coordinate])
-        _put(group, "value", (coordinate,), piece.values, quantity)
-        group.setncatts({"range": np.array(span), "cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error})
-    # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
-    blocks = border.createGroup("blocks")
-    for spec, block in zip(regions.BLOCKS, table.blocks, strict=True):
-        group = blocks.createGroup(spec.name)
-        for axis, values in ((spec.a_name, block.a), (spec.b_name, block.b)):
-            group.createDimension(axis, values.size)
-            _put(group, axis, (axis,), values, _COORDINATES[axis])
-        _put(group, "value", (spec.a_name, spec.b_name), block.values, _QUANTITIES[spec.quantity])
-        for name, nodes in (("power", block.power), ("stick", block.stick)):
-            if nodes.size:
-                _put(group, name, (spec.a_name, spec.b_name), nodes, _COMPANIONS[name])
-        group.setncatts(
-            {
-                "regime": regions.REGIMES[spec.regime],
-                "quantity": spec.quantity,
-                "a_range": np.array(spec.a),
-                "b_range": np.array(spec.b),
-                "cells": np.array(block.cells, dtype=np.int32),
-                "quantity_error": block.quantity_error,
-                "verified_max_abs_error": block.max_abs_error,
-                "verified_max_rel_error": block.max_rel_error,
-            }
-        )
-
-
 def write_table(table: Table, path: str | Path) -> str:
     """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
 
@@ -193,6 +107,8 @@ def write_table(table: Table, path: str | Path) -> str:
     TableError
         When the folder does not exist or cannot be written; nothing is left behind.
     """
+    from friction.table_writer import file_image  # needs h5py, which reading does not
+
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
@@ -200,11 +116,10 @@ def write_table(table: Table, path: str | Path) -> str:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".partial")
     except OSError as error:
         raise TableError(path, f"cannot write here: {error.strerror or error}") from error
-    os.close(handle)
     try:
-        with netCDF4.Dataset(name, "w", format="NETCDF4") as root:
-            _fill(root, table)
-        with open(name, "rb+") as written:
+        with os.fdopen(handle, "wb") as written:
+            written.write(file_image(table))
+            written.flush()
             os.fsync(written.fileno())
         os.chmod(name, 0o644)
         os.replace(name, path)

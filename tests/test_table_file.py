@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 from builder.assemble import build_table
+from builder.rounding import STEPS
 from builder.sweep import Sweep
 from friction import Surrogate, TableError
 from friction.table import read_table, write_table
@@ -49,8 +50,11 @@ def test_a_person_plots_it_in_one_line(source):
 def test_the_plain_grid_is_solved(source, sweep):
     with xr.open_dataset(source) as data:
         solved = sweep.solve("full", data.v_tilde.values[:, None], data.y_tilde.values[None, :])
-        np.testing.assert_allclose(data.mu_ratio.values, solved["mu_ratio"], rtol=1e-13)
-        np.testing.assert_allclose(data.stick_fraction.values, solved["stick_fraction"], atol=1e-9)
+        # to the digits that the file keeps, and the file says by how much it is off
+        np.testing.assert_allclose(data.mu_ratio.values, solved["mu_ratio"], rtol=data.tolerance / STEPS, atol=0.0)
+        assert np.all(np.abs(data.mu_ratio.values - solved["mu_ratio"]) <= data.error_estimate.values)
+        stick = solved["stick_fraction"]
+        np.testing.assert_allclose(data.stick_fraction.values, stick, rtol=data.tolerance / STEPS, atol=1e-9)
 
 
 def test_round_trip(source, tmp_path):
@@ -68,7 +72,7 @@ def _edit(path, change):
 DAMAGES = {
     "another version": (
         lambda r: r.setncattr("format_version", np.int32(99)),
-        "format version 99, this program reads 1",
+        "format version 99, this program reads 2",
     ),
     "a changed value": (lambda r: r["border/blocks/corner/value"].__setitem__((0, 0), 0.5), "checksum"),
     "a changed tolerance": (lambda r: r.setncattr("tolerance", 1e-15), "checksum"),
@@ -88,7 +92,7 @@ def test_a_damaged_table_is_refused_by_name(copy, damage):
     assert str(copy) in str(caught.value)
 
 
-@pytest.mark.parametrize("keep", [0, 100, 5_000, 50_000, 150_000])
+@pytest.mark.parametrize("keep", [0, 100, 5_000, 50_000, 100_000])
 def test_a_truncated_table_is_refused(copy, keep):
     copy.write_bytes(copy.read_bytes()[:keep])
     with pytest.raises(TableError, match=r"copy\.nc"):

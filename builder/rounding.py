@@ -1,0 +1,55 @@
+"""Numbers no longer than the tolerance of their table: bits that say nothing are zero, and zlib does the rest.
+
+Rounding comes before the errors are verified, so that they are the errors of what stands in the file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from friction.table import Block
+
+__all__ = ["STEPS", "bits", "round_block", "to_bits", "to_step"]
+
+#: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to rounding
+STEPS = 256
+Array = NDArray[np.float64]
+
+
+def bits(tolerance: float) -> int:
+    """Binary digits after the point of which the last one is at most ``tolerance``/:data:`STEPS`."""
+    return math.ceil(math.log2(STEPS / tolerance))
+
+
+def to_step(values: Array, tolerance: float) -> Array:
+    """``values`` at multiples of a power of two; none moves by more than half of ``tolerance``/:data:`STEPS`."""
+    digits = bits(tolerance)
+    rounded: Array = np.ldexp(np.round(np.ldexp(values, digits)), -digits)
+    return rounded
+
+
+def to_bits(values: Array, digits: int, up: bool = False) -> Array:
+    """``values`` with ``digits`` binary digits each, to the nearest or, with ``up``, away from zero."""
+    mantissa, exponent = np.frexp(values)
+    scaled = np.ldexp(mantissa, digits)
+    whole = np.copysign(np.ceil(np.abs(scaled)), scaled) if up else np.round(scaled)
+    rounded: Array = np.ldexp(whole, exponent - digits)
+    return rounded
+
+
+def round_block(block: Block, tolerance: float) -> Block:
+    """``block`` with its node values rounded.
+
+    All that a block tabulates is of order one, and mu~ changes by at most about as much as what is tabulated: a step
+    that is the same for all values of a block suits the relative error of mu~ too.
+    """
+    return dataclasses.replace(
+        block,
+        values=to_step(block.values, tolerance),
+        power=to_step(block.power, tolerance),
+        stick=to_step(block.stick, tolerance),
+    )
