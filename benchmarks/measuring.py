@@ -135,18 +135,18 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns:
     return "\n".join([line(header), line(rule), *map(line, rows)])
 
 
-def write_section(name: str, text: str) -> None:
-    """Replace what stands between the markers of ``name`` in docs/benchmarks.md.
+def write_section(name: str, text: str, path: Path = PAGE) -> None:
+    """Replace what stands between the markers of ``name`` on a page, docs/benchmarks.md unless told.
 
     Raises
     ------
     ValueError
         When the page lacks one of the markers.
     """
-    page = PAGE.read_text(encoding="utf-8")
+    page = path.read_text(encoding="utf-8")
     begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
     if page.count(begin) != 1 or page.count(end) != 1:
-        raise ValueError(f"{PAGE} must hold {begin!r} and {end!r} once each")
+        raise ValueError(f"{path} must hold {begin!r} and {end!r} once each")
     before, _, rest = page.partition(begin)
     _, _, after = rest.partition(end)
-    PAGE.write_text(before + begin + "\n" + text.strip() + "\n\n" + end + after, encoding="utf-8")
+    path.write_text(before + begin + "\n" + text.strip() + "\n\n" + end + after, encoding="utf-8")
