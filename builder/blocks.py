@@ -16,8 +16,14 @@ from builder.sweep import Sweep
 from friction import tails
 from friction.border import Border
 from friction.companions import fast_power, power_scale, stick_scale
-from friction.kernels import SQRT2, WIDTH
-from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes, s_of_sigma
+from friction.kernels import WIDTH
+from friction.patches import (
+    chebyshev_coefficients,
+    evaluation_span,
+    file_coordinate,
+    interpolation_matrix,
+    nodes,
+)  # fmt: skip
 from friction.regions import BLOCK_INDEX, BORDER_PIECES, CONTINUOUS, BlockSpec
 from friction.table import Block, BorderPiece
 
@@ -25,7 +31,7 @@ __all__ = ["Points", "build_block", "build_border", "points_of", "quantity_of", 
 
 Array = NDArray[np.float64]
 MAX_NODES = 96
-MAX_CELLS = 96
+MAX_CELLS = 160
 SHARE = 0.1  # of the tolerance that the nodes' truncation in one direction may take
 CELL_SHARE = (
     0.4  # of the tolerance that the cells may take in one direction: fewer cells are faster, nodes cost nothing
@@ -61,6 +67,8 @@ def points_of(spec: BlockSpec, a: Array, b: Array, border: Border) -> Points:
         y = a.copy()
     if spec.b_name == "v_squared_share":
         v = np.sqrt(b / (1.0 - b))
+    elif spec.b_name == "ln_rho":
+        v = np.exp(b) * border(y)
     elif spec.b_name == "ln_kappa":
         v = np.exp(b) * np.sqrt(y)
     else:
@@ -114,44 +122,76 @@ def _tail(coefficients: Array, axis: int) -> float:
     return float(c[-2:].sum(axis=1).max())
 
 
-def _cells(values: Array, axis: int, tolerance: float, spec: BlockSpec | None = None) -> int:
-    """Fewest cells along ``axis`` for which polynomials of the kernel's degree follow the interpolant."""
-    c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
-    c = c.reshape(c.shape[0], -1)
-    n = c.shape[0]
-    along_s = spec is not None and (spec.a_name, spec.b_name)[axis] == "s"
-    if n <= WIDTH and not along_s:
-        return 1
-    local = -np.cos((np.arange(WIDTH) + 0.5) * np.pi / WIDTH)
-    check = np.linspace(-1.0, 1.0, 25)
-    follow = np.polynomial.chebyshev.chebvander(check, WIDTH - 1) @ np.linalg.inv(
-        np.polynomial.chebyshev.chebvander(local, WIDTH - 1)
-    )
-    for cells in range(2 if along_s else 1, MAX_CELLS + 1, 2 if along_s else 1):
-        centre = (2.0 * np.arange(cells)[:, None] + 1.0) / cells - 1.0
-        at, exact = centre + local / cells, centre + check / cells
-        if along_s and spec is not None:
-            low, high = spec.b
-            at, exact = (s_of_sigma(0.5 * SQRT2 * (x + 1.0)) for x in (at, exact))
-            live = exact[:, -1] > low
-            at, exact = ((2.0 * x[live] - low - high) / (high - low) for x in (at, exact))
-            inside = exact >= -1.0
-        else:
-            inside = np.ones(exact.shape, dtype=bool)
-        rows = interpolation_matrix(n, at.ravel()).reshape(*at.shape, n)
-        truth = interpolation_matrix(n, np.maximum(exact, -1.0).ravel()).reshape(*exact.shape, n)
-        # the other axis enters through its Chebyshev coefficients, each of which multiplies a function <= 1
-        off = np.abs((truth - follow @ rows) @ c).sum(axis=-1)
-        if off[inside].max() <= tolerance:
+_LOCAL = -np.cos((np.arange(WIDTH) + 0.5) * np.pi / WIDTH)
+_CHECK = np.linspace(-1.0, 1.0, 25)
+_FOLLOW = np.polynomial.chebyshev.chebvander(_CHECK, WIDTH - 1) @ np.linalg.inv(
+    np.polynomial.chebyshev.chebvander(_LOCAL, WIDTH - 1)
+)
+LINES = 33  # across an axis, along which cells are tried
+
+
+def _fewest(
+    name: str, span: tuple[float, float], exact: Callable[[Array], Array], wanted: float, relative: bool
+) -> int:
+    """Fewest cells along an axis for which polynomials of the kernel's degree follow ``exact``.
+
+    ``exact`` (points) -> (points, lines) takes evaluation's coordinate; errors are compared with ``wanted``.
+    """
+    low, high = evaluation_span(name, *span)
+    step = 2 if name == "s" else 1  # the knot of sigma is an edge of cells
+    for cells in range(step, MAX_CELLS + 1, step):
+        centre = 2.0 * np.arange(cells)[:, None] + 1.0
+        at, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (_LOCAL, _CHECK))
+        if name == "s":
+            # cells below the block are never visited
+            live = file_coordinate(name, check[:, -1]) > span[0]
+            at, check = at[live], check[live]
+        local = exact(at.ravel()).reshape(*at.shape, -1)
+        truth = exact(check.ravel()).reshape(*check.shape, -1)
+        off = np.abs(truth - np.einsum("ij,cjl->cil", _FOLLOW, local))
+        if relative:
+            off /= np.abs(truth)
+        inside = file_coordinate(name, check.ravel()).reshape(check.shape) >= span[0] - 1e-12
+        if off[inside].max() <= wanted:
             return cells
     return MAX_CELLS
+
+
+def _block_cells(spec: BlockSpec, values: Array, axis: int, wanted: float) -> int:
+    """:func:`_fewest` along one axis of a block, on lines that cover the other."""
+    c = chebyshev_coefficients(values)
+    spans, names = (spec.a, spec.b), (spec.a_name, spec.b_name)
+    lines = np.cos(np.linspace(0.0, np.pi, LINES))
+    across = np.moveaxis(c, axis, 0) @ interpolation_matrix(values.shape[1 - axis], lines).T
+
+    def exact(x: Array) -> Array:
+        low, high = spans[axis]
+        out: Array = (
+            interpolation_matrix(
+                values.shape[axis], (2.0 * file_coordinate(names[axis], x) - low - high) / (high - low)
+            )
+            @ across
+        )
+        return out
+
+    return _fewest(names[axis], spans[axis], exact, wanted, False)
+
+
+def _border_cells(name: str, span: tuple[float, float], values: Array, wanted: float) -> int:
+    c, (low, high) = chebyshev_coefficients(values)[:, None], span
+
+    def exact(x: Array) -> Array:
+        out: Array = interpolation_matrix(values.size, (2.0 * file_coordinate(name, x) - low - high) / (high - low)) @ c
+        return out * np.exp(0.5 * x)[:, None] if name == "ln_y" else out
+
+    return _fewest(name, span, exact, wanted, True)
 
 
 def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
     """The stored border; its own tolerance is tighter than the table's, since every stick-slip node is built on it."""
     wanted = max(1e-3 * tolerance, 4e-15)
     pieces = []
-    for name, _, (low, high), _ in BORDER_PIECES:
+    for name, coordinate, (low, high), _ in BORDER_PIECES:
         n = 4 if name == "high" else 12
         while True:
             x = nodes(n, low, high)
@@ -161,7 +201,7 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
             if _tail(chebyshev_coefficients(values), 0) <= wanted or n >= MAX_NODES or name == "high":
                 break
             n = _next(n)
-        pieces.append(BorderPiece(x, values, _cells(values, 0, wanted)))
+        pieces.append(BorderPiece(x, values, _border_cells(coordinate, (low, high), values, wanted)))
     return pieces
 
 
@@ -207,5 +247,5 @@ def build_block(
     follow = [max(CELL_SHARE * tolerance, NODE_FLOOR, min(best[axis], 1.0)) for axis in (0, 1)]
     if spec.a_name == "inverse_y":
         follow[0] = wanted
-    cells = (_cells(values, 0, follow[0], spec), _cells(values, 1, follow[1], spec))
+    cells = (_block_cells(spec, values, 0, follow[0]), _block_cells(spec, values, 1, follow[1]))
     return Block(a, b, values, cells, power=power, stick=stick)

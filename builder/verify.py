@@ -15,12 +15,12 @@ from friction import Surrogate
 from friction.regions import (
     BLOCKS,
     L_MAX,
+    RHO_MAX,
     S_CUT,
     SOURCES,
     Y_CONT,
     Y_HIGH,
-    Y_MID_C,
-    Y_MID_S,
+    Y_MID,
     Y_STICK_HI,
     Y_STICK_LO,
     Y_TAIL,
@@ -31,7 +31,7 @@ __all__ = ["CASES", "block_errors", "draw", "monotony", "seam_jumps", "verify"]
 Array = NDArray[np.float64]
 #: what a fresh solve itself may be wrong by, relative to mu~: rounding, and the input's last digit next to the corner
 SOLVER_NOISE = 2e-15
-SEAMS = (Y_CONT, Y_MID_C, Y_MID_S, Y_HIGH, Y_TAIL, Y_STICK_LO, Y_STICK_HI)
+SEAMS = (Y_STICK_LO, Y_CONT, Y_MID, Y_HIGH, Y_TAIL)
 
 
 def _log(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
@@ -61,6 +61,11 @@ def _creep(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array
     return _log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n)
 
 
+def _fast_from(s: Surrogate, y: Array) -> Array:
+    """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
+    return np.where(y <= Y_TAIL, RHO_MAX * s.v_tilde_crit(y), math.exp(L_MAX) * np.sqrt(y))
+
+
 def _seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
     """Beside the lines where two blocks or a block and a tail meet."""
     y, v = _log(rng, 1e-3, 1e6, n), _log(rng, 1e-6, 1e4, n)
@@ -72,7 +77,7 @@ def _seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array
     v[cut] = s.v_tilde_crit(y[cut]) * np.sin(0.5 * math.pi * S_CUT) ** 2 * off[cut]
     fast = which == 3
     y[fast] = _log(rng, Y_CONT, 1e6, int(fast.sum()))
-    v[fast] = math.exp(L_MAX) * np.sqrt(y[fast]) * off[fast]
+    v[fast] = _fast_from(s, y[fast]) * off[fast]
     return v, y
 
 
@@ -108,8 +113,8 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
 def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[tuple[float, float, float]]:
     """Largest error of the tabulated quantity, of mu~, and relative error of mu~, block by block, on ``n`` points each.
 
-    Points crowd towards the edges of the block, where polynomials err most; those which the dispatch sends to a
-    neighbour are left out.
+    Points crowd towards the edges of the block, where polynomials err most, and beside the seams that cut through it;
+    those which the dispatch sends to a neighbour are left out.
     """
     found = []
     for index, spec in enumerate(BLOCKS):
@@ -117,6 +122,9 @@ def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[
         a = _crowded(rng, spec.a, n, radial=spec.a_name == "radius")
         b = _crowded(rng, spec.b, n, radial=False)
         p = points_of(spec, a, b, surrogate.border)
+        v_seam, y_seam = _seams(rng, 2 * n, surrogate)
+        v_all, y_all = np.concatenate([p.v, v_seam]), np.concatenate([p.y, y_seam])
+        p = type(p)(v_all, y_all, y_all - 1.0)
         mu, _, source = surrogate.ratio_with_bound(p.v, p.y)
         keep = source == index
         v, y, eta = p.v[keep], p.y[keep], p.y[keep] - 1.0
@@ -152,7 +160,7 @@ def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
     y = rng.uniform(Y_STICK_LO, Y_STICK_HI, n)
     edges.append((surrogate.v_tilde_crit(y) * math.sin(0.5 * math.pi * S_CUT) ** 2, y))
     y = _log(rng, Y_CONT, 1e8, n)
-    edges.append((math.exp(L_MAX) * np.sqrt(y), y))
+    edges.append((_fast_from(surrogate, y), y))
     for v, y in edges:
         worst = max(worst, _jump(surrogate, v * (1 - 1e-13), v * (1 + 1e-13), y, y))
     return worst

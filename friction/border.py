@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from friction.errors import InputError
 from friction.kernels import border_scaled
-from friction.patches import cells_1d
+from friction.patches import cells_1d, pace_of
 from friction.regions import BORDER_PIECES
 from friction.table import BorderPiece
 
@@ -41,9 +41,9 @@ class Border:
 
     def __init__(self, pieces: Sequence[BorderPiece]) -> None:
         coefficients, rows, first = [], [], 0
-        for (_, _, (low, high), _), piece in zip(BORDER_PIECES, pieces, strict=True):
-            coefficients.append(cells_1d(piece.values, piece.cells))
-            rows.append([first, piece.cells, low, piece.cells / (high - low)])
+        for (_, name, span, _), piece in zip(BORDER_PIECES, pieces, strict=True):
+            coefficients.append(cells_1d(name, span, piece.values, piece.cells))
+            rows.append([first, piece.cells, *pace_of(name, *span, piece.cells)])
             first += piece.cells
         self.arrays: tuple[Array, Array] = (np.concatenate(coefficients), np.array(rows))
         self.max_rel_error = max(piece.max_rel_error for piece in pieces)

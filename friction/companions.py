@@ -29,7 +29,6 @@ from friction.kernels import (
     C_LOW,
     C_TAIL,
     CORNER,
-    FUSE,
     NO_PATCH,
     S_HIGH,
     S_LOW,
@@ -39,8 +38,8 @@ from friction.kernels import (
     cell,
     locate,
     normal_form_root,
-    outer_expansion,
 )  # fmt: skip
+from friction.outer import FUSE, outer_expansion
 from friction.patch_simd import patch_value
 
 __all__ = ["companions_array", "fast_power", "power_scale", "stick_scale"]

@@ -15,7 +15,9 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from friction.errors import InputError
-from friction.kernels import FUSE, NO_OSCILLATION, ROUNDING, STATIC_LIMIT, outer_expansion, ratio
+from friction.kernels import NO_OSCILLATION, ROUNDING, STATIC_LIMIT, ratio
+from friction.lanes import CHUNK, evaluate_chunk, plan, scratch
+from friction.outer import FUSE, outer_expansion
 from friction.regions import RIGID
 from friction.slopes import ratio_and_slopes, speed_slope_at_zero
 
@@ -25,6 +27,7 @@ __all__ = [
     "POSITIVE",
     "UNITS",
     "Fault",
+    "as_columns",
     "check_inputs",
     "evaluate_array",
     "find_faults",
@@ -73,13 +76,13 @@ def find_faults(columns: Mapping[str, ArrayLike]) -> list[Fault]:
     return [first[i] for i in sorted(first)]
 
 
-def check_inputs(columns: Mapping[str, Any]) -> dict[str, Array]:
-    """The columns as broadcast, flat float64 arrays.
+def as_columns(columns: Mapping[str, Any]) -> dict[str, Array]:
+    """What was given, as float64 arrays; their values are not looked at.
 
     Raises
     ------
     InputError
-        At the first value out of bounds, naming field, value, bound and index; or when a value is no number.
+        When something is no number.
     """
     converted: dict[str, Array] = {}
     for name in FIELDS:
@@ -90,11 +93,23 @@ def check_inputs(columns: Mapping[str, Any]) -> dict[str, Array]:
             converted[name] = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise InputError(name, value, "a real number or an array of them") from error
-        bad = _bad(name, converted[name])
+    return converted
+
+
+def check_inputs(columns: Mapping[str, Any]) -> dict[str, Array]:
+    """What was given, as float64 arrays within :data:`BOUNDS`.
+
+    Raises
+    ------
+    InputError
+        At the first value out of bounds, naming field, value, bound and index; or when a value is no number.
+    """
+    converted = as_columns(columns)
+    for name, values in converted.items():
+        bad = _bad(name, values)
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
-            where = i if converted[name].ndim else None
-            raise InputError(name, float(converted[name].ravel()[i]), BOUNDS[name], where)
+            raise InputError(name, float(values.ravel()[i]), BOUNDS[name], i if values.ndim else None)
     return converted
 
 
@@ -221,17 +236,73 @@ def gradient_array(
         )
 
 
-@njit(cache=True, error_model="numpy", nogil=True, parallel=True)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _groups(
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, low: int, n: int,
+    v: Array, y: Array, odd: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """v~ and y~ of ordinary cases; list the others: zero, rigid, near the ends of the double range, or illegal."""
+    for i in range(low, low + n):
+        force, stretch, speed = mu0[i] * Fz[i], y0[i] * k[i], v0[i] * k[i]
+        pace = force * omega[i]
+        smallest = min(min(force, stretch), min(pace, speed))
+        largest = max(max(force, stretch), max(pace, speed))
+        fast, wide = speed / pace, stretch / force
+        # with mu0 and k positive, positive products leave no negative factor; NaN fails the comparisons
+        ordinary = (
+            (mu0[i] > 0.0) & (k[i] > 0.0) & (smallest > 1e-290) & (largest < 1e290)
+            & (fast > 0.0) & (fast < math.inf) & (wide > 0.0) & (wide < math.inf)
+        )  # fmt: skip
+        v[i] = fast if ordinary else -1.0
+        y[i] = wide if ordinary else -1.0
+    found = 0
+    for i in range(low, low + n):
+        odd[found] = i
+        found += int(v[i] < 0.0)
+    return found
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _legal(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float, rigid: bool) -> bool:
+    """Whether the case is within :data:`BOUNDS`; with ``rigid`` k is infinite."""
+    return (
+        0.0 < mu0 < math.inf and 0.0 < Fz < math.inf and k > 0.0 and (rigid or k < math.inf)
+        and 0.0 <= y0 < math.inf and 0.0 <= omega < math.inf and 0.0 <= v0 < math.inf
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, parallel=True)
 def evaluate_array(
     mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
     coef: Array, meta: Array, bcoef: Array, bmeta: Array,
-    mu: Array, bound: Array, source: NDArray[np.int8], v: Array, y: Array,
-) -> None:  # fmt: skip
-    """Fill mu~, its bound, source, v~, y~ (n,) from six legal columns (n,); columns of stride 0 broadcast."""
-    for i in prange(mu.size):
-        a, b, c, d, e = dimensional(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], coef, meta, bcoef, bmeta)
-        mu[i] = a
-        bound[i] = b
-        source[i] = c
-        v[i] = d
-        y[i] = e
+    rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8], v: Array, y: Array,
+) -> int:  # fmt: skip
+    """Fill mu_macro, mu~, the bound of mu_macro, source, v~, y~ (n,) from six columns (n,); count illegal cases.
+
+    What stands at an illegal case is NaN, and -1 for the source.  With ``rigid`` an infinite k is legal.
+    """
+    n = mu.size
+    table = plan(meta)
+    illegal = 0
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        floats, ints = scratch()
+        odd = np.empty(CHUNK + 1, np.int64)
+        low = c * CHUNK
+        m = min(CHUNK, n - low)
+        found = _groups(mu0, Fz, k, y0, omega, v0, low, m, v, y, odd)
+        evaluate_chunk(v, y, low, m, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
+        wrong = 0
+        for j in range(found):
+            i = odd[j]
+            if _legal(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], rigid):
+                mu[i], bound[i], source[i], v[i], y[i] = dimensional(
+                    mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], coef, meta, bcoef, bmeta
+                )
+            else:
+                wrong += 1
+                mu[i], bound[i], source[i], v[i], y[i] = math.nan, math.nan, -1, math.nan, math.nan
+        for i in range(low, low + m):
+            macro[i] = mu[i] * mu0[i]
+            bound[i] *= mu0[i]
+        illegal += wrong
+    return illegal

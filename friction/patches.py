@@ -16,12 +16,16 @@ from friction.kernels import DEGREE, SQRT2, WIDTH
 from friction.regions import BlockSpec
 
 __all__ = [
-    "axis_positions",
+    "aligned",
+    "cell_positions",
     "cells_1d",
     "cells_2d",
     "chebyshev_coefficients",
+    "evaluation_span",
+    "file_coordinate",
     "interpolation_matrix",
     "nodes",
+    "pace_of",
     "s_of_sigma",
 ]
 
@@ -56,17 +60,62 @@ def interpolation_matrix(n: int, t: Array) -> Array:
     return np.asarray(chebyshev.chebvander(t, n - 1), dtype=np.float64)
 
 
-def _cell_points(cells: int) -> Array:
-    """Local Chebyshev points of all cells as positions in [-1, 1], shape (cells * WIDTH,)."""
+def evaluation_span(name: str, low: float, high: float) -> tuple[float, float]:
+    """The span of a coordinate as evaluation knows it: sigma for s, tan(psi/2) for the angle, else itself."""
+    return (0.0, SQRT2) if name == "s" else (low, high)
+
+
+def pace_of(name: str, low: float, high: float, cells: int) -> tuple[float, float]:
+    """(offset, pace) with which pace * coordinate + offset counts cells from 0; its whole part is the cell.
+
+    The far end counts a hair less than ``cells``, so that it belongs to the last cell.
+    """
+    start, stop = evaluation_span(name, low, high)
+    pace = cells / (stop - start) * (1.0 - 2.0**-51)
+    return -pace * start, pace
+
+
+def file_coordinate(name: str, x: Array) -> Array:
+    """The table file's coordinate at ``x``, the evaluation's."""
+    if name == "angle":
+        return np.asarray(4.0 / np.pi * np.arctan(x), dtype=np.float64)
+    return s_of_sigma(x) if name == "s" else x
+
+
+def _cell_points(cells: int, low: float, high: float) -> Array:
+    """Local Chebyshev points of all cells between ``low`` and ``high``, shape (cells * WIDTH,)."""
     edge = np.arange(cells)[:, None]
-    return (-1.0 + (2.0 * edge + 1.0 + _LOCAL[None, :]) / cells).ravel()
+    out: Array = (low + (high - low) * (0.5 * (2.0 * edge + 1.0 + _LOCAL[None, :]) / cells)).ravel()
+    return out
 
 
-def cells_1d(values: Array, cells: int) -> Array:
-    """Power-basis coefficients (cells, WIDTH), highest power first, of node ``values`` (n,)."""
-    matrix = interpolation_matrix(values.size, _cell_points(cells))
-    local = (matrix @ chebyshev_coefficients(values)).reshape(cells, WIDTH)
-    out: Array = np.ascontiguousarray(local @ _TO_POWERS.T)
+def cell_positions(name: str, low: float, high: float, cells: int) -> tuple[Array, Array]:
+    """Cell points of one axis: as evaluation's coordinate and as positions in [-1, 1] on the axis of nodes.
+
+    Along s, points below the block are never visited; cells that lie wholly below it repeat its edge.
+    """
+    start, stop = evaluation_span(name, low, high)
+    x = _cell_points(cells, start, stop)
+    at = file_coordinate(name, x)
+    if name == "s":
+        dead = s_of_sigma(SQRT2 * (np.arange(cells) + 1.0) / cells) <= low
+        at.reshape(cells, WIDTH)[dead] = low
+    return x, (2.0 * at - low - high) / (high - low)
+
+
+def cells_1d(name: str, span: tuple[float, float], values: Array, cells: int) -> Array:
+    """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node ``values`` (n,).
+
+    On the logarithmic piece they hold v~crit itself, on the others the tabulated quotient.
+    """
+    x, at = cell_positions(name, *span, cells)
+    local = interpolation_matrix(values.size, at) @ chebyshev_coefficients(values)
+    if name == "ln_y":
+        local = local * np.exp(0.5 * x)
+    local = local.reshape(cells, WIDTH)
+    mean = local.mean(axis=1)
+    out: Array = np.ascontiguousarray((local - mean[:, None]) @ _TO_POWERS.T)
+    out[:, -1] += mean
     return out
 
 
@@ -78,29 +127,25 @@ def s_of_sigma(sigma: Array) -> Array:
     return out
 
 
-def axis_positions(spec: BlockSpec, axis: int, cells: int) -> Array:
-    """Local Chebyshev points of all cells along one axis, as positions in [-1, 1] on the nodes' axis.
-
-    Along s the cells are uniform in sigma; cells that lie wholly below the block are never visited and repeat its edge.
-    """
-    if (spec.a_name, spec.b_name)[axis] != "s":
-        return _cell_points(cells)
-    low, high = spec.b
-    s = s_of_sigma(0.5 * SQRT2 * (_cell_points(cells) + 1.0))
-    first = s.reshape(cells, WIDTH)
-    dead = s_of_sigma(SQRT2 * (np.arange(cells) + 1.0) / cells) <= low
-    first[dead] = low
-    return (2.0 * first.ravel() - low - high) / (high - low)
-
-
-def cells_2d(spec: BlockSpec, values: Array, cells_a: int, cells_b: int) -> Array:
+def cells_2d(spec: BlockSpec, values: Array, cells: tuple[int, int]) -> Array:
     """Power-basis coefficients (cells_a * cells_b, WIDTH, WIDTH) of node ``values`` (n_a, n_b).
 
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from DEGREE down to 0.
     """
-    c = chebyshev_coefficients(values)
-    left = interpolation_matrix(values.shape[0], axis_positions(spec, 0, cells_a))
-    right = interpolation_matrix(values.shape[1], axis_positions(spec, 1, cells_b))
-    local = (left @ c @ right.T).reshape(cells_a, WIDTH, cells_b, WIDTH)
-    power = np.einsum("pi,aibj,qj->abqp", _TO_POWERS, local, _TO_POWERS, optimize=True)
-    return np.ascontiguousarray(power.reshape(cells_a * cells_b, DEGREE + 1, DEGREE + 1))
+    left = interpolation_matrix(values.shape[0], cell_positions(spec.a_name, *spec.a, cells[0])[1])
+    right = interpolation_matrix(values.shape[1], cell_positions(spec.b_name, *spec.b, cells[1])[1])
+    local = (left @ chebyshev_coefficients(values) @ right.T).reshape(cells[0], WIDTH, cells[1], WIDTH)
+    # the mean apart: the change of basis multiplies rounding errors by a hundred
+    mean = local.mean(axis=(1, 3))
+    power = np.einsum("pi,aibj,qj->abqp", _TO_POWERS, local - mean[:, None, :, None], _TO_POWERS, optimize=True)
+    power[:, :, -1, -1] += mean
+    out = aligned(cells[0] * cells[1], DEGREE + 1, DEGREE + 1)
+    out[...] = power.reshape(out.shape)
+    return out
+
+
+def aligned(*shape: int) -> Array:
+    """An empty array that starts on a cache line: a row of eight coefficients then lies in one."""
+    raw = np.empty(math.prod(shape) + 8)
+    skip = (-raw.ctypes.data % 64) // 8
+    return raw[skip : skip + math.prod(shape)].reshape(shape)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, prange
 
+from friction.floats import log
 from friction.kernels import (
     C_HIGH,
     C_LOW,
@@ -17,7 +19,6 @@ from friction.kernels import (
     C_TAIL,
     CORNER,
     FAST,
-    FUSE,
     S_LOW,
     S_MID,
     S_TAIL,
@@ -28,10 +29,11 @@ from friction.kernels import (
     Y_TAIL,
     Array,
     at_zero_speed,
+    cell,
     locate,
-    outer_expansion,
     polar,
 )  # fmt: skip
+from friction.outer import FUSE, outer_expansion
 
 __all__ = ["ratio_and_slopes", "slopes_array", "speed_slope_at_zero"]
 
@@ -42,19 +44,18 @@ def _border_slope(y: float, bcoef: Array, bmeta: Array) -> float:
     if y <= Y_CONT:
         k, a, weight, base = 0, y * y, 2.0 * y * y, 2.0
     elif y <= Y_TAIL:
-        k, a, weight, base = 1, math.log(y), 1.0, 0.5
+        k, a, weight, base = 1, log(y), 1.0, 0.0
     else:
         k, a, weight, base = 2, 1.0 / y, -1.0 / y, 0.5
-    cells = int(bmeta[k, 1])
-    x = (a - bmeta[k, 2]) * bmeta[k, 3]
-    i = min(max(int(x), 0), cells - 1)
-    u = 2.0 * (x - i) - 1.0
-    i += int(bmeta[k, 0])
+    x = a * bmeta[k, 3] + bmeta[k, 2]
+    j = np.trunc(x)
+    u = 2.0 * (x - j) - 1.0
+    i = int(bmeta[k, 0] + j)
     value: float = bcoef[i, 0]
     slope: float = 0.0
-    for j in range(1, WIDTH):
+    for n in range(1, WIDTH):
         slope = slope * u + value
-        value = value * u + bcoef[i, j]
+        value = value * u + bcoef[i, n]
     out: float = base + weight * 2.0 * bmeta[k, 3] * slope / value
     return out
 
@@ -110,26 +111,21 @@ def ratio_and_slopes(
         along_y = slope + (change + 0.5 * bend) / speed / speed
         share = (v / speed) * (v / speed)
         return base, -share * (along_y + (2.0 * second + slope) / speed / speed), along_y
-    na, nb = int(meta[source, 1]), int(meta[source, 2])
-    x = (a - meta[source, 3]) * meta[source, 4]
-    z = (b - meta[source, 5]) * meta[source, 6]
-    i = min(max(int(x), 0), na - 1)
-    j = min(max(int(z), 0), nb - 1)
-    p = int(meta[source, 0]) + i * nb + j
-    u, w = 2.0 * (x - i) - 1.0, 2.0 * (z - j) - 1.0
+    p, u, w = cell(meta, source, a, b)
     q, qa, qb = patch_slopes(coef, p, u, w)
     qa *= 2.0 * meta[source, 4]
     qb *= 2.0 * meta[source, 6]
     mu = min(base + factor * q, 1.0)
     if source == C_LOW:
-        share = b
-        rest = 1.0 - share if v < 1.0 else 1.0 / (1.0 + v * v)
+        rest = 1.0 / (1.0 + v * v)
+        share = v * v * rest if v < 1.0 else b
         ww = a
         along_v = factor * 2.0 * (share * rest * qb - share * q)
         return mu, along_v, 2.0 * factor * (q + ww * qa)
     if C_MID_1 <= source <= C_HIGH:
+        # b = ln(v~/v~crit), whose y~ slope is minus that of ln v~crit
         tilt = 1.0 / (1.0 + (v / y) * (v / y))
-        return mu, factor * (tilt * q + qb), factor * (qa - tilt * q - 0.5 * qb)
+        return mu, factor * (tilt * q + qb), factor * (qa - tilt * q - _border_slope(y, bcoef, bmeta) * qb)
     if source == C_TAIL:
         _, _, slope, _, _ = outer_expansion(1.0 / factor)
         return mu, -slope + factor * (q + qb), slope + factor * (-q - a * qa - 0.5 * qb)
@@ -141,7 +137,8 @@ def ratio_and_slopes(
     else:
         root = SQRT2 - b
         rho = 1.0 - root * root
-        if j == nb - 1:
+        if b * meta[source, 6] + meta[source, 5] >= meta[source, 2] - 1.0:
+            # the last cell
             qb = _edge_slope(coef, p, u, w) * 2.0 * meta[source, 6]
             if root < 1e-9:
                 root = 1e-9
@@ -167,21 +164,21 @@ def ratio_and_slopes(
 def _corner_slopes(
     v: float, y: float, mu: float, phi: float, q: float, qr: float, qs: float
 ) -> tuple[float, float, float]:
-    """Chain rule through phi(v~, eta), R and 2 psi/pi."""
+    """Chain rule through phi(v~, eta), R and tan(psi/2)."""
     eta = y - 1.0
-    _, s0, radius, _ = polar(v, eta)
+    _, s0, radius, half = polar(v, eta)
     stiff = 3.0 * phi * phi + 2.0 * eta
     phi_v = math.pi * v / stiff  # d phi / d ln v~
     phi_y = -2.0 * phi / stiff  # d phi / d y~
     s_v = 0.5 * s0 * (1.0 - phi_v / phi)
     s_y = -0.5 * s0 * phi_y / phi
-    r2 = radius * radius
+    turn = 0.5 * (1.0 + half * half) / (radius * radius)  # d tan(psi/2) / d psi, over R^2
 
     along_v = phi_v * q + phi * (
-        qr * (0.5 * s0 * s_v + 2.0 * phi * phi_v) / radius + qs * TWO_OVER_PI * (s0 * phi_v - phi * s_v) / r2
+        qr * (0.5 * s0 * s_v + 2.0 * phi * phi_v) / radius + qs * turn * (s0 * phi_v - phi * s_v)
     )
     along_y = phi_y * q + phi * (
-        qr * (0.5 * s0 * s_y + 2.0 * phi * phi_y) / radius + qs * TWO_OVER_PI * (s0 * phi_y - phi * s_y) / r2
+        qr * (0.5 * s0 * s_y + 2.0 * phi * phi_y) / radius + qs * turn * (s0 * phi_y - phi * s_y)
     )
     return mu, along_v, y * along_y
 

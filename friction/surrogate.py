@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from friction import kernels, nondim, regions
+from friction import kernels, lanes, nondim, regions
 from friction.border import Border
 from friction.companions import companions_array
 from friction.errors import InputError, TableError
-from friction.patches import cells_2d
+from friction.patches import aligned, cells_2d, pace_of
 from friction.slopes import slopes_array
 from friction.table import Table, json_attributes, read_table
 
@@ -23,8 +26,25 @@ __all__ = ["REGIME_OF_SOURCE", "Answer", "Surrogate"]
 # One parallel loop at a time: numba's fallback threading layer (no OpenMP, no TBB) aborts the process when two threads
 # enter one, and a loop uses every core anyway.
 _ONE_LOOP = threading.Lock()
+FEW = 4096  # points that one thread answers before a second one has started
 
 Array = NDArray[np.float64]
+
+
+@contextmanager
+def _loop(points: int, threads: int | None) -> Iterator[None]:
+    """The right to run a parallel loop, on ``threads`` threads (None: as many as numba is set to, all cores)."""
+    with _ONE_LOOP:
+        before = numba.get_num_threads()
+        if points < FEW:
+            numba.set_num_threads(1)
+        elif threads is not None:
+            numba.set_num_threads(threads)
+        try:
+            yield
+        finally:
+            numba.set_num_threads(before)
+
 
 #: regime code of every source code
 REGIME_OF_SOURCE = np.array(
@@ -57,7 +77,7 @@ class Answer:
     """
 
     __slots__ = (
-        "error_bound", "gradient", "length_scale", "mu_macro", "mu_ratio", "source_code", "v_tilde", "y_tilde",
+        "_stretch", "error_bound", "gradient", "mu_macro", "mu_ratio", "source_code", "v_tilde", "y_tilde",
     )  # fmt: skip
 
     def __init__(
@@ -68,7 +88,7 @@ class Answer:
         source_code: Any,
         v_tilde: Any,
         y_tilde: Any,
-        length_scale: Any,
+        stretch: tuple[Any, Any, Any],
         gradient: dict[str, Any] | None = None,
     ) -> None:
         self.mu_macro = mu_macro
@@ -77,8 +97,16 @@ class Answer:
         self.source_code = source_code
         self.v_tilde = v_tilde
         self.y_tilde = y_tilde
-        self.length_scale = length_scale
+        self._stretch = stretch
         self.gradient = gradient
+
+    @property
+    def length_scale(self) -> Any:
+        """l0 = mu0 Fz / k [m], made when asked for."""
+        mu0, force, stiffness = self._stretch
+        with np.errstate(over="ignore", under="ignore"):
+            length = mu0 * (force / stiffness)
+        return np.broadcast_to(length, np.shape(self.mu_ratio)) if np.ndim(self.mu_ratio) else length
 
     @property
     def regime(self) -> Any:
@@ -115,7 +143,11 @@ class Surrogate:
     'stick_slip'
     """
 
-    def __init__(self, table: Table, path: str | Path) -> None:
+    def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
+        most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+        if threads is not None and not (type(threads) is int and 1 <= threads <= most):
+            raise InputError("threads", threads, f"None or a whole number from 1 to {most}")
+        self.threads = threads
         self.path = Path(path)
         self.table = table
         self.attributes = json_attributes(table)
@@ -126,23 +158,37 @@ class Surrogate:
         self.border = Border(table.border)
         patches, rows, first = [], [], 0
         for spec, block in zip(regions.BLOCKS, table.blocks, strict=True):
-            coefficients = cells_2d(spec, block.values, *block.cells)
-            (a0, a1), (b0, b1) = spec.a, ((0.0, kernels.SQRT2) if spec.b_name == "s" else spec.b)
+            patches.append(cells_2d(spec, block.values, block.cells))
             na, nb = block.cells
-            rows.append([first, na, nb, a0, na / (a1 - a0), b0, nb / (b1 - b0), block.quantity_error])
-            patches.append(coefficients)
-            first += coefficients.shape[0]
-        self._data = (np.concatenate(patches), np.array(rows), *self.border.arrays)
+            paces = (*pace_of(spec.a_name, *spec.a, na), *pace_of(spec.b_name, *spec.b, nb))
+            rows.append([first, na, nb, *paces, block.quantity_error + kernels.rounding_of(spec)])
+            first += na * nb
+        self._data = (_joined(patches), np.array(rows), *self.border.arrays)
         self._companion_data: tuple[Array, Array] | None = None
 
     @classmethod
-    def open(cls, path: str | Path) -> Surrogate:
-        """Read, check and prepare the table at ``path``; raises :class:`friction.errors.TableError`."""
-        return cls(read_table(path), path)
+    def open(cls, path: str | Path, threads: int | None = None) -> Surrogate:
+        """Read, check and prepare the table at ``path``.
+
+        Parameters
+        ----------
+        path : str or Path
+            The table file.
+        threads : int, optional
+            Threads that arrays are shared out to; all cores by default.  Scalars need one.
+
+        Raises
+        ------
+        TableError
+            When the file is missing, damaged or of another format.
+        InputError
+            When ``threads`` is not a whole number from 1 to the number that numba was started with.
+        """
+        return cls(read_table(path), path, threads)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle small: by path and checksum; the file must say the same where it is opened again."""
-        return _reopen, (str(self.path.resolve()), self.checksum)
+        return _reopen, (str(self.path.resolve()), self.checksum, self.threads)
 
     @property
     def id(self) -> str:
@@ -168,15 +214,15 @@ class Surrogate:
         ]
 
     def _companions(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
-        with _ONE_LOOP:
+        (v_all, y_all), shape = _columns(v_tilde, y_tilde)
+        with _loop(v_all.size, self.threads):
             if self._companion_data is None:
                 stick, power = [], []
                 for spec, block in zip(regions.BLOCKS, self.table.blocks, strict=True):
-                    power.append(cells_2d(spec, block.power, *block.cells))
+                    power.append(cells_2d(spec, block.power, block.cells))
                     none = np.zeros_like(power[-1])
-                    stick.append(cells_2d(spec, block.stick, *block.cells) if block.stick.size else none)
-                self._companion_data = (np.concatenate(power), np.concatenate(stick))
-            (v_all, y_all), shape = _columns(v_tilde, y_tilde)
+                    stick.append(cells_2d(spec, block.stick, block.cells) if block.stick.size else none)
+                self._companion_data = (_joined(power), _joined(stick))
             power_out, stick_out = np.empty(v_all.size), np.empty(v_all.size)
             companions_array(v_all, y_all, *self._companion_data, *self._data[1:], power_out, stick_out)
         return power_out, stick_out, shape
@@ -248,15 +294,15 @@ class Surrogate:
             raise InputError("y_tilde", y_tilde, "finite and >= 0")
         (v_all, y_all), shape = _columns(v_tilde, y_tilde)
         out = np.empty(v_all.size)
-        with _ONE_LOOP:
-            kernels.value_array(v_all, y_all, *self._data, out)
+        with _loop(v_all.size, self.threads):
+            lanes.value_array(v_all, y_all, *self._data, out)
         return out.reshape(shape) if shape else float(out[0])
 
     def slopes(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Array, Array, Array]:
         """mu~, v~ d mu~/d v~ and y~ d mu~/d y~ [-] of the broadcast shape; inputs must be legal and y~ finite."""
         (v_all, y_all), shape = _columns(v_tilde, y_tilde)
         mu, along_v, along_y = (np.empty(v_all.size) for _ in range(3))
-        with _ONE_LOOP:
+        with _loop(v_all.size, self.threads):
             slopes_array(v_all, y_all, *self._data, mu, along_v, along_y)
         return mu.reshape(shape), along_v.reshape(shape), along_y.reshape(shape)
 
@@ -264,8 +310,8 @@ class Surrogate:
         """mu~, the bound of its absolute error and the source code, of the broadcast shape; inputs must be legal."""
         (v_all, y_all), shape = _columns(v_tilde, y_tilde)
         mu, bound, source = np.empty(v_all.size), np.empty(v_all.size), np.empty(v_all.size, dtype=np.int8)
-        with _ONE_LOOP:
-            kernels.ratio_array(v_all, y_all, *self._data, mu, bound, source)
+        with _loop(v_all.size, self.threads):
+            lanes.ratio_array(v_all, y_all, *self._data, mu, bound, source)
         return mu.reshape(shape), bound.reshape(shape), source.reshape(shape)
 
     def evaluate(
@@ -311,7 +357,8 @@ class Surrogate:
         if _plain(given) and (k is None or given[2] < math.inf):
             a, b, c, d, e, f = given
             return self._scalar(a, b, c, d, e, f, gradient)
-        columns = nondim.check_inputs({"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0})
+        named = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
+        columns = nondim.as_columns(named)
         columns.setdefault("k", np.asarray(math.inf))
         ordered = [columns[name] for name in nondim.FIELDS]
         try:
@@ -320,31 +367,29 @@ class Surrogate:
             shapes = {name: columns[name].shape for name in nondim.FIELDS}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         if shape == ():
+            nondim.check_inputs(named)
             m, n_force, stiffness, amplitude, frequency, speed = (float(c) for c in ordered)
             return self._scalar(m, n_force, stiffness, amplitude, frequency, speed, gradient)
         flat, _ = _columns(*ordered)
         n = flat[0].size
-        mu, bound, v, y = (np.empty(n) for _ in range(4))
+        macro, mu, bound, v, y = (np.empty(n) for _ in range(5))
         source = np.empty(n, dtype=np.int8)
-        with _ONE_LOOP:
+        with _loop(n, self.threads):
             a, b, c, d, e, f = flat
-            nondim.evaluate_array(a, b, c, d, e, f, *self._data, mu, bound, source, v, y)
+            illegal = nondim.evaluate_array(a, b, c, d, e, f, *self._data, k is None, macro, mu, bound, source, v, y)
+            if illegal:
+                nondim.check_inputs(named)
             slopes = np.empty((n, 6)) if gradient else None
             if slopes is not None:
                 nondim.gradient_array(a, b, c, d, e, f, mu, source, v, y, *self._data, slopes)
-        scale = np.broadcast_to(ordered[0], shape)
-        ratio: Array = mu.reshape(shape)
-        with np.errstate(over="ignore", under="ignore"):
-            length = np.broadcast_to(ordered[0] * (ordered[1] / ordered[2]), shape)
-        code = source.reshape(shape)
         return Answer(
-            mu_macro=ratio * scale,
-            mu_ratio=ratio,
-            error_bound=bound.reshape(shape) * scale,
-            source_code=code,
+            mu_macro=macro.reshape(shape),
+            mu_ratio=mu.reshape(shape),
+            error_bound=bound.reshape(shape),
+            source_code=source.reshape(shape),
             v_tilde=v.reshape(shape),
             y_tilde=y.reshape(shape),
-            length_scale=length,
+            stretch=(ordered[0], ordered[1], ordered[2]),
             gradient=None if slopes is None else self._named(slopes.T.reshape(6, *shape), k is None),
         )
 
@@ -366,7 +411,7 @@ class Surrogate:
             source_code=source,
             v_tilde=v,
             y_tilde=y,
-            length_scale=mu0 * (Fz / k),
+            stretch=(mu0, Fz, k),
             gradient=named,
         )
 
@@ -386,6 +431,11 @@ def _plain(values: tuple[Any, ...]) -> bool:
     )  # fmt: skip
 
 
+def _joined(patches: list[Array]) -> Array:
+    out = aligned(sum(p.shape[0] for p in patches), *patches[0].shape[1:])
+    return np.concatenate(patches, out=out)
+
+
 def _columns(*values: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     """The values broadcast together, flat, contiguous and writable (one numba signature), and their shape."""
     arrays = [np.asarray(value, dtype=np.float64) for value in values]
@@ -401,8 +451,8 @@ def _columns(*values: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     return out, shape
 
 
-def _reopen(path: str, checksum: str) -> Surrogate:
-    surrogate = Surrogate.open(path)
+def _reopen(path: str, checksum: str, threads: int | None = None) -> Surrogate:
+    surrogate = Surrogate.open(path, threads)
     if checksum and surrogate.checksum != checksum:
         raise TableError(path, f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}")
     return surrogate

@@ -39,6 +39,7 @@ _COORDINATES = {
     "y_squared": "square of the dimensionless amplitude",
     "v_squared_share": "v_tilde^2/(1 + v_tilde^2)",
     "ln_y": "natural logarithm of y_tilde",
+    "ln_rho": "natural logarithm of v_tilde/v_tilde_crit",
     "ln_kappa": "natural logarithm of v_tilde/sqrt(y_tilde)",
     "inverse_y": "1/y_tilde",
     "s": "s with v_tilde = v_tilde_crit sin^2(pi s/2)",

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from friction.kernels import normal_form_root, outer_expansion
+from friction.kernels import normal_form_root
+from friction.outer import outer_expansion
 
 __all__ = [
     "agm",

@@ -11,7 +11,7 @@ from builder.assemble import ABS_TO_REL, build_table
 from builder.sweep import Sweep
 from builder.verify import CASES, SOLVER_NOISE, draw, monotony, seam_jumps
 from friction import InputError, Surrogate, TableError
-from friction.regions import REGIMES, SOURCES, Y_STICK_HI, Y_STICK_LO
+from friction.regions import REGIMES, SOURCES, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from friction.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP, REGIME_OF_SOURCE
 
 TOLERANCES = ("1e-4", "1e-7", "1e-10", "1e-12")
@@ -102,7 +102,7 @@ def test_corner_follows_its_cube_root(table):
 
 
 def test_one_digit_on_either_side_of_every_region_line(table):
-    for y in (Y_STICK_LO, 1.5, Y_STICK_HI, 3.0, 6.0, 30.0, 1e5):
+    for y in (Y_STICK_LO, Y_CONT, Y_MID, Y_HIGH, Y_TAIL):
         around = [math.nextafter(y, 0.0), y, math.nextafter(y, math.inf)]
         for v in (1e-9, 1e-3, 0.1, 0.5, 3.0, 40.0, 1e4):
             mu = [table.mu_ratio(v, b) for b in around]

@@ -9,15 +9,18 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from friction import kernels
-from friction.kernels import DEGREE, SQRT2, WIDTH, edge_coordinate
+from friction.kernels import DEGREE, SQRT2, WIDTH, edge_coordinate, polar
 from friction.patch_simd import patch_value
 from friction.patches import (
-    axis_positions,
+    cell_positions,
     cells_1d,
     cells_2d,
     chebyshev_coefficients,
+    evaluation_span,
+    file_coordinate,
     interpolation_matrix,
     nodes,
+    pace_of,
     s_of_sigma,
 )
 from friction.regions import BLOCKS, BlockSpec
@@ -72,7 +75,7 @@ def test_coefficients_of_a_plane_work_along_both_axes() -> None:
 def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
     rng = np.random.default_rng(cells)
     c = rng.normal(size=DEGREE + 1)
-    local = cells_1d(chebyshev.chebval(nodes(20, -1.0, 1.0), c), cells)
+    local = cells_1d("y", (-1.0, 1.0), chebyshev.chebval(nodes(20, -1.0, 1.0), c), cells)
     assert local.shape == (cells, WIDTH)
     for x in np.linspace(0.0, 1.0, 57):
         i = min(int(x * cells), cells - 1)
@@ -85,7 +88,7 @@ def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[in
     rng = np.random.default_rng(sum(cells))
     c = rng.normal(size=(WIDTH, WIDTH))
     values = chebyshev.chebgrid2d(nodes(12, -1.0, 1.0), nodes(15, -1.0, 1.0), c)
-    coef = cells_2d(plain_block((0.0, 1.0), (0.0, 1.0)), values, *cells)
+    coef = cells_2d(plain_block((0.0, 1.0), (0.0, 1.0)), values, cells)
     assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
     assert coef.flags.c_contiguous
     for x, z in rng.random((80, 2)):
@@ -96,7 +99,7 @@ def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
     values = np.exp(np.sin(3.0 * nodes(60, 0.0, 1.0)))
     errors = []
     for cells in (2, 4, 8):
-        local = cells_1d(values, cells)
+        local = cells_1d("y", (0.0, 1.0), values, cells)
         x = np.linspace(0.0, 1.0, 500, endpoint=False)
         i = (x * cells).astype(int)
         found = np.array([np.polyval(local[k], 2.0 * (t * cells - k) - 1.0) for t, k in zip(x, i, strict=True)])
@@ -108,7 +111,7 @@ def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
 def test_neighbouring_cells_meet() -> None:
     x, z = nodes(40, 0.0, 1.0), nodes(40, 0.0, 1.0)
     values = np.exp(-x[:, None]) * np.cos(2.0 * z[None, :]) + x[:, None] * z[None, :] ** 2
-    coef = cells_2d(plain_block((0.0, 1.0), (0.0, 1.0)), values, 6, 6)
+    coef = cells_2d(plain_block((0.0, 1.0), (0.0, 1.0)), values, (6, 6))
     for i in range(5):
         for t in np.linspace(-1.0, 1.0, 9):
             assert _value(coef, i * 6 + 2, 1.0, t) == pytest.approx(_value(coef, (i + 1) * 6 + 2, -1.0, t), abs=2e-12)
@@ -142,6 +145,27 @@ def test_compiled_patch_says_what_plain_python_says() -> None:
 # --- the coordinate of stick-slip blocks --------------------------------------------------------------
 
 
+@pytest.mark.parametrize("spec", BLOCKS, ids=lambda spec: spec.name)
+@pytest.mark.parametrize("cells", [1, 2, 7, 40])
+def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(spec: BlockSpec, cells: int) -> None:
+    for name, (low, high) in ((spec.a_name, spec.a), (spec.b_name, spec.b)):
+        offset, pace = pace_of(name, low, high, cells)
+        start, stop = evaluation_span(name, low, high)
+        for x in (start, np.nextafter(start, stop), 0.5 * (start + stop), np.nextafter(stop, start), stop):
+            assert 0 <= math.trunc(x * pace + offset) < cells
+        assert math.trunc((start + 0.999999 * (stop - start)) * pace + offset) == cells - 1
+
+
+def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
+    low, high = evaluation_span("angle", 0.0, 1.0)
+    for v, eta in ((1e-9, 1e-3), (1e-3, 0.0), (0.02, -0.2), (1e-7, 0.4)):
+        phi, s0, radius, half = polar(v, eta)
+        assert low < half < high
+        assert radius == pytest.approx(math.hypot(s0 / SQRT2, SQRT2 * phi), rel=1e-15)
+        angle = 2.0 / math.pi * math.atan2(2.0 * phi, s0)
+        assert file_coordinate("angle", np.array([half]))[0] == pytest.approx(angle, rel=1e-14)
+
+
 def test_edge_coordinate_undoes_the_map_of_the_table() -> None:
     assert edge_coordinate(0.0) == 0.0
     assert edge_coordinate(1.0) == SQRT2
@@ -163,7 +187,8 @@ def test_edge_coordinate_is_continuous_at_its_knot() -> None:
 @pytest.mark.parametrize("spec", [spec for spec in BLOCKS if spec.b_name == "s"], ids=lambda spec: spec.name)
 def test_cells_along_s_lie_on_the_nodes_axis_and_start_anew_at_the_knot(spec: BlockSpec) -> None:
     cells = 8
-    t = axis_positions(spec, 1, cells).reshape(cells, WIDTH)
+    sigma, t = (x.reshape(cells, WIDTH) for x in cell_positions("s", *spec.b, cells))
+    assert np.all(np.diff(sigma.ravel()) > 0.0)
     low, high = spec.b
     s = 0.5 * (low + high) + 0.5 * (high - low) * t
     assert s.max() < high
@@ -174,15 +199,16 @@ def test_cells_along_s_lie_on_the_nodes_axis_and_start_anew_at_the_knot(spec: Bl
             assert np.all(s[i] == pytest.approx(low, abs=1e-15))  # never visited
         else:
             assert np.all((s[i] > edges[i]) & (s[i] < edges[i + 1]))
-    assert axis_positions(spec, 0, 3).shape == (3 * WIDTH,)
-    assert np.all(np.abs(axis_positions(spec, 0, 3)) < 1.0)
+    x, t = cell_positions(spec.a_name, *spec.a, 3)
+    assert x.shape == t.shape == (3 * WIDTH,)
+    assert np.all(np.abs(t) < 1.0)
 
 
 def test_cells_along_s_follow_a_smooth_function() -> None:
     spec = next(block for block in BLOCKS if block.name == "stick_slip_low")
     a, s = nodes(20, *spec.a), nodes(30, *spec.b)
     values = np.exp(-a[:, None]) * np.cos(2.0 * s[None, :])
-    coef = cells_2d(spec, values, 4, 12)
+    coef = cells_2d(spec, values, (4, 12))
     rng = np.random.default_rng(2)
     for x, sigma in zip(rng.random(200), SQRT2 * rng.random(200), strict=True):
         expected = math.exp(-x * spec.a[1]) * math.cos(2.0 * float(s_of_sigma(np.array([sigma]))[0]))

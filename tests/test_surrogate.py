@@ -9,6 +9,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 import xarray as xr
@@ -336,3 +337,25 @@ def test_xarray_applies_it_on_dask_chunks(fine: Surrogate) -> None:
     plane = xr.apply_ufunc(fine.mu_ratio, v, y, dask="parallelized", output_dtypes=[float])
     assert plane.chunks is not None
     assert np.array_equal(plane.compute().values, fine.mu_ratio(values[:, None], values[:30]))
+
+
+# --- threads ------------------------------------------------------------------------------------------
+
+
+def test_the_number_of_threads_changes_nothing_but_the_time(tables_dir: Path) -> None:
+    path = tables_dir / "mumacro-1e-7.nc"
+    rng = np.random.default_rng(12)
+    v, y = log_uniform(rng, 1e-3, 1e3, 5000), log_uniform(rng, 1e-3, 1e3, 5000)
+    before = numba.get_num_threads()
+    every = Surrogate.open(path)
+    one = Surrogate.open(path, threads=1)
+    assert every.threads is None
+    assert pickle.loads(pickle.dumps(one)).threads == 1  # noqa: S301 (our own bytes)
+    np.testing.assert_array_equal(one.mu_ratio(v, y), every.mu_ratio(v, y))
+    assert numba.get_num_threads() == before
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])
+def test_threads_out_of_bounds_are_refused(tables_dir: Path, threads: Any) -> None:
+    with pytest.raises(InputError, match="threads"):
+        Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=threads)
