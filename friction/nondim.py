@@ -30,6 +30,7 @@ __all__ = [
     "as_columns",
     "check_inputs",
     "evaluate_array",
+    "evaluate_block",
     "find_faults",
     "gradient",
     "gradient_array",
@@ -271,6 +272,31 @@ def _legal(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float, 
     )  # fmt: skip
 
 
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def _evaluate_chunk(
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, low: int, n: int,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array, table: Array, floats: Array, ints: NDArray[np.int64],
+    rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8], v: Array, y: Array,
+) -> int:  # fmt: skip
+    odd = np.empty(CHUNK + 1, np.int64)
+    found = _groups(mu0, Fz, k, y0, omega, v0, low, n, v, y, odd)
+    evaluate_chunk(v, y, low, n, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
+    illegal = 0
+    for j in range(found):
+        i = odd[j]
+        if _legal(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], rigid):
+            mu[i], bound[i], source[i], v[i], y[i] = dimensional(
+                mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], coef, meta, bcoef, bmeta
+            )
+        else:
+            illegal += 1
+            mu[i], bound[i], source[i], v[i], y[i] = math.nan, math.nan, -1, math.nan, math.nan
+    for i in range(low, low + n):
+        macro[i] = mu[i] * mu0[i]
+        bound[i] *= mu0[i]
+    return illegal
+
+
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, parallel=True)
 def evaluate_array(
     mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
@@ -286,23 +312,40 @@ def evaluate_array(
     illegal = 0
     for c in prange((n + CHUNK - 1) // CHUNK):
         floats, ints = scratch()
-        odd = np.empty(CHUNK + 1, np.int64)
         low = c * CHUNK
+        illegal += _evaluate_chunk(
+            mu0, Fz, k, y0, omega, v0, low, min(CHUNK, n - low),
+            coef, meta, bcoef, bmeta, table, floats, ints, rigid, macro, mu, bound, source, v, y,
+        )  # fmt: skip
+    return illegal
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def evaluate_block(
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
+    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+    macro: Array, mu: Array, bound: Array, source: NDArray[np.int8],
+) -> int:  # fmt: skip
+    """:func:`evaluate_array` on the calling thread, for columns of n values or of one that holds for all cases.
+
+    An infinite k is rigid contact.  v~ and y~ are not kept.
+    """
+    n = mu.size
+    table = plan(meta)
+    floats, ints = scratch()
+    columns = np.empty((6, CHUNK))
+    v, y = np.empty(CHUNK), np.empty(CHUNK)
+    illegal = 0
+    for low in range(0, n, CHUNK):
         m = min(CHUNK, n - low)
-        found = _groups(mu0, Fz, k, y0, omega, v0, low, m, v, y, odd)
-        evaluate_chunk(v, y, low, m, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
-        wrong = 0
-        for j in range(found):
-            i = odd[j]
-            if _legal(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], rigid):
-                mu[i], bound[i], source[i], v[i], y[i] = dimensional(
-                    mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], coef, meta, bcoef, bmeta
-                )
-            else:
-                wrong += 1
-                mu[i], bound[i], source[i], v[i], y[i] = math.nan, math.nan, -1, math.nan, math.nan
-        for i in range(low, low + m):
-            macro[i] = mu[i] * mu0[i]
-            bound[i] *= mu0[i]
-        illegal += wrong
+        for j, given in enumerate((mu0, Fz, k, y0, omega, v0)):
+            if given.size == n:
+                columns[j, :m] = given[low : low + m]
+            elif low == 0:
+                columns[j, :] = given[0]
+        illegal += _evaluate_chunk(
+            columns[0], columns[1], columns[2], columns[3], columns[4], columns[5], 0, m,
+            coef, meta, bcoef, bmeta, table, floats, ints, True,
+            macro[low : low + m], mu[low : low + m], bound[low : low + m], source[low : low + m], v, y,
+        )  # fmt: skip
     return illegal

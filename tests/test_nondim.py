@@ -13,7 +13,17 @@ from mpmath import ellipk, mpf, pi, workdps
 
 from builder.steady import solve
 from friction import InputError, Surrogate
-from friction.nondim import BOUNDS, FIELDS, POSITIVE, UNITS, amplitude_ratio, check_inputs, find_faults, groups
+from friction.nondim import (
+    BOUNDS,
+    FIELDS,
+    POSITIVE,
+    UNITS,
+    amplitude_ratio,
+    check_inputs,
+    evaluate_block,
+    find_faults,
+    groups,
+)
 
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-10.nc"
 PLAIN = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -272,3 +282,36 @@ def test_faultless_batches_and_rigid_contacts() -> None:
     assert find_faults(without) == []
     assert "k" not in check_inputs(without)
     assert check_inputs({**PLAIN, "v0": [1, 2]})["v0"].dtype == np.float64
+
+
+@pytest.mark.parametrize("n", [1, 255, 256, 1000])
+def test_a_block_on_one_thread_says_what_the_array_says(table: Surrogate, n: int) -> None:
+    rng = np.random.default_rng(n)
+    columns = [
+        rng.uniform(0.1, 0.8, n), 10.0 ** rng.uniform(-1.0, 3.0, n), 10.0 ** rng.uniform(4.0, 8.0, n),
+        10.0 ** rng.uniform(-8.0, -3.0, n), 10.0 ** rng.uniform(0.0, 6.0, n), 10.0 ** rng.uniform(-6.0, 1.0, n),
+    ]  # fmt: skip
+    for column in columns[3:]:
+        column[:: max(2, n // 7)] = 0.0
+    for fixed in (None, 0, 2, 5):
+        given = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
+        macro, mu, bound = np.empty(n), np.empty(n), np.empty(n)
+        source = np.empty(n, dtype=np.int8)
+        assert evaluate_block(*given, *table._data, macro, mu, bound, source) == 0
+        expected = table.evaluate(*(c if c.size == n else np.full(n, c[0]) for c in given))
+        np.testing.assert_array_equal(macro, expected.mu_macro)
+        np.testing.assert_array_equal(mu, expected.mu_ratio)
+        np.testing.assert_array_equal(bound, expected.error_bound)
+        np.testing.assert_array_equal(source, expected.source_code)
+
+
+def test_a_block_marks_illegal_cases_and_takes_infinite_stiffness_for_rigid(table: Surrogate) -> None:
+    mu0 = np.array([0.3, -0.3, 0.3, 0.3, math.nan, 0.3])
+    force = np.array([10.0, -10.0, 10.0, 0.0, 10.0, 10.0])
+    k = np.array([1e6, 1e6, math.inf, 1e6, 1e6, -1e6])
+    macro, mu, bound, source = np.empty(6), np.empty(6), np.empty(6), np.empty(6, dtype=np.int8)
+    rest = (np.array([2e-6]), np.array([1.3e5]), np.array([0.01]))
+    assert evaluate_block(mu0, force, k, *rest, *table._data, macro, mu, bound, source) == 4
+    assert np.flatnonzero(source < 0).tolist() == [1, 3, 4, 5]
+    assert np.isnan(macro[source < 0]).all()
+    assert macro[2] == table.evaluate(0.3, 10.0, None, 2e-6, 1.3e5, 0.01).mu_macro
