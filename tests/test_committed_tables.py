@@ -9,7 +9,7 @@ import pytest
 
 from builder.assemble import ABS_TO_REL, build_table
 from builder.sweep import Sweep
-from builder.verify import CASES, SOLVER_NOISE, draw, monotony, seam_jumps
+from builder.verify import CASES, SOLVER_NOISE, draw, monotony, seam_jumps, seam_slope_jumps
 from friction import InputError, Surrogate, TableError
 from friction.regions import REGIMES, SOURCES, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from friction.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP, REGIME_OF_SOURCE
@@ -71,6 +71,10 @@ def test_bounds_are_no_blanket(table, sweep):
 
 def test_seams_are_invisible(table):
     assert seam_jumps(table) <= 2.0 * ABS_TO_REL * table.tolerance
+
+
+def test_slopes_go_on_across_seams(fine):
+    assert seam_slope_jumps(fine, n=20_000) <= 1e-7
 
 
 def test_mu_rises_with_speed_and_falls_with_amplitude(table):
