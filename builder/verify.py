@@ -149,7 +149,7 @@ def _crowded(rng: np.random.Generator, span: tuple[float, float], n: int, radial
 
 
 def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Pairs of points 2e-13 apart on either side of each seam, the border, and the edge of the closed form: v, v, y, y."""
+    """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of the closed form."""
     rng = np.random.default_rng(seed)
     for seam in SEAMS:
         v = _log(rng, 1e-9, 1e5, n)
