@@ -39,7 +39,7 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 IMAGES = ROOT / "docs" / "img"
 
 
-def _processor() -> str:
+def processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
@@ -60,7 +60,7 @@ def _version(package: str) -> str | None:
 
 def machine(*packages: str) -> str:
     """One line: processor, cores, system, Python, the versions that matter, and how busy the machine was."""
-    parts = [_processor(), f"{os.cpu_count()} cores", f"{platform.system()} {platform.machine()}"]
+    parts = [processor(), f"{os.cpu_count()} cores", f"{platform.system()} {platform.machine()}"]
     parts.append(f"Python {platform.python_version()}")
     parts += [text for text in map(_version, ("numpy", "numba", *packages)) if text]
     if hasattr(os, "getloadavg"):
