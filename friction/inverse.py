@@ -19,44 +19,45 @@ mu0    rises: it would fold only where        one, but searched like k and Fz
 
 The figures are those of benchmarks/folds.py, for r up to 1e8.
 
-Roots are found by bisection on the *bits* of the input: doubles of one sign are ordered like the integers that their
-bits spell, so cutting ends at two neighbouring doubles, whatever the scale, at no risk of overflow.
+How a level is met on a monotone piece: :mod:`friction.crossings`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from friction.crossings import TINY, Curve, Sweep, last_double, one_thread
 from friction.errors import InputError
 from friction.nondim import BOUNDS, FIELDS, POSITIVE
 from friction.surrogate import Answer, Surrogate
 
-__all__ = ["Crossing", "Reach", "Root", "Solution", "border_crossings", "checked_case", "last_double", "solve_for"]
+__all__ = ["Crossing", "Reach", "Root", "Solution", "border_crossings", "checked_case", "solve_for"]
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 MONOTONE = ("v0", "y0", "omega")
-TINY, HUGE = 5e-324, 1.7976931348623157e308
+HUGE = 1.7976931348623157e308
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  At r = 10, three
 # percent above its birth, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
 _PER_DECADE = 100
 _MAX_SAMPLES = 20_001
-_PER_CALL = 512
+# Elsewhere samples only bracket roots, for Newton's method to finish: close together within so many decades of where
+# mu_macro turns from one limit to the other, wide apart in the rest of the double range.
+_NEAR, _NEAR_PER_DECADE, _FAR = 9, 6, 8
 # y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls strictly from 2 to 1/2
 # (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on either side.
 Y_CLOSEST = 1.290791
 
 
-@dataclass(frozen=True)
-class Root:
+class Root(NamedTuple):
     """One value of the unknown.
 
     Attributes
@@ -144,55 +145,6 @@ def checked_case(case: Mapping[str, float | None], without: str) -> dict[str, fl
     return out
 
 
-def _ordered(x: ArrayLike) -> NDArray[np.int64]:
-    """Doubles >= 0 as integers of the same order.  Adding 0.0 turns -0.0, the smallest integer, into 0.0."""
-    return (np.asarray(x, dtype=np.float64) + 0.0).view(np.int64)
-
-
-def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike) -> tuple[Array, Array]:
-    """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
-
-    Parameters
-    ----------
-    below : callable
-        Array (n, m) in, array of bool (n, m) out, row i judging bracket i; true at ``low``, false at ``high``, monotone
-        in between.
-    low, high : array_like
-        Ends of the brackets, >= 0, shape (n,).
-    """
-    a, b = _ordered(low).copy(), _ordered(high).copy()
-    rows = np.arange(a.size)
-    # a call costs as much as some hundred points: few brackets are cut into many parts at once
-    parts = min(max(_PER_CALL // max(a.size, 1), 2), 64)
-    inner = np.arange(1, parts)
-    while np.any(b - a > 1):
-        step, rest = np.divmod(b - a, parts)
-        cuts = a[:, None] + step[:, None] * inner + rest[:, None] * inner // parts
-        count = np.argmin(np.column_stack((below(cuts.view(np.float64)), np.zeros(a.size, dtype=np.bool_))), axis=1)
-        ends = np.column_stack((a, cuts, b))
-        a, b = ends[rows, count], ends[rows, count + 1]
-    return a.view(np.float64), b.view(np.float64)
-
-
-class _Sweep:
-    """mu_macro as a function of one input."""
-
-    def __init__(self, surrogate: Surrogate, case: Mapping[str, float | None], unknown: str) -> None:
-        self.surrogate = surrogate
-        self.unknown = unknown
-        self.case: dict[str, Any] = {"k": None, **case}
-
-    def answer(self, x: Array) -> Answer:
-        return self.surrogate.evaluate(**{**self.case, self.unknown: x})
-
-    def mu(self, x: Array) -> Array:
-        out: Array = np.asarray(self.answer(x).mu_macro)
-        return out
-
-    def at(self, x: float) -> float:
-        return float(self.mu(np.array([x]))[0])
-
-
 def _scale(case: Mapping[str, float | None], unknown: str) -> float:
     """Value of ``unknown`` (k, Fz or mu0) at which y~ = 1, within double range; y0 must be > 0, k not None."""
     product = {"k": ("mu0", "Fz"), "Fz": ("y0", "k"), "mu0": ("y0", "k")}[unknown]
@@ -224,81 +176,100 @@ def _default_range(case: Mapping[str, float | None], unknown: str, targets: Arra
     return max(low, 1e-300), min(high, 1e300)
 
 
-def _turning_points(sweep: _Sweep, low: float, high: float) -> tuple[list[float], bool]:
-    """Where mu_macro stops rising or falling, ascending; and whether it is the same everywhere, to its own error."""
-    decades = math.log10(high) - math.log10(low)
-    n = min(max(int(decades * _PER_DECADE), 64) + 1, _MAX_SAMPLES)
-    x = np.exp(np.linspace(math.log(low), math.log(high), n))
-    x[0], x[-1] = low, high
-    answer = sweep.answer(x)
-    mu, noise = np.asarray(answer.mu_macro), 2.0 * np.asarray(answer.error_bound)
-    if float(mu.max() - mu.min()) <= float(noise.max()):
-        return [], True
-    found: list[int] = []
-    direction, top, bottom = 0, 0, 0
-    for i in range(1, n):
-        top = i if mu[i] > mu[top] else top
-        bottom = i if mu[i] < mu[bottom] else bottom
-        if direction >= 0 and mu[i] < mu[top] - noise[i]:
-            if direction > 0:
-                found.append(top)
-            direction, bottom = -1, i
-        elif direction <= 0 and mu[i] > mu[bottom] + noise[i]:
-            if direction < 0:
-                found.append(bottom)
-            direction, top = 1, i
-    sign = {i: 1.0 if mu[i] >= max(mu[i - 1], mu[min(i + 1, n - 1)]) else -1.0 for i in found}
-    return [_extremum(sweep, x[i - 1], x[min(i + 1, n - 1)], sign[i]) for i in found], False
+def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[float]:
+    """Where mu_macro stops rising or falling by more than ``noise``, ascending, from samples ``x``, ``mu`` (n,)."""
+    rise = np.sign(np.diff(mu))
+    # only where the samples themselves turn; the ends close the last stretch
+    places = np.unique(np.concatenate(([0], 1 + np.flatnonzero(rise[1:] != rise[:-1]), [x.size - 1])))
+    found: list[tuple[int, float]] = []
+    direction, top, bottom = 0.0, 0, 0
+    for i, m, slack in zip(places.tolist(), mu[places].tolist(), noise[places].tolist(), strict=True):
+        top = i if m > mu[top] else top
+        bottom = i if m < mu[bottom] else bottom
+        if direction >= 0.0 and m < mu[top] - slack:
+            if direction > 0.0:
+                found.append((top, 1.0))
+            direction, bottom = -1.0, i
+        elif direction <= 0.0 and m > mu[bottom] + slack:
+            if direction < 0.0:
+                found.append((bottom, -1.0))
+            direction, top = 1.0, i
+    return [_extremum(sweep, float(x[i - 1]), float(x[min(i + 1, x.size - 1)]), sign) for i, sign in found]
 
 
-def _extremum(sweep: _Sweep, low: float, high: float, sign: float) -> float:
-    """Largest (sign +1) or smallest (-1) mu_macro between two samples, in the logarithm, to where it is flat."""
-    a, b = math.log(low), math.log(high)
-    for _ in range(8):
-        grid = np.linspace(a, b, 33)
-        i = int(np.argmax(sign * sweep.mu(np.exp(grid))))
-        a, b = float(grid[max(i - 1, 0)]), float(grid[min(i + 1, 32)])
-    return math.exp(0.5 * (a + b))
+def _extremum(sweep: Sweep, low: float, high: float, sign: float) -> float:
+    """Where the slope of mu_macro goes through zero between two samples: at a maximum (sign +1) or a minimum (-1)."""
+    a, b = low, high
+    for _ in range(5):
+        grid = np.geomspace(a, b, 34)
+        grid[0], grid[-1] = a, b
+        _, slope = sweep.with_slope(grid[1:-1])
+        # the first place from which the slope has turned; the ends stand for the directions that are known
+        turned = np.append(sign * slope < 0.0, True)
+        i = int(np.argmax(turned)) + 1
+        a, b = float(grid[i - 1]), float(grid[i])
+    return math.sqrt(a) * math.sqrt(b)
 
 
-def _on_pieces(sweep: _Sweep, edges: Array, targets: Array) -> list[list[Root]]:
-    """All roots, given the edges (m + 1,) of m pieces on each of which mu_macro is monotone; ascending."""
-    mu = sweep.mu(edges)
-    which, piece = np.nonzero(
-        (targets[:, None] >= np.minimum(mu[:-1], mu[1:])) & (targets[:, None] <= np.maximum(mu[:-1], mu[1:]))
-    )
+def _curves(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
+    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the whole range."""
+    at = np.array(edges)
+    ends = sweep.mu(at)
+    curves = []
+    for i in range(at.size - 1):
+        two = slice(i, i + 2)
+        inside = slice(np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left"))
+        # next to a turning point a sample may lie beyond it by a rounding error
+        between = np.clip(mu[inside], ends[two].min(), ends[two].max())
+        curves.append(Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between)))
+    return curves
+
+
+def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]]:
+    """All roots on all pieces, ascending."""
     found: list[list[Root]] = [[] for _ in targets]
-    if not which.size:
-        return found
-    sign = np.where(mu[piece + 1] >= mu[piece], 1.0, -1.0)
-    wanted, start, end = targets[which], edges[piece], edges[piece + 1]
-
-    def reach(level: Array, beyond: bool = False) -> tuple[Array, Array]:
-        """Neighbours between which mu_macro comes to ``level``, or leaves it; an end of the piece where it does not."""
-
-        def below(x: Array) -> Bools:
-            m, limit = sign[:, None] * sweep.mu(x), (sign * level)[:, None]
-            out: Bools = m <= limit if beyond else m < limit
-            return out
-
-        return last_double(below, start, end)
-
-    a, b = reach(wanted)
-    off_a, off_b = np.abs(sweep.mu(a) - wanted), np.abs(sweep.mu(b) - wanted)
-    value = np.where(off_a <= off_b, a, b)
-    # a target that is the very value at an edge has its root there; just inside, rounding may say otherwise
-    value = np.where(mu[piece] == wanted, start, value)
-    value = np.where((mu[piece + 1] == wanted) & (np.minimum(off_a, off_b) > 0.0), end, value)
-    answer = sweep.answer(value)
-    # at y0 = 0 mu_macro is exact, and beside it no longer
-    bound = np.maximum(np.asarray(answer.error_bound), np.asarray(sweep.answer(b).error_bound))
-    low = np.minimum(reach(wanted - sign * bound)[0], value)
-    high = np.maximum(reach(wanted + sign * bound, beyond=True)[1], value)
-    columns = (value, low, high, np.asarray(answer.mu_macro), np.asarray(answer.regime))
-    for i, *root in zip(which.tolist(), *(column.tolist() for column in columns), strict=True):
-        if not found[i] or root[0] != found[i][-1].value:
-            found[i].append(Root(*root))
+    for curve in curves:
+        which = np.flatnonzero(curve.holds(targets))
+        if not which.size:
+            continue
+        wanted, start, end = targets[which], curve.x[0], curve.x[-1]
+        # a target that is the very value at an edge has its root there; just inside, rounding may say otherwise
+        value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
+        last = wanted == curve.mu[-1]
+        if last.any():
+            value = np.where(last & (sweep.mu(value) != wanted), end, value)
+        answer, slope = sweep.with_slope(value)
+        low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
+        columns = (value, low, high, np.asarray(answer.mu_macro), np.asarray(answer.regime))
+        for i, root in zip(which.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True):
+            if not found[i] or root.value != found[i][-1].value:
+                found[i].append(root)
     return found
+
+
+def _enclosures(
+    sweep: Sweep, curve: Curve, wanted: Array, value: Array, answer: Answer, slope: Array
+) -> tuple[Array, Array]:
+    """Between which values mu_macro is within its error bound of the target: ``low`` and ``high`` of a root, (n,).
+
+    ``answer`` and ``slope`` (d mu_macro / d ln x) are those at the root.
+    """
+    bound = np.asarray(answer.error_bound)
+    if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
+        beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
+        bound = np.maximum(bound, np.asarray(sweep.answer(beside).error_bound))
+    levels = np.concatenate((wanted - curve.sign * bound, wanted + curve.sign * bound))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        step = bound / (curve.sign * slope)
+        ends = np.concatenate((value * np.exp(-step), value * np.exp(step)))
+        straight = (ends > curve.x[0]) & (ends < curve.x[-1]) & (np.concatenate((step, step)) > 0.0)
+    # most often the curve is straight over so short a way; where it is not, the levels are looked for
+    tried = np.where(straight, ends, curve.x[0])
+    straight &= np.abs(sweep.mu(tried) - levels) <= 0.01 * np.concatenate((bound, bound))
+    curved = np.flatnonzero(~straight)
+    if curved.size:
+        ends[curved] = curve.meet(levels[curved], leave=curved >= value.size)
+    return np.minimum(ends[: value.size], value), np.maximum(ends[value.size :], value)
 
 
 def solve_for(
@@ -337,10 +308,9 @@ def solve_for(
         raise InputError("target", float(wanted[i]), "finite and >= 0", i if np.ndim(targets) else None)
     if within is not None:
         within = _checked_range(within, unknown)
-    sweep = _Sweep(surrogate, known, unknown)
-    if unknown in MONOTONE:
-        return _solve_monotone(sweep, wanted, within)
-    return _solve_folded(sweep, wanted, within)
+    sweep = Sweep(surrogate, known, unknown)
+    with one_thread():
+        return (_solve_monotone if unknown in MONOTONE else _solve_folded)(sweep, wanted, within)
 
 
 def _checked_range(within: tuple[float, float], unknown: str) -> tuple[float, float]:
@@ -352,7 +322,7 @@ def _checked_range(within: tuple[float, float], unknown: str) -> tuple[float, fl
     return low, high
 
 
-def _solve_monotone(sweep: _Sweep, targets: Array, within: tuple[float, float] | None) -> Solution:
+def _solve_monotone(sweep: Sweep, targets: Array, within: tuple[float, float] | None) -> Solution:
     low, high = within if within is not None else (0.0, HUGE)
     mu = sweep.mu(np.array([low, max(low, TINY), high]))
     # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
@@ -368,8 +338,11 @@ def _solve_monotone(sweep: _Sweep, targets: Array, within: tuple[float, float] |
     )  # fmt: skip
     if constant:
         reach = Reach(low, high, min(first, last), max(first, last), True, True)
-    edges = np.array([max(low, TINY) if jump else low, high])
-    solved: list[list[Root]] = [[] for _ in targets] if constant else _on_pieces(sweep, edges, targets)
+    edges = [max(low, TINY) if jump else low, high]
+    solved: list[list[Root]] = [[] for _ in targets]
+    if not constant:
+        x = _samples(sweep, *edges)
+        solved = _roots(sweep, _curves(sweep, edges, x, sweep.mu(x)), targets)
     at_zero = [Root(low, low, low, first, str(sweep.answer(np.array([low])).regime[0]))] if jump else []
     roots = [
         at_zero if jump and target == first else found if reach.holds(float(target)) else []
@@ -378,7 +351,28 @@ def _solve_monotone(sweep: _Sweep, targets: Array, within: tuple[float, float] |
     return _solution(sweep, targets, roots, reach, constant and not jump)
 
 
-def _limit(sweep: _Sweep, last: float) -> float:
+def _samples(sweep: Sweep, low: float, high: float) -> Array:
+    """Values strictly between ``low`` and ``high`` that bracket what is looked for: v0, y0 or omega, ascending."""
+    # products over quotients: where v~ or y~ is 1, and where y~ = v~
+    elastic = {
+        "v0": (("mu0", "Fz", "omega"), ("k",)),
+        "y0": (("mu0", "Fz"), ("k",)),
+        "omega": (("v0", "k"), ("mu0", "Fz")),
+    }
+    rigid = {"v0": (("y0", "omega"), ()), "y0": (("v0",), ("omega",)), "omega": (("v0",), ("y0",))}
+    parts = [np.arange(-323.0, 308.0, _FAR)]
+    for above, under in (elastic[sweep.unknown], rigid[sweep.unknown]):
+        if all(sweep.case[name] for name in above + under):
+            centre = sum(math.log10(sweep.case[name]) for name in above) - sum(
+                math.log10(sweep.case[name]) for name in under
+            )
+            parts.append(np.linspace(centre - _NEAR, centre + _NEAR, 2 * _NEAR * _NEAR_PER_DECADE + 1))
+    exponents = np.unique(np.clip(np.concatenate(parts), -323.0, 308.0))
+    x = 10.0**exponents
+    return np.unique(np.append(x[(x > low) & (x < high)], TINY if low < TINY < high else [])).astype(np.float64)
+
+
+def _limit(sweep: Sweep, last: float) -> float:
     """What mu_macro tends to as v0, y0 or omega grows without limit; ``last`` is its value at the largest double."""
     if sweep.unknown == "v0":
         return float(sweep.case["mu0"])
@@ -387,12 +381,12 @@ def _limit(sweep: _Sweep, last: float) -> float:
     return last if sweep.case["k"] is not None else 0.0
 
 
-def _attained(sweep: _Sweep, last: float) -> bool:
+def _attained(sweep: Sweep, last: float) -> bool:
     """Whether the smallest mu_macro is reached at a finite value: friction that vanishes at rest, at y0 = l0."""
     return sweep.unknown == "y0" and last == 0.0 and sweep.case["v0"] == 0.0
 
 
-def _solve_folded(sweep: _Sweep, targets: Array, within: tuple[float, float] | None) -> Solution:
+def _solve_folded(sweep: Sweep, targets: Array, within: tuple[float, float] | None) -> Solution:
     still = 0.0 in (sweep.case.get("y0"), sweep.case.get("omega"))
     if within is not None:
         low, high = within
@@ -400,15 +394,22 @@ def _solve_folded(sweep: _Sweep, targets: Array, within: tuple[float, float] | N
         low, high = (1e-300, 1e300)
     else:
         low, high = _default_range(sweep.case, sweep.unknown, targets)
-    turns, constant = _turning_points(sweep, low, high)
-    edges = np.array([low, *turns, high])
-    mu = sweep.mu(edges)
-    reach = Reach(low, high, float(mu.min()), float(mu.max()), True, True)
-    roots: list[list[Root]] = [[] for _ in targets] if constant else _on_pieces(sweep, edges, targets)
+    decades = math.log10(high) - math.log10(low)
+    x = np.exp(np.linspace(math.log(low), math.log(high), min(max(int(decades * _PER_DECADE), 64) + 1, _MAX_SAMPLES)))
+    x[0], x[-1] = low, high
+    answer = sweep.answer(x)
+    mu, noise = np.asarray(answer.mu_macro), 2.0 * np.asarray(answer.error_bound)
+    constant = float(mu.max() - mu.min()) <= float(noise.max())
+    edges = [low, *([] if constant else _turning_points(sweep, x, mu, noise)), high]
+    ends = sweep.mu(np.array(edges))
+    reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
+    roots: list[list[Root]] = [[] for _ in targets]
+    if not constant:
+        roots = _roots(sweep, _curves(sweep, edges, x, mu), targets)
     return _solution(sweep, targets, roots, reach, constant)
 
 
-def _solution(sweep: _Sweep, targets: Array, roots: list[list[Root]], reach: Reach, constant: bool) -> Solution:
+def _solution(sweep: Sweep, targets: Array, roots: list[list[Root]], reach: Reach, constant: bool) -> Solution:
     return Solution(sweep.unknown, tuple(targets.tolist()), tuple(map(tuple, roots)), reach, constant)
 
 
@@ -420,7 +421,7 @@ def border_crossings(
     ``case`` holds the other five inputs.  None for rigid contact (never any stick) and without oscillation.
     """
     known = checked_case(case, along)
-    sweep = _Sweep(surrogate, known, along)
+    sweep = Sweep(surrogate, known, along)
     if sweep.case["k"] is None and along != "k":
         return ()
     if any(known.get(name) == 0.0 for name in ("y0", "omega", "v0") if name != along):
@@ -436,11 +437,12 @@ def border_crossings(
         out: Bools = np.asarray(sweep.answer(x).regime) == "continuous"
         return out
 
-    state = slides(np.array(edges))
-    found = []
-    for a, b, here, there in zip(edges[:-1], edges[1:], state[:-1], state[1:], strict=True):
-        if here != there:
-            wanted = bool(here)
-            _, first = last_double(lambda x, wanted=wanted: slides(x) == wanted, np.array([a]), np.array([b]))  # type: ignore[misc]
-            found.append(Crossing(float(first[0]), sweep.at(float(first[0]))))
+    with one_thread():
+        state = slides(np.array(edges))
+        found = []
+        for a, b, here, there in zip(edges[:-1], edges[1:], state[:-1], state[1:], strict=True):
+            if here != there:
+                wanted = bool(here)
+                _, first = last_double(lambda x, wanted=wanted: slides(x) == wanted, np.array([a]), np.array([b]))  # type: ignore[misc]
+                found.append(Crossing(float(first[0]), sweep.at(float(first[0]))))
     return tuple(found)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from friction import tails
+from friction.crossings import one_thread
 from friction.errors import InputError
 from friction.inverse import Crossing, border_crossings, checked_case
 from friction.nondim import FIELDS, POSITIVE
@@ -96,7 +97,8 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     """
     known = checked_case(case, along)
     full: dict[str, Any] = {"k": None, **known, along: values}
-    answer = surrogate.evaluate(**full)
+    with one_thread():
+        answer = surrogate.evaluate(**full)
     mu0 = np.broadcast_to(np.asarray(full["mu0"], dtype=np.float64), values.shape)
     at_rest = (np.asarray(full["y0"]) == 0.0) | (np.asarray(full["omega"]) == 0.0)
     static = np.where(at_rest, mu0, mu0 * tails.static_limit(answer.y_tilde))
