@@ -1,4 +1,4 @@
-"""``python -m builder``: build, verify and query tables offline."""
+"""``python -m builder``: build, verify, query and export tables offline."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from builder.assemble import MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
+from builder.export import FORMATS, export_table
 from builder.steady import solve as solve_one
 from builder.sweep import SolveError, Sweep
 from builder.verify import verify as verify_table
@@ -133,6 +134,28 @@ def verify(
     print(_json(report))
     if not report["holds"]:
         raise _fail(f"{table} misses its tolerance of {surrogate.tolerance:g}")
+
+
+@app.command()
+def export(
+    table: Annotated[Path, typer.Argument(help="A table file.")],
+    kind: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")],
+    out: Annotated[
+        Path | None, typer.Option(help="The file to write; left out: the table's name with another suffix, here.")
+    ] = None,
+) -> None:
+    """Write the table's plain grid for other tools; print what was written as JSON."""
+    if kind not in FORMATS:
+        raise typer.BadParameter(f"must be one of {', '.join(FORMATS)}, got {kind!r}", param_hint="--format")
+    target = Path(table.stem + FORMATS[kind][0]) if out is None else out
+    if target.is_dir():
+        raise typer.BadParameter(f"{str(target)!r} is a folder", param_hint="--out")
+    try:
+        found = export_table(table, kind, target)
+    except (MumacroError, OSError) as error:
+        raise _fail(str(error)) from error
+    shape = list(found.mu_ratio.shape)
+    print(_json({"table": str(table), "format": kind, "out": str(target), "shape": shape}))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
-EXAMPLES = {"README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "uncertainty.py", "least_power.py"}
+EXAMPLES = {
+    "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
+    "least_power.py",
+}  # fmt: skip
 
 
 def run(repository, *command):
