@@ -17,18 +17,37 @@ from friction.inverse import Crossing, border_crossings, checked_case
 from friction.nondim import FIELDS, POSITIVE
 from friction.surrogate import Answer, Surrogate
 
-__all__ = ["APPROXIMATIONS", "SCALES", "Law", "approximations", "friction_law", "sweep_values"]
+__all__ = [
+    "APPROXIMATIONS",
+    "BORDERS",
+    "SCALES",
+    "Law",
+    "approximations",
+    "border_speeds",
+    "friction_law",
+    "sweep_values",
+]
 
 Array = NDArray[np.float64]
 
 SCALES = ("log", "linear")
 
-#: name -> what it is and where it holds; NaN elsewhere
+#: name -> what it is and where it holds; NaN elsewhere.  Without an equation number it is this project's own.
 APPROXIMATIONS = {
     "static": "eq. (16), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
+    "creep": "slow sliding, first order: mu0 (sqrt(1 - y~^2) + pi v~ / (2 (1 - y~^2))), or mu0 C(y~) v~ for y~ > 1, C "
+    "from the table; given up to mu0",
     "small_amplitude": "eq. (31), continuous sliding at y~ << 1: mu0 (1 - y~^2 / (4 (1 + v~^2))); given for y~ <= 1",
+    "continuous": "continuous sliding: mu0 (2/pi) K(i y~ / sqrt(1 + v~^2)), eqs. (31) and (35) in one",
     "rigid": "eqs. (35), (37), fast sliding or rigid contact: mu0 (2/pi) K(i y~/v~)",
     "corner": "slow sliding near y~ = 1, root of mu~^3 + 2 (y~ - 1) mu~ = pi v~; given for |y~ - 1| <= 0.5, mu~ <= 0.7",
+}
+#: v0 at which continuous sliding begins: name -> what it is
+BORDERS = {
+    "exact": "the table's border",
+    "small_amplitude": "l0 omega (y~^2 / 2)(1 - 5 y~^2 / 12); given for y~ <= 1",
+    "large_amplitude": "l0 omega sqrt(y~ / 4.402914), eq. (26) with the exact constant",
+    "blend": "one formula for every y~, within 0.6 percent",
 }
 _CORNER_REACH, _CORNER_TOP = 0.5, 0.7
 
@@ -106,8 +125,13 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     return Law(along, values, answer, static, crossings)
 
 
-def approximations(law: Law, mu0: float | Array) -> dict[str, Array]:
-    """The approximations of :data:`APPROXIMATIONS` along a law; NaN where one is not meant to hold."""
+def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
+    """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN where one is not meant to hold.
+
+    ``case`` holds the other five inputs, as :func:`friction_law` had them.
+    """
+    full: dict[str, Any] = {"k": None, **case, law.along: law.values}
+    mu0 = np.asarray(full["mu0"], dtype=np.float64)
     v, y = (np.asarray(x, dtype=np.float64) for x in (law.answer.v_tilde, law.answer.y_tilde))
     elastic = np.isfinite(y) & np.isfinite(v)
     v_safe, y_safe = np.where(elastic, v, 1.0), np.where(elastic, y, 0.0)
@@ -120,9 +144,48 @@ def approximations(law: Law, mu0: float | Array) -> dict[str, Array]:
     near = elastic & (np.abs(y_safe - 1.0) <= _CORNER_REACH) & (v_safe > 0.0) & (v_safe < 1.0)
     corner = np.full(v.shape, np.nan)
     corner[near] = tails.corner_root(v_safe[near], y_safe[near] - 1.0)
+    creep = _creep(surrogate, law, full)
     return {
         "static": law.mu_static.copy(),
+        "creep": np.where(creep <= mu0, creep, np.nan),
         "small_amplitude": np.where(elastic & (y <= 1.0), mu0 * small, np.nan),
+        "continuous": np.where(elastic, mu0 * tails.continuous(v_safe, y_safe), np.nan),
         "rigid": mu0 * rigid,
         "corner": np.where(corner <= _CORNER_TOP, mu0 * corner, np.nan),
     }
+
+
+def _creep(surrogate: Surrogate, law: Law, full: Mapping[str, Any]) -> Array:
+    """The tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)."""
+    with one_thread():
+        at_rest = surrogate.evaluate(
+            mu0=full["mu0"], Fz=full["Fz"], k=full["k"], y0=full["y0"], omega=full["omega"],
+            v0=np.zeros_like(law.values), gradient=True,
+        )  # fmt: skip
+    slope = np.asarray((at_rest.gradient or {})["v0"])
+    with np.errstate(invalid="ignore", over="ignore"):
+        out: Array = law.mu_static + slope * np.asarray(full["v0"], dtype=np.float64)
+    return out
+
+
+def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
+    """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in :data:`BORDERS`; (n,).
+
+    NaN where an approximation is not meant to hold and where y~ is beyond double range; 0 for rigid contact and without
+    oscillation, which never stick.
+    """
+    full: dict[str, Any] = {"k": None, **case, law.along: law.values}
+    y = np.broadcast_to(np.asarray(law.answer.y_tilde, dtype=np.float64), law.values.shape)
+    omega = np.asarray(full["omega"], dtype=np.float64)
+    never = np.broadcast_to((np.asarray(full["y0"]) == 0.0) | (omega == 0.0) | (full["k"] is None), y.shape)
+    usable = np.isfinite(y) & ~never
+    y_safe = np.where(usable, y, 1.0)
+    with np.errstate(over="ignore", invalid="ignore"), one_thread():
+        unit = np.where(usable, np.asarray(law.answer.length_scale) * omega, np.nan)
+        found = {
+            "exact": unit * surrogate.v_tilde_crit(y_safe),
+            "small_amplitude": np.where(y_safe <= 1.0, unit * tails.border_small_amplitude(y_safe), np.nan),
+            "large_amplitude": unit * tails.border_large_amplitude(y_safe),
+            "blend": unit * tails.border_blend(y_safe),
+        }
+    return {name: np.where(never, 0.0, column) for name, column in found.items()}

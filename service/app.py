@@ -25,7 +25,7 @@ from service.drain import draining
 from service.errors import answer_problem
 from service.logs import AccessLog
 from service.metrics import Metrics
-from service.middleware import ApiKeyGate, BodyLimit, RequestRecord
+from service.middleware import HEALTH_PATHS, ApiKeyGate, BodyLimit, RequestRecord
 from service.openapi import install
 from service.routes import batch, docs, health, inverse, law, mu_macro, page, table, umbridge
 from service.routes import metrics as metrics_route
@@ -41,6 +41,8 @@ _ROUTERS = (
     mu_macro.router, batch.router, inverse.router, law.router, table.router, health.router, metrics_route.router,
     docs.router, umbridge.router, page.router,
 )  # fmt: skip
+# The pages are the same for everyone and tell nothing; they ask their user for the key and send it with every question.
+_OPEN_PATHS = HEALTH_PATHS | page.OPEN_PATHS | docs.OPEN_PATHS
 _log = logging.getLogger("mumacro.app")
 
 
@@ -89,7 +91,7 @@ def create_app(settings: Settings | None = None) -> Application:
         redirect_slashes=False,
         middleware=[
             Middleware(RequestRecord, metrics=metrics, log=access_log),
-            Middleware(ApiKeyGate, key=key),
+            Middleware(ApiKeyGate, key=key, open_paths=_OPEN_PATHS),
             Middleware(BodyLimit, max_bytes=settings.max_body_bytes),
         ],
     )

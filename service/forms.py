@@ -161,7 +161,13 @@ class LawAnswer(BaseModel):
     border: list[BorderMark] = Field(description="Up to two places inside the range")
     approximations: dict[str, list[float | None]] | None = Field(
         None,
-        description="Only if asked for: static (16), small_amplitude (31), rigid (35), corner; null: not meant there",
+        description="Only if asked for [-]: static (16), creep, small_amplitude (31), continuous, rigid (35), corner; "
+        "null: not meant there",
+    )
+    border_speeds: dict[str, list[float | None]] | None = Field(
+        None,
+        description="Only with approximations [m/s]: v0 at which continuous sliding begins for each case: exact, "
+        "small_amplitude, large_amplitude (26), blend; null: not meant there",
     )
     table: TableLabel
     api_version: str

@@ -82,15 +82,16 @@ class RequestRecord:
 
 
 class ApiKeyGate:
-    """Asks for the API key, everywhere but at the health endpoints.  Without a key in the settings it is open."""
+    """Asks for the API key, everywhere but at ``open_paths``.  Without a key in the settings it is open."""
 
-    def __init__(self, app: ASGIApp, key: str | None) -> None:
+    def __init__(self, app: ASGIApp, key: str | None, open_paths: frozenset[str] = HEALTH_PATHS) -> None:
         self.app = app
         self.key = None if key is None else key.encode("ascii")
+        self.open_paths = open_paths
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request, or answer 401."""
-        if self.key is None or scope["type"] != "http" or scope["path"] in HEALTH_PATHS or self._admits(scope):
+        if self.key is None or scope["type"] != "http" or scope["path"] in self.open_paths or self._admits(scope):
             await self.app(scope, receive, send)
             return
         fault = UnauthorizedError(

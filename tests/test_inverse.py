@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from friction import InputError
 from friction.inverse import border_crossings, solve_for
-from friction.law import approximations, friction_law, sweep_values
+from friction.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 from friction.nondim import FIELDS
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -263,12 +263,16 @@ def test_the_approximations_hold_where_they_should(surrogate):
     def compare(name, case, **ranges):
         values = sweep_values("v0", *ranges["v0"], 31, "log")
         law = friction_law(surrogate, "v0", values, others(case, "v0"))
-        approximation = approximations(law, case["mu0"])[name]
+        approximation = approximations(surrogate, law, others(case, "v0"))[name]
         return np.max(np.abs(approximation - law.answer.mu_macro)) / case["mu0"]
 
     unit = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 1.0}
     assert compare("static", {**unit, "y0": 0.5}, v0=(1e-12, 1e-9)) < 1e-8
     assert compare("small_amplitude", {**unit, "y0": 0.01}, v0=(1e-3, 1e3)) < 1e-8  # O(y~^4)
+    assert compare("creep", {**unit, "y0": 0.5}, v0=(1e-12, 1e-6)) < 1e-8  # O(v~^(3/2))
+    assert compare("creep", {**unit, "y0": 2.0}, v0=(1e-12, 1e-6)) < 1e-8
+    assert compare("continuous", {**unit, "y0": 0.01}, v0=(1e-3, 1e3)) < 1e-8  # O(y~^4)
+    assert compare("continuous", {**unit, "y0": 1.0}, v0=(1e3, 1e6)) < 1e-6  # O(1/v~^2)
     assert compare("rigid", {**unit, "y0": 1.0}, v0=(1e3, 1e6)) < 1e-6  # O(1/v~^2)
     assert compare("corner", {**unit, "y0": 1.0}, v0=(1e-12, 1e-9)) < 1e-8  # O(mu~^3)
 
@@ -276,15 +280,41 @@ def test_the_approximations_hold_where_they_should(surrogate):
 def test_an_approximation_is_silent_where_it_is_not_meant(surrogate):
     values = sweep_values("v0", 1e-3, 10.0, 11, "log")
     law = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 1e-5})  # y~ = 3.3
-    found = approximations(law, 0.3)
+    found = approximations(surrogate, law, {**others(CASE, "v0"), "y0": 1e-5})
+    assert found.keys() == APPROXIMATIONS.keys()
     assert np.isnan(found["small_amplitude"]).all()
     assert np.isnan(found["corner"]).all()
     assert np.isfinite(found["rigid"]).all()
     rigid = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "k": None})
-    assert approximations(rigid, 0.3)["rigid"] == pytest.approx(rigid.answer.mu_macro, rel=1e-14)
+    found = approximations(surrogate, rigid, {**others(CASE, "v0"), "k": None})
+    assert found["rigid"] == pytest.approx(rigid.answer.mu_macro, rel=1e-14)
+    assert np.isnan(found["creep"]).all()
+    assert np.isnan(found["continuous"]).all()
     assert (rigid.mu_static == 0.0).all()
     still = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 0.0})
     assert (still.mu_static == 0.3).all()
+
+
+@pytest.mark.parametrize("along", FIELDS)
+def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate, along):
+    values = sweep_values(along, 0.1 * CASE[along], 10.0 * CASE[along], 31, "log")
+    law = friction_law(surrogate, along, values, others(CASE, along))
+    speeds = border_speeds(surrogate, law, others(CASE, along))
+    assert speeds.keys() == BORDERS.keys()
+    v0 = values if along == "v0" else CASE["v0"]
+    assert ((v0 >= speeds["exact"]) == (law.answer.regime == "continuous")).all()
+    assert speeds["blend"] == pytest.approx(speeds["exact"], rel=0.006)
+    meant = ~np.isnan(speeds["small_amplitude"])
+    assert (meant == (law.answer.y_tilde <= 1.0)).all()
+    assert speeds["small_amplitude"][meant] == pytest.approx(speeds["exact"][meant], rel=0.11)
+
+
+def test_what_never_sticks_has_no_border(surrogate):
+    values = sweep_values("v0", 1e-3, 10.0, 5, "log")
+    for changed in ({"k": None}, {"y0": 0.0}, {"omega": 0.0}):
+        case = {**others(CASE, "v0"), **changed}
+        for column in border_speeds(surrogate, friction_law(surrogate, "v0", values, case), case).values():
+            assert (column == 0.0).all()
 
 
 @pytest.mark.parametrize(

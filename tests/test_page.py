@@ -86,7 +86,7 @@ def open_page(live_server, tmp_path_factory):
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
 
-    def start(address="", width=1400, height=1000, scheme="light"):
+    def start(address="", width=1400, height=1000, scheme="light", url=live_server.url, ready=r"^0(\.\d+)?$"):
         # another document: setting only the part behind "#" would not load the page anew
         browser.get("about:blank")
         browser.execute_cdp_cmd(
@@ -95,8 +95,8 @@ def open_page(live_server, tmp_path_factory):
         )
         media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
-        browser.get(live_server.url + "/" + address)
-        return Page(browser, live_server.url)
+        browser.get(url + "/" + address)
+        return Page(browser, url, ready)
 
     yield start
     browser.quit()
@@ -105,9 +105,9 @@ def open_page(live_server, tmp_path_factory):
 class Page:
     """The page as a user sees it."""
 
-    def __init__(self, browser, url):
+    def __init__(self, browser, url, ready):
         self.browser, self.url = browser, url
-        self.wait_for("#mu", r"^0(\.\d+)?$")
+        self.wait_for("#mu", ready)
         self.run("await new Promise((done) => setTimeout(done, 300))")
 
     def run(self, script, *arguments):
@@ -375,3 +375,85 @@ def test_everything_that_takes_input_has_a_name(open_page):
         "document.getElementById(id).tabIndex < 0);"
     )
     assert reached == []
+
+
+# --- with an API key in force -------------------------------------------------------------------------
+
+
+def test_the_page_is_open_where_the_numbers_are_not(tables_dir, problem):
+    from starlette.testclient import TestClient
+
+    from service.app import create_app
+    from service.routes import docs, page
+    from service.settings import Settings
+
+    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="sesame"))) as client:
+        for path in page.OPEN_PATHS | docs.OPEN_PATHS:
+            assert client.get(path).status_code == 200, path
+        for path in ("/static/page/map.json", "/v1/mu-macro", "/openapi.json", "/v1/law.csv", "/Info", "/static/page/"):
+            problem(client.get(path), 401)
+        assert client.get("/static/page/map.json", headers={"X-API-Key": "sesame"}).status_code == 200
+
+
+@pytest.fixture(scope="module")
+def closed(serving, tables_dir):
+    with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
+        yield f"http://127.0.0.1:{server.port}"
+
+
+def test_the_page_asks_for_the_key_and_uses_it(open_page, closed, surrogate, tmp_path):
+    page = open_page(url=closed, ready="^…$")
+    page.wait_for("#key-form", "asks for an API key")
+    assert page.find("#key-form").is_displayed()
+    for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
+        page.type("#key", wrong)
+        page.find("#key-form button").click()
+        page.wait_for("#key-status", said)
+        assert page.text("#mu") == "…"
+    page.type("#key", "open-sesame")
+    page.find("#key-form button").click()
+    page.wait_for("#mu", "^0.240012$")
+    page.wait_for("#bar-v0", "%$")
+    page.run("await new Promise((done) => setTimeout(done, 500));")
+    assert not page.find("#key-form").is_displayed()
+    assert page.find("#forget").is_displayed()
+    assert "sesame" not in page.browser.current_url + page.find("#link").get_attribute("href")
+    # the download, which no plain link could make
+    page.browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    page.find("#csv").click()
+    found = tmp_path / "friction-law-v0.csv"
+    for _ in range(100):
+        if found.exists():
+            break
+        page.run("await new Promise((done) => setTimeout(done, 100));")
+    header, *rows = csv.reader(io.StringIO(found.read_text()))
+    assert header[0] == "v0 [m/s]"
+    assert float(rows[0][1]) == surrogate.evaluate(**{**START, "v0": float(rows[0][0])}).mu_macro
+    # loaded anew, the tab still has the key; forgotten, it has not
+    page.browser.refresh()
+    page.wait_for("#mu", "^0.240012$")
+    page.find("#forget").click()
+    page.wait_for("#mu", "^…$")
+    page.wait_for("#key-form", "asks for an API key")
+    assert page.run("return sessionStorage.length;") == 0
+    # a browser writes down every answer of 401; nothing else may be there
+    assert [entry for entry in page.complaints() if "401" not in entry] == []
+
+
+def test_the_description_asks_for_the_key_too(open_page, closed):
+    page = open_page(url=closed, ready="^…$")
+    page.browser.get(closed + "/docs")
+    page.wait_for("#key-form", "asks for an API key")
+    page.type("#key", "open-sesame")
+    page.find("#key-form button").click()
+    page.wait_for("#swagger-ui", "mu_macro over a range of one input")
+    assert [entry for entry in page.complaints() if "401" not in entry] == []
+    page.run("sessionStorage.clear();")
+
+
+def test_without_a_key_the_description_is_shown_at_once(open_page, live_server):
+    page = open_page()
+    page.browser.get(live_server.url + "/docs")
+    page.wait_for("#swagger-ui", "The value of one input that gives a wanted mu_macro")
+    assert not page.find("#key-form").is_displayed()
+    assert page.complaints() == []

@@ -7,6 +7,8 @@ import math
 
 import pytest
 
+from friction.law import APPROXIMATIONS, BORDERS
+
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 SOLVE = {"unknown": "y0", "target": 0.15, **{name: value for name, value in CASE.items() if name != "y0"}}
 LAW = {"start": 1e-4, "stop": 10.0, "points": 33, **{name: value for name, value in CASE.items() if name != "v0"}}
@@ -129,7 +131,8 @@ def test_a_law_goes_along_any_input(client, along):
     }
     law = client.post("/v1/law", json={**request, "include": ["approximations"]}).json()
     assert len(law["values"]) == 201
-    assert law["approximations"].keys() == {"static", "small_amplitude", "rigid", "corner"}
+    assert law["approximations"].keys() == set(APPROXIMATIONS)
+    assert law["border_speeds"].keys() == set(BORDERS)
     assert all(len(column) == 201 for column in law["approximations"].values())
     middle = client.post("/v1/mu-macro", json={**CASE, along: law["values"][77]}).json()
     assert law["mu_macro"][77] == pytest.approx(middle["mu_macro"], rel=1e-14)
@@ -149,13 +152,14 @@ def test_the_table_for_spreadsheets_is_the_law(client):
     header, *rows = csv.reader(io.StringIO(response.text))
     assert header == [
         "v0 [m/s]", "mu_macro [-]", "mu_ratio [-]", "error_bound [-]", "mu_static [-]",
-        "static [-]", "small_amplitude [-]", "rigid [-]", "corner [-]", "regime", "source",
+        *(f"{name} [-]" for name in APPROXIMATIONS), *(f"border_{name} [m/s]" for name in BORDERS), "regime", "source",
     ]  # fmt: skip
     assert [float(row[0]) for row in rows] == law["values"]
     assert [float(row[1]) for row in rows] == law["mu_macro"]
-    assert [row[9] for row in rows] == law["regime"]
+    assert [row[-2] for row in rows] == law["regime"]
     expected = ["" if value is None else repr(value) for value in law["approximations"]["corner"]]
-    assert [row[8] for row in rows] == expected
+    assert [row[header.index("corner [-]")] for row in rows] == expected
+    assert [float(row[header.index("border_exact [m/s]")]) for row in rows] == law["border_speeds"]["exact"]
     assert response.text.count("\r\n") == 34
 
 

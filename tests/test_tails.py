@@ -76,6 +76,22 @@ def test_border_tails() -> None:
         assert float(tails.border_large_amplitude(y)) == pytest.approx(border(y)[0], rel=0.08 / y + 2e-7)
 
 
+def test_the_blend_is_the_border_within_what_it_says() -> None:
+    y = np.geomspace(1e-4, 1e6, 61)
+    exact = np.array([border(float(value))[0] for value in y])
+    assert tails.border_blend(y) == pytest.approx(exact, rel=0.006)
+    assert tails.border_blend(1e-3) == pytest.approx(float(tails.border_small_amplitude(1e-3)), rel=1e-11)
+    assert tails.border_blend(1e300) == pytest.approx(float(tails.border_large_amplitude(1e300)), rel=1e-12)
+
+
+def test_one_formula_for_continuous_sliding() -> None:
+    y = np.array([0.01, 0.3, 1.0, 3.0, 30.0, 1000.0])
+    for factor in (1.0, 1.5, 4.0, 30.0):
+        v = factor * np.array([border(float(value))[0] for value in y])
+        exact = np.array([solve(float(a), float(b)).mu_ratio for a, b in zip(v, y, strict=True)])
+        assert np.max(np.abs(tails.continuous(v, y) - exact)) < 0.041
+
+
 @pytest.mark.parametrize("eta", [-0.25, -1e-3, -1e-12, 0.0, 1e-15, 1e-6, 0.6])
 @pytest.mark.parametrize("v", [1e-300, 1e-30, 1e-12, 1e-4, 0.3])
 def test_corner_root_solves_its_cubic(v: float, eta: float) -> None:

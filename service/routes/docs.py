@@ -5,12 +5,14 @@ from pathlib import Path
 from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
-__all__ = ["ASSETS", "router"]
+__all__ = ["ASSETS", "OPEN_PATHS", "router"]
 
 router = APIRouter(include_in_schema=False)
 
 _FOLDER = Path(__file__).resolve().parent.parent / "static" / "swagger-ui"
 ASSETS = {"swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css", "start.js": "text/javascript"}
+#: what needs no API key: the page and its parts; the description itself does
+OPEN_PATHS = frozenset({"/docs", *(f"/static/swagger-ui/{name}" for name in ASSETS)})
 
 # Styles inline: the interface sets some on its elements.  Scripts, and all else, from this host alone.
 _POLICY = (

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from friction.errors import InputError
-from friction.law import Law, approximations, friction_law, sweep_values
+from friction.law import Law, approximations, border_speeds, friction_law, sweep_values
 from friction.nondim import UNITS
 from service.answers import signature
 from service.codecs import encode
@@ -108,8 +108,9 @@ def _answer(
         "border": [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border],
     }
     if form.include:
-        mu0 = law.values if form.along == "mu0" else float(case["mu0"] or math.nan)
-        answer["approximations"] = {name: column.tolist() for name, column in approximations(law, mu0).items()}
+        for name, columns in (("approximations", approximations), ("border_speeds", border_speeds)):
+            found = columns(table.surrogate, law, case)
+            answer[name] = {key: column.tolist() for key, column in found.items()}
     answer.update(signature(table))
     return answer
 
@@ -118,8 +119,9 @@ def _as_csv(answer: dict[str, Any]) -> str:
     columns: dict[str, list[Any]] = {f"{answer['along']} [{answer['unit']}]": answer["values"]}
     for name in ("mu_macro", "mu_ratio", "error_bound", "mu_static"):
         columns[f"{name} [-]"] = answer[name]
-    for name, column in answer.get("approximations", {}).items():
-        columns[f"{name} [-]"] = ["" if math.isnan(value) else value for value in column]
+    for group, prefix, unit in (("approximations", "", "-"), ("border_speeds", "border_", "m/s")):
+        for name, column in answer.get(group, {}).items():
+            columns[f"{prefix}{name} [{unit}]"] = ["" if math.isnan(value) else value for value in column]
     columns.update(regime=answer["regime"], source=answer["source"])
     text = io.StringIO()
     writer = csv.writer(text)

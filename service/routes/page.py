@@ -14,13 +14,15 @@ from service.codecs import encode
 from service.routes.mu_macro import etag_matches
 from service.shelf import shelf_of
 
-__all__ = ["ASSETS", "POLICY", "router"]
+__all__ = ["ASSETS", "OPEN_PATHS", "POLICY", "router"]
 
 router = APIRouter(include_in_schema=False)
 
 _FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
-_SCRIPTS = ("main.js", "api.js", "fields.js", "plot.js", "map.js", "law.js")
+_SCRIPTS = ("main.js", "api.js", "key.js", "fields.js", "plot.js", "map.js", "law.js")
 ASSETS = {**dict.fromkeys(_SCRIPTS, "text/javascript"), "page.css": "text/css"}
+#: what needs no API key: the page and its parts, but no number
+OPEN_PATHS = frozenset({"/", *(f"/static/page/{name}" for name in ASSETS)})
 
 # No inline script, no inline style, nothing from another host.
 POLICY = (

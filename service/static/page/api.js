@@ -1,4 +1,5 @@
 // Questions to the service.
+import { withKey } from "./key.js";
 
 /** One question in flight; while it is, only the newest of those that come is kept. */
 export class Channel {
@@ -31,13 +32,27 @@ export class Channel {
   }
 }
 
+/** The service wants a key, or another one. */
+export class KeyWanted extends Error {}
+
 async function read(response) {
+  if (response.status === 401) throw new KeyWanted("this service asks for an API key");
   const body = await response.json().catch(() => ({}));
   if (response.ok) return body;
   throw new Error(body.detail ?? body.error?.message ?? `the service answered ${response.status}`);
 }
 
 export const query = (values) => new URLSearchParams(Object.entries(values).map(([name, value]) => [name, String(value)])).toString();
-export const get = async (path, values) => read(await fetch(values ? `${path}?${query(values)}` : path));
+export const get = async (path, values) => read(await fetch(values ? `${path}?${query(values)}` : path, withKey()));
 export const post = async (path, body) =>
-  read(await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) }));
+  read(await fetch(path, { method: "POST", ...withKey({ "Content-Type": "application/json" }), body: JSON.stringify(body) }));
+
+/** The content of an address, as a browser's download; for what a plain link cannot fetch, because it needs the key. */
+export async function download(path, name) {
+  const response = await fetch(path, withKey());
+  if (!response.ok) return read(response);
+  const address = URL.createObjectURL(await response.blob());
+  Object.assign(document.createElement("a"), { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+  return null;
+}

@@ -2,7 +2,7 @@
 import { Axis, Plot, drawAxes, drawPoint, theme } from "./plot.js";
 import { SYMBOLS } from "./fields.js";
 
-export const APPROXIMATIONS = { static: ["static limit (16)", "a1"], small_amplitude: ["small amplitude (31)", "a2"], rigid: ["rigid contact (35)", "a3"], corner: ["near ỹ = 1", "a4"] };
+export const APPROXIMATIONS = { static: ["static limit (16)", "a1"], creep: ["creep, first order", "a5"], small_amplitude: ["small amplitude (31)", "a2"], continuous: ["(31) and (35) in one", "a6"], rigid: ["rigid contact (35)", "a3"], corner: ["near ỹ = 1", "a4"] };
 
 export class LawPlot {
   /** `pick(value)` when the user moves along the law, `hover(value, mu, regime)` or `hover(null)`. */
@@ -127,8 +127,10 @@ export class LawPlot {
       context.fillText("static", this.x.from + 5, this.y.pixel(still[0]) - 3);
       return;
     }
-    Object.values(APPROXIMATIONS).forEach(([label, shade], i) => {
-      const y = this.y.from - 22 - 17 * (Object.keys(APPROXIMATIONS).length - 1 - i);
+    // only those that are meant to hold somewhere here
+    const shown = Object.entries(APPROXIMATIONS).filter(([name]) => approximations[name].some((value) => value !== null));
+    shown.forEach(([, [label, shade]], i) => {
+      const y = this.y.from - 22 - 17 * (shown.length - 1 - i);
       const x = this.x.to - 150;
       context.strokeStyle = colour(shade);
       context.lineWidth = 1.8;

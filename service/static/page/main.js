@@ -1,6 +1,7 @@
 // The page: one state (SI), its fields, the questions it asks, and what the answers change.
-import { Channel, get, post, query } from "./api.js";
+import { Channel, KeyWanted, download, get, post, query } from "./api.js";
 import { FIELDS, NAMES, SYMBOLS, fault, parse, show, withUnit } from "./fields.js";
+import { apiKey, setApiKey } from "./key.js";
 import { LawPlot } from "./law.js";
 import { FrictionMap } from "./map.js";
 
@@ -103,12 +104,12 @@ function syncField(name, keepText = false) {
 // --- questions ----------------------------------------------------------------------------------------
 
 const inputs = () => Object.fromEntries(NAMES.map((name) => [name, state[name]]));
-const fail = (error) => complain(error.message);
+const fail = (error) => (error instanceof KeyWanted ? wantKey() : complain(error.message));
 
 const asks = {
   point: new Channel((values) => get("v1/mu-macro", { ...values, include: "groups,limits" }), showAnswer, fail),
   slopes: new Channel((values) => post("Gradient", { name: "mu_macro", outWrt: 0, inWrt: 0, input: [NAMES.map((name) => values[name])], sens: [1] }),
-    (found, values) => showBars({ slopes: found.output, values }), () => showBars(null)),
+    (found, values) => showBars({ slopes: found.output, values }), (error) => { showBars(null); if (error instanceof KeyWanted) wantKey(); }),
   law: new Channel((request) => post("v1/law", request), showLaw, fail),
   hover: new Channel((v, y) => get("v1/mu-macro", { mu0: 1, Fz: 1, k: 1, omega: 1, y0: y, v0: v }), showHover, () => {}),
 };
@@ -251,6 +252,42 @@ for (const id of ["map", "law"]) {
   });
 }
 
+// --- key ----------------------------------------------------------------------------------------------
+
+/** Shows the field for the key; says so when the one that was sent is not it. */
+function wantKey() {
+  const tried = apiKey() !== null;
+  setApiKey(null);
+  $("forget").hidden = true;
+  if (tried) $("key-status").textContent = "That is not the key of this service.";
+  if ($("key-form").hidden) {
+    $("key-form").hidden = false;
+    $("key").focus();
+  }
+}
+
+function useKey(event) {
+  event.preventDefault();
+  if (!setApiKey($("key").value.trim())) {
+    $("key-status").textContent = "A key has 1 to 512 characters: letters, digits, signs, no spaces.";
+    return;
+  }
+  $("key").value = "";
+  $("key-status").textContent = "";
+  begin();
+}
+
+/** Asks for everything, the map included: at the start, and when there is a key. */
+function begin() {
+  lastLaw = "";
+  change({});
+  get("static/page/map.json").then((data) => {
+    map.show(data);
+    $("key-form").hidden = true;
+    $("forget").hidden = apiKey() === null;
+  }, fail);
+}
+
 // --- start --------------------------------------------------------------------------------------------
 
 buildFields();
@@ -272,6 +309,15 @@ addEventListener("hashchange", () => {
   readAddress();
   change({});
 });
+$("key-form").addEventListener("submit", useKey);
+$("forget").addEventListener("click", () => {
+  setApiKey(null);
+  location.reload();
+});
+$("csv").addEventListener("click", (event) => {
+  if (apiKey() === null) return; // a plain link will do
+  event.preventDefault();
+  download($("csv").href, `friction-law-${state.along}.csv`).catch(fail);
+});
 readAddress();
-change({});
-get("static/page/map.json").then((data) => map.show(data), fail);
+begin();
