@@ -16,7 +16,7 @@ from friction.surrogate import REGIME_OF_SOURCE
 from service import API_VERSION
 from service.compiled.block import evaluate_cases
 from service.limits import groups, limits, power, stick_fraction
-from service.schemas import CaseRequest, Groups, InputStd, Limits
+from service.schemas import CaseRequest, Groups, InputStd, Limits, Power
 from service.shelf import LoadedTable
 
 __all__ = [
@@ -160,7 +160,7 @@ _KEYS: dict[str, tuple[str, ...] | None] = {
     "gradient": FIELDS,
     "std": None,
     "stick_fraction": None,
-    "power": None,
+    "power": tuple(Power.model_fields),
 }
 
 

@@ -3,7 +3,7 @@
 import re
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, ValidationError
 
 from friction.nondim import BOUNDS
 from service.errors import FieldFault, InvalidFieldsError, MalformedBodyError, safe_value
@@ -27,6 +27,8 @@ MAX_POINTS = 10_001
 MAX_TARGETS = 10_000
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "v0"]
+# JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema.
+_Whole = BeforeValidator(lambda value: int(value) if isinstance(value, float) and value.is_integer() else value)
 Target = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Form = TypeVar("Form", bound="_Five")
 
@@ -95,7 +97,9 @@ class LawRequest(_Five):
     along: Name = Field("v0", description="The swept input")
     start: NotNegative = Field(description="First value [SI]; > 0 on a logarithmic scale")
     stop: Positive = Field(description="Last value [SI], > start")
-    points: Annotated[int, Field(ge=2, le=MAX_POINTS)] = Field(201, description=f"Number of values, 2 to {MAX_POINTS}")
+    points: Annotated[int, Field(ge=2, le=MAX_POINTS), _Whole] = Field(
+        201, description=f"Number of values, 2 to {MAX_POINTS}"
+    )
     scale: Literal["log", "linear"] = Field("log", description="Spacing of the values")
     include: list[Literal["approximations"]] | None = Field(None, description="More to compute: approximations")
 

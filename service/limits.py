@@ -68,19 +68,24 @@ def limits(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, NDAr
     }
 
 
-def power(surrogate: Surrogate, case: Values, answer: Answer) -> Any:
-    """Mean power that keeps up the oscillation [W]; the drive adds v0 mu_macro Fz to it.
+def power(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, Any]:
+    """What the oscillation costs and what it saves: ``oscillation`` and ``saved``, both mean powers [W].
 
-    NaN for rigid contact, whose l0 = 0 is no unit, and where the groups are beyond double range.
+    Notes
+    -----
+    ``oscillation`` is what the shaker puts in, mu0 Fz l0 omega <y~ cos tau u_y>; what the contact turns into heat is
+    this plus mu_macro Fz v0, which the drive puts in.  NaN for rigid contact, whose l0 = 0 is no unit, and where the
+    groups are beyond double range.  ``saved`` is what the drive is spared, (mu0 - mu_macro) Fz v0.
     """
-    mu0, load, omega = (np.asarray(case[name], dtype=np.float64) for name in ("mu0", "Fz", "omega"))
+    mu0, load, omega, v0 = (np.asarray(case[name], dtype=np.float64) for name in ("mu0", "Fz", "omega", "v0"))
     at_rest = (np.asarray(case["y0"]) == 0.0) | (omega == 0.0)
     usable = np.isfinite(answer.v_tilde) & np.isfinite(answer.y_tilde) & ~at_rest
     v, y = (np.where(usable, group, 1.0) for group in (answer.v_tilde, answer.y_tilde))
-    with np.errstate(over="ignore", under="ignore"):
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         unit = mu0 * load * (np.asarray(answer.length_scale) * omega)
         found = np.asarray(surrogate.power(v, y)) * unit
-    return np.where(at_rest, 0.0, np.where(usable, found, np.nan))
+        saved = (mu0 - np.asarray(answer.mu_macro)) * load * v0
+    return {"oscillation": np.where(at_rest, 0.0, np.where(usable, found, np.nan)), "saved": saved}
 
 
 def stick_fraction(surrogate: Surrogate, answer: Answer) -> Any:

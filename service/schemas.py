@@ -17,6 +17,7 @@ __all__ = [
     "Health",
     "InputStd",
     "Limits",
+    "Power",
     "Problem",
     "Result",
     "RowsAnswer",
@@ -34,7 +35,6 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _K = "Tangential contact stiffness [N/m], finite and > 0; left out or null: rigid contact"
 _STD = "Standard deviations of the inputs; needed where include asks for std, and nowhere else"
 _STICK = "Share of the period during which the contact sticks [-]; only if asked for"
-_POWER = "Mean power that keeps up the oscillation [W]; null for rigid contact; only if asked for"
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
@@ -83,12 +83,12 @@ class BatchColumns(BaseModel):
         json_schema_extra={"examples": [{**_EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}]},
     )
 
-    mu0: float | list[float] = Field(description="[-], finite and > 0")
-    Fz: float | list[float] = Field(description="[N], finite and > 0")
-    k: float | list[float | None] | None = Field(None, description="[N/m], finite and > 0; null: rigid contact")
-    y0: float | list[float] = Field(description="[m], finite and >= 0")
-    omega: float | list[float] = Field(description="[rad/s], finite and >= 0")
-    v0: float | list[float] = Field(description="[m/s], finite and >= 0")
+    mu0: Positive | list[float] = Field(description="[-], finite and > 0")
+    Fz: Positive | list[float] = Field(description="[N], finite and > 0")
+    k: Positive | list[float | None] | None = Field(None, description="[N/m], finite and > 0; null: rigid contact")
+    y0: NotNegative | list[float] = Field(description="[m], finite and >= 0")
+    omega: NotNegative | list[float] = Field(description="[rad/s], finite and >= 0")
+    v0: NotNegative | list[float] = Field(description="[m/s], finite and >= 0")
     include: list[Include] | None = Field(None, description=_INCLUDE)
     tolerance: Positive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
     std: InputStd | None = Field(None, description=_STD)
@@ -128,6 +128,15 @@ class Gradient(BaseModel):
     v0: float | None = Field(description="[s/m]")
 
 
+class Power(BaseModel):
+    """Mean powers [W].  null: not finite in double precision."""
+
+    oscillation: float | None = Field(
+        description="What the shaker puts in: mu0 Fz l0 omega <y~ cos tau u_y>; null for rigid contact"
+    )
+    saved: float | None = Field(description="What the drive is spared: (mu0 - mu_macro) Fz v0")
+
+
 class Result(BaseModel):
     """What is known of one case."""
 
@@ -141,7 +150,7 @@ class Result(BaseModel):
     gradient: Gradient | None = Field(None, description="Only if asked for")
     std: float | None = Field(None, description="Standard deviation of mu_macro [-], to first order; only if asked for")
     stick_fraction: float | None = Field(None, description=_STICK)
-    power: float | None = Field(None, description=_POWER)
+    power: Power | None = Field(None, description="Only if asked for")
 
 
 class CaseAnswer(Result):
@@ -179,7 +188,7 @@ class ColumnsAnswer(_BatchEnd):
     gradient: dict[str, list[float | None]] | None = None
     std: list[float | None] | None = None
     stick_fraction: list[float | None] | None = None
-    power: list[float | None] | None = None
+    power: dict[str, list[float | None]] | None = None
 
 
 class RowsAnswer(_BatchEnd):

@@ -16,7 +16,7 @@ import pytest
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
-    "least_power.py",
+    "least_power.py", "quasi_monte_carlo.py",
 }  # fmt: skip
 
 
@@ -116,6 +116,22 @@ def test_uncertainty(repository, live_server, surrogate):
     expected = sum((gradient[name] * CASE[name] * np.log(spread)) ** 2 for name, spread in spreads.items()) ** 0.5
     assert first_order == pytest.approx(expected, abs=1e-5)
     assert sampled == pytest.approx(first_order, rel=0.02)
+
+
+def test_quasi_monte_carlo(repository, live_server, surrogate):
+    need(None, "qmcpy", "umbridge")
+    text = run(repository, sys.executable, "examples/quasi_monte_carlo.py", live_server.url)
+    # the same inputs by plain sampling of the table itself
+    mean = np.log10(list(CASE.values()))
+    spread = np.log10([1.03, 1.02, 1.05, 1.05, 1.001, 1.02])
+    drawn = 10.0 ** (mean + spread * np.random.default_rng(3).standard_normal((400_000, 6)))
+    sampled = surrogate.evaluate(*drawn.T).mu_macro
+    assert number(r"mean of mu_macro ([\d.]+)", text) == pytest.approx(sampled.mean(), abs=2e-5 + 1e-4)
+    assert number(r"\nstandard deviation ([\d.]+)", text) == pytest.approx(sampled.std(), rel=0.01)
+    gradient = surrogate.evaluate(**CASE, gradient=True).gradient
+    slopes = np.log(10.0) * np.array([gradient[name] * value for name, value in CASE.items()])
+    expected = np.sqrt(np.sum((slopes * spread) ** 2))
+    assert number(r"first order: standard deviation ([\d.]+)", text) == pytest.approx(expected, abs=1e-5)
 
 
 def test_least_power(repository, tables_dir):

@@ -99,18 +99,21 @@ def test_power_and_stick_fraction_are_the_surrogates(client, case, surrogate, v0
     answer = ask(client, at, include=["groups", "power", "stick_fraction", "limits"])
     v, y, l0 = (answer["groups"][name] for name in ("v_tilde", "y_tilde", "l0"))
     unit = case["mu0"] * case["Fz"] * l0 * case["omega"]
-    assert answer["power"] == pytest.approx(surrogate.power(v, y) * unit, rel=1e-12)
+    shaker = answer["power"]["oscillation"]
+    assert shaker == pytest.approx(surrogate.power(v, y) * unit, rel=1e-12)
+    assert answer["power"]["saved"] == pytest.approx((case["mu0"] - answer["mu_macro"]) * case["Fz"] * v0, rel=1e-12)
     assert answer["stick_fraction"] == pytest.approx(surrogate.stick_fraction(v, y), rel=1e-12)
     assert (answer["stick_fraction"] > 0) == (v0 < answer["limits"]["v0_crit"])
     # what both drives put in is lost where the contact slips, so neither is more than the friction force can take
     speed = v0 + y0 * case["omega"]
-    assert 0 <= answer["power"] + v0 * answer["mu_macro"] * case["Fz"] <= case["mu0"] * case["Fz"] * speed * (1 + 1e-9)
+    assert 0 <= shaker + v0 * answer["mu_macro"] * case["Fz"] <= case["mu0"] * case["Fz"] * speed * (1 + 1e-9)
 
 
 @pytest.mark.parametrize(("change", "power"), [({"y0": 0}, 0.0), ({"omega": 0}, 0.0), ({"k": None}, None)])
 def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, power):
     answer = ask(client, {**case, **change}, include=["power", "stick_fraction"])
-    assert (answer["power"], answer["stick_fraction"]) == (power, 0.0)
+    assert (answer["power"]["oscillation"], answer["stick_fraction"]) == (power, 0.0)
+    assert answer["power"]["saved"] == pytest.approx((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
 
 
 def test_power_and_stick_fraction_come_in_batches(client, case):
@@ -120,8 +123,6 @@ def test_power_and_stick_fraction_come_in_batches(client, case):
     for row, result in zip(rows[:-1], results, strict=False):
         single = ask(client, row, include=["stick_fraction", "power"])
         assert result["stick_fraction"] == pytest.approx(single["stick_fraction"], rel=1e-12)
-        if single["power"] is None:
-            assert result["power"] is None
-        else:
-            assert result["power"] == pytest.approx(single["power"], rel=1e-12)
+        for name, power in single["power"].items():
+            assert result["power"][name] == (None if power is None else pytest.approx(power, rel=1e-12))
     assert results[-1] is None

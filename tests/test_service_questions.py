@@ -119,6 +119,13 @@ def test_a_law_is_single_answers_in_a_row(client):
     assert "approximations" not in law
 
 
+def test_a_whole_number_is_one_however_it_is_written(client, problem):
+    body = json.dumps({**LAW, "points": 5}).replace('"points": 5', '"points": 5.0')
+    assert len(client.post("/v1/law", content=body).json()["values"]) == 5
+    for bad in (5.5, True, "5", 1e30):
+        problem(client.post("/v1/law", json={**LAW, "points": bad}), 422)
+
+
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega"])
 def test_a_law_goes_along_any_input(client, along):
     request = {

@@ -1,0 +1,77 @@
+"""Standard deviation, gradient and power against the full model: its solves at random inputs, a time integration."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import norm, qmc
+
+from builder.steady import solve
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+PATH = "/v1/mu-macro"
+NAMES = tuple(CASE)
+# stick-slip below and above y~ = 1, beside the border, continuous sliding, far above the border
+PLACES = {
+    "creep": {"v0": 1e-3}, "stick-slip": {}, "large amplitude": {"y0": 1e-5}, "continuous": {"v0": 0.3},
+    "fast": {"v0": 5.0, "y0": 2e-5}, "beside the border": {"v0": 0.0714},
+}  # fmt: skip
+
+
+def full_model(columns):
+    """mu_macro [-] of the full model for columns (n,) of the six inputs: no table, no surrogate."""
+    mu0, load, k, y0, omega, v0 = columns
+    length = mu0 * load / k
+    places = zip((v0 / (length * omega)).tolist(), (y0 / length).tolist(), strict=True)
+    return mu0 * np.array([solve(v, y).mu_ratio for v, y in places])
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_the_standard_deviation_is_that_of_the_full_model(client, sweep, place):
+    case = {**CASE, **PLACES[place]}
+    share = {"mu0": 0.004, "Fz": 0.003, "k": 0.004, "y0": 0.003, "omega": 0.002, "v0": 0.005}
+    std = {name: share[name] * value for name, value in case.items()}
+    answer = client.post(PATH, json={**case, "include": ["std", "gradient"], "std": std}).json()
+    points = norm.ppf(qmc.Sobol(6, rng=np.random.default_rng(11)).random(1024))
+    columns = np.array(list(case.values())) + points * np.array(list(std.values()))
+    mu0, load, k, y0, omega, v0 = columns.T
+    length = mu0 * load / k
+    sampled = mu0 * sweep.solve("full", v0 / (length * omega), y0 / length)["mu_ratio"]
+    # second-order terms are of the size of the inputs' relative deviations
+    assert answer["std"] == pytest.approx(sampled.std(), rel=0.01)
+    assert sampled.mean() == pytest.approx(answer["mu_macro"], abs=0.02 * answer["std"])
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_the_gradient_is_that_of_the_full_model(client, place):
+    case = {**CASE, **PLACES[place]}
+    gradient = client.post(PATH, json={**case, "include": ["gradient"]}).json()["gradient"]
+    for i, (name, value) in enumerate(case.items()):
+        step = np.zeros((6, 4))
+        step[i] = 1e-4 * value * np.array([-2.0, -1.0, 1.0, 2.0])
+        f = full_model(np.array(list(case.values()))[:, None] + step)
+        slope = (8.0 * (f[2] - f[1]) - (f[3] - f[0])) / (12.0 * 1e-4)  # d mu_macro / d ln input, fourth order
+        assert gradient[name] * value == pytest.approx(slope, rel=1e-7, abs=3e-10), name
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_the_power_is_that_of_a_plain_time_integration(client, naive, place):
+    case = {**CASE, **PLACES[place]}
+    answer = client.post(PATH, json={**case, "include": ["power", "groups"]}).json()
+    v, y, l0 = (answer["groups"][name] for name in ("v_tilde", "y_tilde", "l0"))
+    periods = 1 + naive.periods_until_steady(v, y)
+    means = []
+    for steps in (20_000, 40_000):
+        orbit = naive.march(v, y, steps, periods)
+        # a step ends with what the displacement during it did: velocities at its middle, elongations at both ends
+        tau = 2.0 * math.pi * (np.arange(steps) + 0.5) / steps
+        before = np.roll(orbit, 1, axis=0)
+        middle = 0.5 * (orbit + before)
+        means.append((np.mean(y * np.cos(tau) * middle[:, 1]), np.mean(middle[:, 0])))
+    (p1, m1), (p2, m2) = means
+    p, mu = 2.0 * p2 - p1, 2.0 * m2 - m1  # the error is proportional to the step
+    assert case["mu0"] * mu == pytest.approx(answer["mu_macro"], rel=2e-5)
+    unit = case["mu0"] * case["Fz"] * l0 * case["omega"]
+    assert unit * p == pytest.approx(answer["power"]["oscillation"], rel=1e-4)
+    saved = (1.0 - mu) * case["mu0"] * case["Fz"] * case["v0"]
+    assert saved == pytest.approx(answer["power"]["saved"], rel=1e-3)
