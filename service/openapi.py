@@ -18,10 +18,12 @@ __all__ = [
     "describe_batch",
     "describe_json",
     "describe_problems",
+    "describe_umbridge",
     "form_parameters",
     "install",
     "option_parameters",
     "table_parameters",
+    "umbridge_body",
 ]
 
 _REF = "#/components/schemas/{model}"
@@ -59,6 +61,7 @@ _ANSWERS: tuple[Any, ...] = (
 )
 _PARAMETER_SCHEMAS = models.CaseRequest.model_json_schema()["properties"]
 _EXAMPLE = models.Case.model_json_schema()["examples"][0]
+_COLUMNS = models.BatchColumns.model_json_schema()["examples"][0]
 
 
 def describe_json(answer: str | Sequence[str], *statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -80,6 +83,35 @@ def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     }
 
 
+def umbridge_body(example: dict[str, Any]) -> dict[str, Any]:
+    """Describe the body of a UM-Bridge call; what it holds beside the model's name is the protocol's business."""
+    schema = {
+        "type": "object",
+        "required": ["name"],
+        "properties": {"name": {"type": "string", "enum": ["mu_macro", "mu_macro_log10"]}},
+    }
+    return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema, "example": example}}}}
+
+
+def describe_umbridge(example: dict[str, Any] | None = None) -> dict[int | str, dict[str, Any]]:
+    """Describe the answers of a UM-Bridge call: the protocol has its own form of errors, 400 and 500."""
+    text = {"type": "string"}
+    error = {
+        "type": "object",
+        "required": ["error"],
+        "properties": {"error": {"type": "object", "required": ["type", "message"], "properties": {"type": text}}},
+    }
+    answer: dict[str, Any] = {"schema": {"type": "object"}}
+    if example is not None:
+        answer["example"] = example
+    described: dict[int | str, dict[str, Any]] = {
+        200: {"description": "The answer", "content": {"application/json": answer}}
+    }
+    for status, why in ((400, "ModelNotFound, UnsupportedFeature or InvalidInput"), (500, "InvalidOutput")):
+        described[status] = {"description": why, "content": {"application/json": {"schema": error}}}
+    return {**described, **describe_problems(401, 413)}
+
+
 def batch_bodies() -> dict[str, Any]:
     """Describe the forms of a batch."""
     columns, row = {"$ref": _REF.format(model="BatchColumns")}, {"$ref": _REF.format(model="Case")}
@@ -87,8 +119,14 @@ def batch_bodies() -> dict[str, Any]:
     return {
         "required": True,
         "content": {
-            JSON: {"schema": {"oneOf": [columns, rows]}},
-            NDJSON: {"schema": {"oneOf": [columns, rows, row], "description": "One of these a line"}},
+            JSON: {
+                "schema": {"oneOf": [columns, rows]},
+                "examples": {"columns": {"value": _COLUMNS}, "rows": {"value": [_EXAMPLE, {**_EXAMPLE, "v0": 0.1}]}},
+            },
+            NDJSON: {
+                "schema": {"oneOf": [columns, rows, row], "description": "One of these a line"},
+                "examples": {"a line": {"value": _COLUMNS}},
+            },
             ARROW: {"schema": {"type": "string", "format": "binary", "description": _ARROW_BODY}},
         },
     }

@@ -16,12 +16,13 @@ from starlette.responses import Response
 
 from friction.errors import MumacroError
 from service.errors import BodyTooLargeError
+from service.openapi import describe_umbridge, umbridge_body
 from service.shelf import shelf_of
-from service.umbridge import INFO, OPERATIONS, UmBridgeError, model_of
+from service.umbridge import INFO, MODELS, OPERATIONS, UmBridgeError, model_of
 
 __all__ = ["PATHS", "router", "umbridge_error"]
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(tags=["UM-Bridge 1.0"])
 
 PATHS = frozenset({"/Info", *(f"/{name}" for name in OPERATIONS)})
 
@@ -38,8 +39,11 @@ def umbridge_error(kind: str, message: str, status: int | None = None) -> Respon
     return _write(error.as_json(), error.status if status is None else status)
 
 
-@router.head("/Info")
-@router.get("/Info")
+@router.head("/Info", include_in_schema=False)
+@router.get(
+    "/Info", operation_id="Info", summary="The protocol's version and the models", response_class=Response,
+    responses=describe_umbridge(INFO),
+)  # fmt: skip
 async def info() -> Response:
     """Return the protocol's version and the names of the models."""
     return _write(INFO)
@@ -74,5 +78,22 @@ def _endpoint(name: str) -> Callable[[Request], Awaitable[Response]]:
     return answer
 
 
+_POINT = {"input": [[0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]]}
+_WRT = {"outWrt": 0, "inWrt": 0}
+#: operation -> what it does, the rest of an example's body
+_DESCRIBED: dict[str, tuple[str, dict[str, Any]]] = {
+    "ModelInfo": ("What the model supports", {}),
+    "InputSizes": ("The sizes of its inputs: mu0, Fz, k, y0, omega, v0", {}),
+    "OutputSizes": ("The sizes of its outputs: mu_macro", {}),
+    "Evaluate": ("mu_macro", _POINT),
+    "Gradient": ("Gradient of mu_macro, times sens", {**_WRT, **_POINT, "sens": [1.0]}),
+    "ApplyJacobian": ("Jacobian of mu_macro, times vec", {**_WRT, **_POINT, "vec": [0.01, 0, 0, 0, 0, 0]}),
+    "ApplyHessian": ("Not supported: always 400", {}),
+}
 for _name in OPERATIONS:
-    router.add_api_route(f"/{_name}", _endpoint(_name), methods=["POST"], name=_name)
+    _summary, _rest = _DESCRIBED[_name]
+    router.add_api_route(
+        f"/{_name}", _endpoint(_name), methods=["POST"], name=_name, operation_id=_name, summary=_summary,
+        response_class=Response, openapi_extra=umbridge_body({"name": MODELS[0], **_rest}),
+        responses=describe_umbridge(),
+    )  # fmt: skip
