@@ -8,17 +8,15 @@ step before the last is replaced by halving the bracket: by its geometric mean, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from friction.surrogate import Answer, Surrogate
 
-__all__ = ["TINY", "Curve", "Sweep", "last_double", "one_thread"]
+__all__ = ["TINY", "Curve", "Sweep", "last_double"]
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -26,21 +24,6 @@ Bools = NDArray[np.bool_]
 TINY = 5e-324
 _ROUNDING = 2.0**-52
 _PER_CALL = 512
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Compiled loops of this thread run on one core within.
-
-    A loop over some thousand points is over before a second core has taken its share; and where that core is busy with
-    something else, waiting for it takes a hundred times as long as the loop.
-    """
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
-        yield
-    finally:
-        numba.set_num_threads(before)
 
 
 class Sweep:

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from friction.crossings import TINY, Curve, Sweep, last_double, one_thread
+from friction.crossings import TINY, Curve, Sweep, last_double
 from friction.errors import InputError
 from friction.nondim import BOUNDS, FIELDS, POSITIVE
 from friction.surrogate import Answer, Surrogate
@@ -309,8 +309,7 @@ def solve_for(
     if within is not None:
         within = _checked_range(within, unknown)
     sweep = Sweep(surrogate, known, unknown)
-    with one_thread():
-        return (_solve_monotone if unknown in MONOTONE else _solve_folded)(sweep, wanted, within)
+    return (_solve_monotone if unknown in MONOTONE else _solve_folded)(sweep, wanted, within)
 
 
 def _checked_range(within: tuple[float, float], unknown: str) -> tuple[float, float]:
@@ -437,12 +436,11 @@ def border_crossings(
         out: Bools = np.asarray(sweep.answer(x).regime) == "continuous"
         return out
 
-    with one_thread():
-        state = slides(np.array(edges))
-        found = []
-        for a, b, here, there in zip(edges[:-1], edges[1:], state[:-1], state[1:], strict=True):
-            if here != there:
-                wanted = bool(here)
-                _, first = last_double(lambda x, wanted=wanted: slides(x) == wanted, np.array([a]), np.array([b]))  # type: ignore[misc]
-                found.append(Crossing(float(first[0]), sweep.at(float(first[0]))))
+    state = slides(np.array(edges))
+    found = []
+    for a, b, here, there in zip(edges[:-1], edges[1:], state[:-1], state[1:], strict=True):
+        if here != there:
+            wanted = bool(here)
+            _, first = last_double(lambda x, wanted=wanted: slides(x) == wanted, np.array([a]), np.array([b]))  # type: ignore[misc]
+            found.append(Crossing(float(first[0]), sweep.at(float(first[0]))))
     return tuple(found)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from friction import tails
-from friction.crossings import one_thread
 from friction.errors import InputError
 from friction.inverse import Crossing, border_crossings, checked_case
 from friction.nondim import FIELDS, POSITIVE
@@ -116,8 +115,7 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     """
     known = checked_case(case, along)
     full: dict[str, Any] = {"k": None, **known, along: values}
-    with one_thread():
-        answer = surrogate.evaluate(**full)
+    answer = surrogate.evaluate(**full)
     mu0 = np.broadcast_to(np.asarray(full["mu0"], dtype=np.float64), values.shape)
     at_rest = (np.asarray(full["y0"]) == 0.0) | (np.asarray(full["omega"]) == 0.0)
     static = np.where(at_rest, mu0, mu0 * tails.static_limit(answer.y_tilde))
@@ -157,11 +155,10 @@ def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | No
 
 def _creep(surrogate: Surrogate, law: Law, full: Mapping[str, Any]) -> Array:
     """The tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)."""
-    with one_thread():
-        at_rest = surrogate.evaluate(
-            mu0=full["mu0"], Fz=full["Fz"], k=full["k"], y0=full["y0"], omega=full["omega"],
-            v0=np.zeros_like(law.values), gradient=True,
-        )  # fmt: skip
+    at_rest = surrogate.evaluate(
+        mu0=full["mu0"], Fz=full["Fz"], k=full["k"], y0=full["y0"], omega=full["omega"],
+        v0=np.zeros_like(law.values), gradient=True,
+    )  # fmt: skip
     slope = np.asarray((at_rest.gradient or {})["v0"])
     with np.errstate(invalid="ignore", over="ignore"):
         out: Array = law.mu_static + slope * np.asarray(full["v0"], dtype=np.float64)
@@ -180,7 +177,7 @@ def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | Non
     never = np.broadcast_to((np.asarray(full["y0"]) == 0.0) | (omega == 0.0) | (full["k"] is None), y.shape)
     usable = np.isfinite(y) & ~never
     y_safe = np.where(usable, y, 1.0)
-    with np.errstate(over="ignore", invalid="ignore"), one_thread():
+    with np.errstate(over="ignore", invalid="ignore"):
         unit = np.where(usable, np.asarray(law.answer.length_scale) * omega, np.nan)
         found = {
             "exact": unit * surrogate.v_tilde_crit(y_safe),
