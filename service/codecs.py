@@ -27,7 +27,7 @@ from service.compiled.block import (
     write_numbers,
     write_rows,
 )
-from service.compiled.digits import TEXT_WIDTH, Bytes
+from service.compiled.digits import PADDING, TEXT_WIDTH, Bytes
 from service.compiled.scan import (
     DEEP,
     FULL,
@@ -51,7 +51,17 @@ from service.errors import (
 )
 from service.intake import KNOWN_FIELDS
 
-__all__ = ["MAX_ERRORS", "columns_text", "encode", "is_rows", "read_batch", "row_text", "rows_text", "terminated"]
+__all__ = [
+    "MAX_ERRORS",
+    "columns_text",
+    "encode",
+    "is_rows",
+    "lines_text",
+    "read_batch",
+    "row_text",
+    "rows_text",
+    "terminated",
+]
 
 MAX_ERRORS = 1000
 _REQUIRED = tuple(name for name in FIELDS if name != "k")
@@ -70,9 +80,9 @@ def encode(values: Mapping[str, Any]) -> bytes:
 
 
 def terminated(body: bytes | bytearray) -> tuple[bytearray, Bytes]:
-    """The text with the 0 byte that stops every scan, as Python's and as numpy's; without a copy of a bytearray."""
+    """The text with the 0 bytes that stop every scan, as Python's and as numpy's; without a copy of a bytearray."""
     text = body if isinstance(body, bytearray) else bytearray(body)
-    text.append(0)
+    text += bytes(PADDING)
     return text, np.frombuffer(text, dtype=np.uint8)
 
 
@@ -117,7 +127,7 @@ def _unreadable(state: int, where: int) -> MalformedBodyError:
 
 def _expect_end(view: Bytes, end: int, length: int) -> None:
     i = skip_space(view, end)
-    if i != length - 1:
+    if i != length - PADDING:
         raise _unreadable(SOUND, i)
 
 
@@ -273,7 +283,7 @@ def _words(names: tuple[str, ...]) -> tuple[Bytes, NDArray[np.int64]]:
     """The names as JSON strings, one behind the other, and where each begins."""
     texts = [orjson.dumps(name) for name in names]
     ends = np.cumsum([0, *map(len, texts)]).astype(np.int64)
-    return np.frombuffer(b"".join(texts), dtype=np.uint8).copy(), ends
+    return np.frombuffer(b"".join(texts) + bytes(PADDING), dtype=np.uint8).copy(), ends
 
 
 _SOURCE_NAMES = tuple(SOURCES)
@@ -284,7 +294,7 @@ _NAME_WIDTH = max(map(len, (*_SOURCE_NAMES, *_REGIME_NAMES))) + 3
 def columns_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
     """Write the answers as an object of lists, piece by piece."""
     opening = b"{"
-    room = np.empty(_SLICE * max(TEXT_WIDTH + 1, _NAME_WIDTH), dtype=np.uint8)
+    room = np.empty(_SLICE * max(TEXT_WIDTH + 1, _NAME_WIDTH) + PADDING, dtype=np.uint8)
     for key, column in _default_columns(answers):
         yield opening + b'"' + key.encode() + b'":['
         yield from _list_text(room, column, key)
@@ -327,6 +337,24 @@ def _list_text(room: Bytes, column: NDArray[Any], key: str) -> Iterator[bytes]:
 
 def rows_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
     """Write the answers as a list of objects, piece by piece."""
+    yield b'{"results":['
+    for start, text in _objects(answers, b"}", b","):
+        yield text[:-1] if start + _SLICE >= answers.size else text
+    yield b"]," + encode({**errors_of(answers), **signature})[1:]
+
+
+def lines_text(answers: Answers, signature: Mapping[str, Any]) -> bytes:
+    """Write the answers to good cases as objects, each on a line of its own."""
+    return b"".join(text for _, text in _objects(answers, b"," + encode(signature)[1:], b"\n"))
+
+
+def row_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
+    """Write the answer to one good case as an object: plain numbers that are bad refuse what they stand in."""
+    yield lines_text(answers, signature)[:-1]
+
+
+def _objects(answers: Answers, end: bytes, behind: bytes) -> Iterator[tuple[int, bytes]]:
+    """Index of the first case, and objects with ``behind`` behind each of them."""
     numbers = [answers.mu_macro, answers.mu_ratio, answers.error_bound]
     pieces = [b'{"mu_macro":', b',"mu_ratio":', b',"regime":', b',"error_bound":', b',"source":']
     closing = b""
@@ -342,28 +370,17 @@ def rows_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]
             pieces.append(closing + b"," + orjson.dumps(name) + b":")
             numbers.append(group)
             closing = b""
-    pieces.append(closing + b"}")
-    text = np.frombuffer(b"".join(pieces), dtype=np.uint8).copy()
+    pieces.append(closing + end)
+    text = np.frombuffer(b"".join(pieces) + bytes(PADDING), dtype=np.uint8).copy()
     ends = np.cumsum([0, *map(len, pieces)]).astype(np.int64)
     width = text.size + len(numbers) * TEXT_WIDTH + 2 * _NAME_WIDTH
-    step = min(_SLICE, answers.size)
-    room = np.empty(max(step, 1) * width, dtype=np.uint8)
-    yield b'{"results":['
+    room = np.empty(min(_SLICE, answers.size) * width + PADDING, dtype=np.uint8)
+    names = (*_words(_REGIME_NAMES), *_words(_SOURCE_NAMES))
     for start in range(0, answers.size, _SLICE):
         part = slice(start, start + _SLICE)
         table = np.stack([column[part] for column in numbers])
-        flaws = answers.flaws[part]
-        end = write_rows(
-            room, 0, flaws, text, ends, table, answers.source[part], *_words(_REGIME_NAMES), *_words(_SOURCE_NAMES)
-        )
-        yield room[: end - (start + flaws.size == answers.size)].tobytes()
-    yield b"]," + encode({**errors_of(answers), **signature})[1:]
-
-
-def row_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
-    """Write the answer to one good case as an object: plain numbers that are bad refuse what they stand in."""
-    text = b"".join(rows_text(answers, {}))
-    yield text[len(b'{"results":[') : text.rindex(b'],"errors"') - 1] + b"," + encode(signature)[1:]
+        last = write_rows(room, 0, answers.flaws[part], behind[0], text, ends, table, answers.source[part], *names)
+        yield start, room[:last].tobytes()
 
 
 def errors_of(answers: Answers) -> dict[str, Any]:

@@ -229,3 +229,33 @@ def test_a_stream_is_compressed_line_by_line(client, case):
     assert lines_of(client.post(PATH, content=body, headers={**LINES, "Accept-Encoding": "gzip"})) == lines_of(
         client.post(PATH, content=body, headers={**LINES, "Accept-Encoding": "identity"})
     )
+
+
+def test_lines_of_one_case_each_are_answered_alike_alone_and_together(client, case):
+    rows = [{**case, "v0": 1e-3 * i} for i in range(1, 100)]
+    lines = [json.dumps(row) for row in rows]
+    together = lines_of(client.post(PATH, content="\n".join(lines), headers=LINES))
+    alone = [lines_of(client.post(PATH, content=line, headers=LINES))[0] for line in lines]
+    assert together == alone == [client.post("/v1/mu-macro", json=row).json() for row in rows]
+    query = {"include": "groups,power"}
+    extended = lines_of(client.post(PATH, params=query, content="\n".join(lines), headers=LINES))
+    assert [answer["mu_macro"] for answer in extended] == [answer["mu_macro"] for answer in alone]
+    assert all(answer.keys() >= {"groups", "power", "table", "api_version"} for answer in extended)
+
+
+@pytest.mark.parametrize(
+    "odd", ['{"mu0":1', '{"a":{}}', "{},{}", '{"v0":2}', "[]", "{} {}", '{"include":["groups"]}', ""]
+)
+def test_an_odd_line_among_plain_ones_spoils_only_itself(client, case, odd):
+    good = json.dumps(case)
+    (expected,) = lines_of(client.post(PATH, content=good, headers=LINES))
+    answers = lines_of(client.post(PATH, content="\n".join([good, odd, good, good]), headers=LINES))
+    kept = [answer for answer in answers if "status" not in answer and "results" not in answer]
+    assert kept == [expected] * 3
+    assert len(answers) == (4 if odd else 3)
+
+
+def test_halves_of_objects_are_not_joined_over_lines(client, case):
+    first, second = json.dumps(case)[:20].rstrip(", "), json.dumps(case)[20:].lstrip(", ")
+    answers = lines_of(client.post(PATH, content=f"{first}\n{second}\n{json.dumps(case)}", headers=LINES))
+    assert [answer.get("status") for answer in answers] == [400, 400, None]
