@@ -216,10 +216,10 @@ def mlserver_question() -> Question:
     return Question("POST", ["/v2/models/mu_macro/infer"] * 64, bodies)
 
 
-def load(server: Server, script: Path, seconds: float) -> tuple[float, float]:
+def load(server: Server, script: Path, seconds: int) -> tuple[float, float]:
     """Processor time [us] a request, and requests a second, under 16 connections that never pause."""
     before = server.cpu()
-    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", "-c16", f"-d{seconds:g}s", "-s", str(script)]
+    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", "-c16", f"-d{seconds}s", "-s", str(script)]
     done = subprocess.run(
         [*command, f"http://127.0.0.1:{server.port}"], capture_output=True, text=True, check=True
     ).stdout
@@ -231,7 +231,7 @@ def load(server: Server, script: Path, seconds: float) -> tuple[float, float]:
     return 1e6 * spent / requests, float(words[words.index("Requests/sec:") + 1])
 
 
-def measure_single(peers: dict[str, str], rounds: int, seconds: float, folder: Path) -> dict[str, tuple[float, float]]:
+def measure_single(peers: dict[str, str], rounds: int, seconds: int, folder: Path) -> dict[str, tuple[float, float]]:
     """Median processor time [us] and rate for every server and kind of question."""
     asked: dict[str, list[tuple[str, Question]]] = {
         "mumacro": [("POST", post()), ("GET", get())],
@@ -379,7 +379,7 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
         for name, options in wanted.items():
             progress(f"include {name}")
             script = post(**options).script(folder)
-            load(server, script, 0.5)
+            load(server, script, 1)
             single = statistics.median(load(server, script, 2)[0] for _ in range(rounds))
             rate = _rate(server, BATCH, orjson.dumps({**table, **options}), "application/json", n, rounds)
             rows.append([name, quantity(single, 3), quantity(1e3 / rate, 3)])
@@ -554,7 +554,7 @@ def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--seconds", type=int, default=3)
     parser.add_argument("--peers", nargs="*", default=[], metavar="PYTHON")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
