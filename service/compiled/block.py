@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from friction.nondim import dimensional
 from service.compiled.digits import Bytes, write_number
-from service.compiled.machine import load_eight, store_eight
+from service.compiled.machine import LOOP, load_eight, store_eight
 from service.compiled.scan import MISSING, NOT_A_NUMBER
 
 __all__ = [
@@ -27,7 +27,7 @@ Flaws = NDArray[np.uint8]
 MISSING_FLAW, NUMBER_FLAW, BOUND_FLAW = 10, 20, 30
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -> int:
     """First fault of a case that has one: what is missing before what is no number before what is out of bounds."""
     values = (mu0, fz, k, y0, omega, v0)
@@ -44,7 +44,7 @@ def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -
     return 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**LOOP)
 def evaluate_cases(
     mu0: Array, fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
     coef: Array, meta: Array, bcoef: Array, bmeta: Array,
@@ -90,7 +90,7 @@ def evaluate_cases(
     return bad
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _copy(out: Bytes, p: int, text: Bytes, start: int, stop: int) -> int:
     """Copy text[start:stop] eight bytes at a time: up to seven behind the end are read and written, too."""
     i = start
@@ -100,7 +100,7 @@ def _copy(out: Bytes, p: int, text: Bytes, start: int, stop: int) -> int:
     return p + stop - start
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def write_numbers(out: Bytes, p: int, values: Array) -> int:
     """Write the values with a comma behind each; null for what is not finite."""
     for i in range(values.size):
@@ -110,7 +110,7 @@ def write_numbers(out: Bytes, p: int, values: Array) -> int:
     return p
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np.int64]) -> int:
     """Write ``names[ends[c]:ends[c + 1]]`` of each code with a comma behind it; null for a negative code."""
     for i in range(codes.size):
@@ -125,7 +125,7 @@ def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np
     return p
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def write_rows(
     out: Bytes,
     p: int,

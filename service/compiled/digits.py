@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from service.compiled.machine import leading_zeros, load_eight, multiply_high, trailing_zeros
+from service.compiled.machine import LOOP, leading_zeros, load_eight, multiply_high, trailing_zeros
 
 __all__ = [
     "HARD",
@@ -85,14 +85,14 @@ _TEN_HIGH, _TEN_LOW = _powers_of_ten()
 _PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).copy()
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _high(a: np.uint64, b: np.uint64) -> np.uint64:
     """Upper 64 bits of the product."""
     upper: np.uint64 = multiply_high(a, b)  # type: ignore[call-arg]  # numba supplies the typing context
     return upper
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
     """(w followed by the digits at ``i`` as a number, index behind them); eight at a time, no branch for the rest."""
     while True:
@@ -112,7 +112,7 @@ def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
             return w, i
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _double(w: np.uint64, q: int) -> np.uint64:
     """Bits of w 10^q, w > 0, rounded to nearest even; those of infinity when it is beyond range."""
     if q < _SMALLEST:
@@ -148,7 +148,7 @@ def _double(w: np.uint64, q: int) -> np.uint64:
     return (mantissa & _FRACTION) | (_U(exponent) << _S52)
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _significant(text: Bytes, i: int, end: int) -> int:
     """Digits of the number in text[i:end] from the first that is not 0, up to its exponent."""
     count = 0
@@ -162,7 +162,7 @@ def _significant(text: Bytes, i: int, end: int) -> int:
     return count
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _matches(text: Bytes, i: int, word: bytes) -> bool:
     # One byte after another: the text's last 0 differs from every word, so nothing behind it is looked at.
     for j in range(len(word)):  # noqa: SIM110  (compiled code has no generators)
@@ -171,7 +171,7 @@ def _matches(text: Bytes, i: int, word: bytes) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     """(bits of the double, index behind it, what it was) of the JSON number that begins at ``i``.
 
@@ -227,7 +227,7 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     return bits, i, NUMBER
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
     y0 = high * c + _high(low, c)
     y1 = _high(high, c)
@@ -236,7 +236,7 @@ def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
     return y1 | (_U1 if y0 > _U1 else _U0)
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
     """(digits, k) with the shortest digits 10^k that round to the positive, finite double of these bits."""
     fraction, biased = bits & _FRACTION, int((bits >> _S52) & _EXPONENT)
@@ -268,7 +268,7 @@ def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
     return (s + _U1 if middle > half or (middle == half and s & _U1 == _U1) else s), k
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def write_digits(out: Bytes, p: int, value: np.uint64, count: int) -> int:
     """Write ``value`` with ``count`` digits; return the index behind them."""
     i = p + count
@@ -282,7 +282,7 @@ def write_digits(out: Bytes, p: int, value: np.uint64, count: int) -> int:
     return p + count
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def write_number(out: Bytes, p: int, x: float) -> int:
     """Write one number, or null for what is not finite; return the index behind it."""
     bits = np.float64(x).view(np.uint64)

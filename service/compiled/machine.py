@@ -6,7 +6,12 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-__all__ = ["leading_zeros", "load_eight", "multiply_high", "store_eight", "trailing_zeros"]
+__all__ = ["LOOP", "leading_zeros", "load_eight", "multiply_high", "store_eight", "trailing_zeros"]
+
+#: How every loop of this folder is compiled: kept on disk, without the interpreter's lock, without a handler for
+#: division by zero, and without counting references to the arrays that it is given: none of them makes one, the caller
+#: holds them all, and counting costs an atomic instruction per array with every call from loop to loop.
+LOOP: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 
 _I64, _I128 = ir.IntType(64), ir.IntType(128)
 
