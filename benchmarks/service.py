@@ -338,11 +338,11 @@ def limits(rounds: int) -> dict[str, float]:
     n = 100_000
     body = body_of("columns", n)
     table = LoadedTable.open(TABLE)
-    batch, _ = read_batch(*terminated(body), n)
+    batch, _ = read_batch(terminated(body), n)
     work: dict[str, Callable[[], object]] = {
         "orjson.loads": lambda: orjson.loads(body),
         "json.loads": lambda: json.loads(body),
-        "our scanner": lambda: read_batch(*terminated(body), n),
+        "our scanner": lambda: read_batch(terminated(body), n),
         "evaluation": lambda: answer_cases(table, batch, ()),
     }
     try:

@@ -5,6 +5,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from service.answers import answer_cases
@@ -31,12 +32,12 @@ def prepare(shelf: Shelf) -> None:
     table = shelf.tables[0]
     for value in _TEXTS:
         try:
-            cases, _ = read_batch(*terminated(json.dumps(value).encode()), len(_TEXTS) + 10)
+            cases, _ = read_batch(terminated(json.dumps(value).encode()), len(_TEXTS) + 10)
         except RequestError:
             continue  # read, and found to be no batch, as it should be
         answers = answer_cases(table, cases, _INCLUDE)
         for write in (columns_text, rows_text):
-            b"".join(write(answers, {}))
+            b"".join(write(replace(answers), {}))  # a writer lets go of the cases
 
 
 if __name__ == "__main__":

@@ -1,12 +1,11 @@
 """The compiled middle of a batch: columns -> answers and faults, answers -> text; without the interpreter's lock."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from friction.nondim import dimensional
 from service.compiled.digits import Bytes, write_number
-from service.compiled.machine import LOOP, load_eight, store_eight
+from service.compiled.machine import inlined, load_eight, loop, store_eight
 from service.compiled.scan import MISSING, NOT_A_NUMBER
 
 __all__ = [
@@ -27,7 +26,7 @@ Flaws = NDArray[np.uint8]
 MISSING_FLAW, NUMBER_FLAW, BOUND_FLAW = 10, 20, 30
 
 
-@njit(**LOOP)
+@loop
 def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -> int:
     """First fault of a case that has one: what is missing before what is no number before what is out of bounds."""
     values = (mu0, fz, k, y0, omega, v0)
@@ -44,11 +43,11 @@ def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -
     return 0
 
 
-@njit(**LOOP)
+@loop
 def evaluate_cases(
     mu0: Array, fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
     coef: Array, meta: Array, bcoef: Array, bmeta: Array,
-    mu_macro: Array, mu_ratio: Array, bound: Array, source: Codes, v_tilde: Array, y_tilde: Array, flaws: Flaws,
+    mu_macro: Array, mu_ratio: Array, bound: Array, source: Codes, flaws: Flaws,
 ) -> int:  # fmt: skip
     """Answer n cases; return how many are bad.
 
@@ -70,13 +69,11 @@ def evaluate_cases(
             and 0.0 <= e < inf
             and 0.0 <= f < inf
         ):
-            mu, eps, code, v, y = dimensional(a, b, c, d, e, f, coef, meta, bcoef, bmeta)
+            mu, eps, code, _, _ = dimensional(a, b, c, d, e, f, coef, meta, bcoef, bmeta)
             mu_macro[i] = a * mu
             mu_ratio[i] = mu
             bound[i] = a * eps
             source[i] = code
-            v_tilde[i] = v
-            y_tilde[i] = y
         else:
             bad += 1
             if flaws[i] == 0:
@@ -85,12 +82,10 @@ def evaluate_cases(
             mu_ratio[i] = np.nan
             bound[i] = np.nan
             source[i] = -1
-            v_tilde[i] = np.nan
-            y_tilde[i] = np.nan
     return bad
 
 
-@njit(**LOOP)
+@inlined
 def _copy(out: Bytes, p: int, text: Bytes, start: int, stop: int) -> int:
     """Copy text[start:stop] eight bytes at a time: up to seven behind the end are read and written, too."""
     i = start
@@ -100,7 +95,7 @@ def _copy(out: Bytes, p: int, text: Bytes, start: int, stop: int) -> int:
     return p + stop - start
 
 
-@njit(**LOOP)
+@loop
 def write_numbers(out: Bytes, p: int, values: Array) -> int:
     """Write the values with a comma behind each; null for what is not finite."""
     for i in range(values.size):
@@ -110,7 +105,7 @@ def write_numbers(out: Bytes, p: int, values: Array) -> int:
     return p
 
 
-@njit(**LOOP)
+@loop
 def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np.int64]) -> int:
     """Write ``names[ends[c]:ends[c + 1]]`` of each code with a comma behind it; null for a negative code."""
     for i in range(codes.size):
@@ -125,7 +120,7 @@ def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np
     return p
 
 
-@njit(**LOOP)
+@loop
 def write_rows(
     out: Bytes,
     p: int,

@@ -7,10 +7,17 @@ of no JSON token: every loop here stops at the first of them at the latest.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from service.compiled.machine import LOOP, leading_zeros, load_eight, multiply_high, trailing_zeros
+from service.compiled.machine import (
+    inlined,
+    leading_zeros,
+    load_eight,
+    loop,
+    multiply_high,
+    store_eight,
+    trailing_zeros,
+)
 
 __all__ = [
     "HARD",
@@ -22,7 +29,6 @@ __all__ = [
     "TEXT_WIDTH",
     "Bytes",
     "read_number",
-    "write_digits",
     "write_number",
 ]
 
@@ -82,17 +88,22 @@ def _powers_of_ten() -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
 
 _FIVE_HIGH, _FIVE_LOW = _powers_of_five()
 _TEN_HIGH, _TEN_LOW = _powers_of_ten()
-_PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).copy()
+_MOST = 17  # digits that a double needs at most
+_TENS = np.array([10**n for n in range(20)], dtype=np.uint64)
+_TEN8, _TEN16, _U10000, _U48 = _U(10**8), _U(10**16), _U(10000), _U(48)
+# n * 10486 >> 20 is n // 100 for n < 10^4, and n * 103 >> 10 is n // 10 for n < 100
+_U10486, _U103, _S20 = _U(10486), _U(103), _U(20)
+_HUNDREDS, _TENTHS = _U(0x0000007F0000007F), _U(0x000F000F000F000F)
 
 
-@njit(**LOOP)
+@inlined
 def _high(a: np.uint64, b: np.uint64) -> np.uint64:
     """Upper 64 bits of the product."""
     upper: np.uint64 = multiply_high(a, b)  # type: ignore[call-arg]  # numba supplies the typing context
     return upper
 
 
-@njit(**LOOP)
+@inlined
 def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
     """(w followed by the digits at ``i`` as a number, index behind them); eight at a time, no branch for the rest."""
     while True:
@@ -112,7 +123,7 @@ def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
             return w, i
 
 
-@njit(**LOOP)
+@inlined
 def _double(w: np.uint64, q: int) -> np.uint64:
     """Bits of w 10^q, w > 0, rounded to nearest even; those of infinity when it is beyond range."""
     if q < _SMALLEST:
@@ -148,7 +159,7 @@ def _double(w: np.uint64, q: int) -> np.uint64:
     return (mantissa & _FRACTION) | (_U(exponent) << _S52)
 
 
-@njit(**LOOP)
+@loop
 def _significant(text: Bytes, i: int, end: int) -> int:
     """Digits of the number in text[i:end] from the first that is not 0, up to its exponent."""
     count = 0
@@ -162,7 +173,7 @@ def _significant(text: Bytes, i: int, end: int) -> int:
     return count
 
 
-@njit(**LOOP)
+@loop
 def _matches(text: Bytes, i: int, word: bytes) -> bool:
     # One byte after another: the text's last 0 differs from every word, so nothing behind it is looked at.
     for j in range(len(word)):  # noqa: SIM110  (compiled code has no generators)
@@ -171,7 +182,7 @@ def _matches(text: Bytes, i: int, word: bytes) -> bool:
     return True
 
 
-@njit(**LOOP)
+@loop
 def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     """(bits of the double, index behind it, what it was) of the JSON number that begins at ``i``.
 
@@ -227,7 +238,7 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     return bits, i, NUMBER
 
 
-@njit(**LOOP)
+@inlined
 def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
     y0 = high * c + _high(low, c)
     y1 = _high(high, c)
@@ -236,7 +247,7 @@ def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
     return y1 | (_U1 if y0 > _U1 else _U0)
 
 
-@njit(**LOOP)
+@inlined
 def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
     """(digits, k) with the shortest digits 10^k that round to the positive, finite double of these bits."""
     fraction, biased = bits & _FRACTION, int((bits >> _S52) & _EXPONENT)
@@ -268,21 +279,39 @@ def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
     return (s + _U1 if middle > half or (middle == half and s & _U1 == _U1) else s), k
 
 
-@njit(**LOOP)
-def write_digits(out: Bytes, p: int, value: np.uint64, count: int) -> int:
-    """Write ``value`` with ``count`` digits; return the index behind them."""
-    i = p + count
-    while i > p + 1:
-        pair = int(value % _U100) * 2
-        value = value // _U100
-        i -= 2
-        out[i], out[i + 1] = _PAIRS[pair], _PAIRS[pair + 1]
-    if i > p:
-        out[p] = np.uint8(48 + value)
-    return p + count
+@inlined
+def _eight_digits(value: np.uint64) -> np.uint64:
+    """The digits of a number below 10^8 as text, the first one lowest; halves, quarters and eighths side by side."""
+    x = value // _U10000 | (value % _U10000) << _S32
+    y = ((x * _U10486) >> _S20) & _HUNDREDS
+    x = y | (x - _U100 * y) << _U16
+    y = ((x * _U103) >> _U10) & _TENTHS
+    return (y | (x - _U10 * y) << _U8) + _ZEROS
 
 
-@njit(**LOOP)
+@inlined
+def _write_all(out: Bytes, p: int, digits: np.uint64) -> None:
+    """Write all 17 digits of a number below 10^17, leading zeros, too."""
+    first, rest = digits // _TEN16, digits % _TEN16
+    out[p] = np.uint8(_U48 + first)
+    store_eight(out, p + 1, _eight_digits(rest // _TEN8))  # type: ignore[call-arg]
+    store_eight(out, p + 9, _eight_digits(rest % _TEN8))
+
+
+@loop
+def _write_exponent(out: Bytes, p: int, value: int) -> int:
+    """Write a number of up to three digits; return the index behind them."""
+    if value >= 100:
+        out[p] = np.uint8(48 + value // 100)
+        p += 1
+    if value >= 10:
+        out[p] = np.uint8(48 + value // 10 % 10)
+        p += 1
+    out[p] = np.uint8(48 + value % 10)
+    return p + 1
+
+
+@loop
 def write_number(out: Bytes, p: int, x: float) -> int:
     """Write one number, or null for what is not finite; return the index behind it."""
     bits = np.float64(x).view(np.uint64)
@@ -300,21 +329,19 @@ def write_number(out: Bytes, p: int, x: float) -> int:
     while digits % _U10 == _U0:
         digits = digits // _U10
         k += 1
-    count, bound = 1, _U10
-    while count < 19 and digits >= bound:
+    width: int = leading_zeros(digits)  # type: ignore[call-arg]
+    count = ((64 - width) * 1233) >> 12  # 1233/4096 is log10(2) to the accuracy that 64 bits need
+    if digits >= _TENS[count]:
         count += 1
-        bound = bound * _U10
+    digits = digits * _TENS[_MOST - count]
     point = count + k  # digits before the decimal point
     if 0 < point <= 16:
         if k >= 0:
-            p = write_digits(out, p, digits, count)
-            for _ in range(k):
-                out[p] = 48
-                p += 1
-            out[p], out[p + 1] = 46, 48
-            return p + 2
+            _write_all(out, p, digits)
+            out[p + point], out[p + point + 1] = 46, 48
+            return p + point + 2
         # write one place to the right, then move what belongs before the point
-        write_digits(out, p + 1, digits, count)
+        _write_all(out, p + 1, digits)
         for i in range(point):
             out[p + i] = out[p + i + 1]
         out[p + point] = 46
@@ -325,15 +352,14 @@ def write_number(out: Bytes, p: int, x: float) -> int:
         for _ in range(-point):
             out[p] = 48
             p += 1
-        return write_digits(out, p, digits, count)
-    if count == 1:
-        out[p] = np.uint8(48 + digits)
-        p += 1
-    else:
-        write_digits(out, p + 1, digits, count)
-        out[p] = out[p + 1]
-        out[p + 1] = 46
-        p += count + 1
+        _write_all(out, p, digits)
+        return p + count
+    _write_all(out, p + 1, digits)
+    out[p] = out[p + 1]
+    p += 1
+    if count > 1:
+        out[p] = 46
+        p += count
     out[p] = 101
     p += 1
     exponent = point - 1
@@ -341,4 +367,4 @@ def write_number(out: Bytes, p: int, x: float) -> int:
         out[p] = 45
         p += 1
         exponent = -exponent
-    return write_digits(out, p, _U(exponent), 3 if exponent >= 100 else 2 if exponent >= 10 else 1)
+    return _write_exponent(out, p, exponent)

@@ -1,17 +1,40 @@
-"""Machine instructions that numba has no name for: half a product, zeros at either end, eight bytes in or out."""
+"""How loops are compiled, and machine instructions that numba has no name for.
 
-from typing import Any
+Half a product, zeros at either end, eight bytes in or out.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 from llvmlite import ir
-from numba import types
+from numba import njit, types
 from numba.extending import intrinsic
 
-__all__ = ["LOOP", "leading_zeros", "load_eight", "multiply_high", "store_eight", "trailing_zeros"]
+__all__ = ["inlined", "leading_zeros", "load_eight", "loop", "multiply_high", "store_eight", "trailing_zeros"]
 
-#: How every loop of this folder is compiled: kept on disk, without the interpreter's lock, without a handler for
-#: division by zero, and without counting references to the arrays that it is given: none of them makes one, the caller
-#: holds them all, and counting costs an atomic instruction per array with every call from loop to loop.
-LOOP: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def loop(function: Function) -> Function:
+    """Compile as everything in this folder is: kept on disk, without the interpreter's lock, without a handler for
+    division by zero, and without counting references to arrays.
+
+    No loop here makes an array, and the caller holds those that it gives; counting them would cost an atomic
+    instruction per array with every call from loop to loop.
+    """
+    return _compiled(function, False)
+
+
+def inlined(function: Function) -> Function:
+    """Compile as :func:`loop` does, into the callers."""
+    return _compiled(function, True)
+
+
+def _compiled(function: Function, inline: bool) -> Function:
+    options: Any = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": inline}
+    made: Function = njit(**options)(function)
+    return made
+
 
 _I64, _I128 = ir.IntType(64), ir.IntType(128)
 

@@ -6,11 +6,10 @@ is infinity: rigid contact.  Text ends in a 0 byte, where every loop stops.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from service.compiled.digits import HARD, MALFORMED, NO_NUMBER, NUMBER, OUT_OF_RANGE, Bytes, read_number
-from service.compiled.machine import LOOP
+from service.compiled.machine import inlined, loop
 
 __all__ = [
     "BROKEN",
@@ -56,7 +55,7 @@ _ONE, _TOP = np.uint64(1), np.uint64(63)
 _K = 2  # the field that may be null
 
 
-@njit(**LOOP)
+@inlined
 def skip_space(text: Bytes, i: int) -> int:
     """Index of the next byte that is not white space."""
     c = text[i]
@@ -66,7 +65,7 @@ def skip_space(text: Bytes, i: int) -> int:
     return i
 
 
-@njit(**LOOP)
+@loop
 def _skip_string(text: Bytes, i: int) -> int:
     """Index behind the string that begins at ``i``, or minus one minus where it is no string."""
     i += 1
@@ -90,7 +89,7 @@ def _skip_string(text: Bytes, i: int) -> int:
         i += 1
 
 
-@njit(**LOOP)
+@loop
 def _skip_word(text: Bytes, i: int) -> int:
     """Index behind true, false or null, or minus one minus where it is none of them."""
     c = text[i]
@@ -106,7 +105,7 @@ def _skip_word(text: Bytes, i: int) -> int:
     return -1 - i
 
 
-@njit(**LOOP)
+@loop
 def _skip_leaf(text: Bytes, i: int) -> int:
     """Index behind a string, a number or a word, or minus one minus where it is none."""
     c = text[i]
@@ -118,7 +117,7 @@ def _skip_leaf(text: Bytes, i: int) -> int:
     return _skip_word(text, i)
 
 
-@njit(**LOOP)
+@loop
 def skip_value(text: Bytes, i: int) -> tuple[int, int]:
     """(index behind the JSON value at ``i``, SOUND), or (where, BROKEN or DEEP)."""
     # What is open, one bit each, the innermost lowest: set for an object.
@@ -173,7 +172,7 @@ def skip_value(text: Bytes, i: int) -> tuple[int, int]:
             i = skip_space(text, i + 1)
 
 
-@njit(**LOOP)
+@inlined
 def _read_entry(text: Bytes, i: int, nullable: bool) -> tuple[np.uint64, int, int]:
     """(bits, index behind the value at ``i``, NUMBER or HARD), or (0, where, MALFORMED or minus DEEP)."""
     bits, end, kind = read_number(text, i)
@@ -196,7 +195,7 @@ def _read_entry(text: Bytes, i: int, nullable: bool) -> tuple[np.uint64, int, in
     return NOT_A_NUMBER, end, NUMBER
 
 
-@njit(**LOOP)
+@loop
 def read_list(
     text: Bytes, i: int, column: Words, count: int, nullable: bool, hard: Places, waiting: int
 ) -> tuple[int, int, int, int]:
@@ -235,7 +234,7 @@ def read_list(
         i = skip_space(text, i + 1)
 
 
-@njit(**LOOP)
+@inlined
 def _field(text: Bytes, i: int, length: int) -> int:
     """Index among FIELDS of the name text[i:i+length], or -1."""
     c = text[i]
@@ -259,7 +258,7 @@ def _field(text: Bytes, i: int, length: int) -> int:
     return -1
 
 
-@njit(**LOOP)
+@loop
 def _read_row(
     text: Bytes, i: int, cases: Words, flaws: NDArray[np.uint8], names: Places, case: int, hard: Places, waiting: int
 ) -> tuple[int, int, int]:
@@ -308,7 +307,7 @@ def _read_row(
         i = skip_space(text, i + 1)
 
 
-@njit(**LOOP)
+@loop
 def read_rows(
     text: Bytes,
     i: int,

@@ -21,7 +21,9 @@ from starlette.types import Message, Receive, Scope, Send
 from friction.errors import MumacroError
 from friction.regions import SOURCES
 from service.answers import Answers, answer_cases, signature
-from service.codecs import columns_text, is_rows, lines_text, read_batch, row_text, rows_text, terminated
+from service.codecs import columns_text, is_rows, lines_text, read_batch, room_for, row_text, rows_text, terminated
+from service.compiled.digits import PADDING, Bytes
+from service.connection import FILL
 from service.errors import (
     BodyTooLargeError,
     MalformedBodyError,
@@ -140,42 +142,69 @@ class BatchEndpoint:
     async def _whole(
         self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget, kind: str, length: int
     ) -> None:
-        body = await self._body(length, receive, budget)
-        if not body:
+        body = await self._body(request.scope, length, receive, budget)
+        size = body.size - PADDING
+        if size == 0:
             raise MalformedBodyError("the body is empty")
-        size = len(body)
         if kind == ARROW:
             from service.arrow import answer_arrow
 
             query, place = merged_options(query, {})
             table = self._shelf.pick(query.tolerance, place)
-            pieces = answer_arrow(body, table, query, self._settings.max_batch, self._count)
+            pieces = answer_arrow(body[:size], table, query, self._settings.max_batch, self._count)
         else:
-            pieces = await self._run(size, lambda: self._answer(body, query))
+            pieces = await self._run(size, partial(self._answer, body, query))
+        del body  # or it would be held until the last piece is sent
         await self._send(request, send, kind, size, _gather(pieces), budget)
 
-    async def _body(self, length: int, receive: Receive, budget: Budget) -> bytearray:
-        body = bytearray()
+    async def _body(self, scope: Scope, length: int, receive: Receive, budget: Budget) -> Bytes:
+        """The body, with 0 bytes behind it.  Memory is taken as it comes in, not as it is announced."""
         limit = self._settings.max_body_bytes
         if length > limit:
-            raise BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+            raise _body_too_large(limit)
         deadline = budget.deadline()
-        more = True
+        message = await self._message(receive, budget, deadline)
+        piece, more = message.get("body", b""), message.get("more_body", False)
+        if length >= 0 and len(piece) <= length:
+            text = room_for(length)
+            room = text.data
+            room[: len(piece)] = piece
+            filled = len(piece)
+            fill = scope.get("extensions", {}).get(FILL)
+            if more and fill is not None:
+                # the server below puts the rest in its place, instead of sending a message for every few kilobytes
+                if not await budget.client(fill(room, filled), deadline):
+                    raise ClientDisconnect
+                return text
+            while more:
+                message = await self._message(receive, budget, deadline)
+                piece, more = message.get("body", b""), message.get("more_body", False)
+                room[filled : filled + len(piece)] = piece
+                filled += len(piece)
+            text[filled:] = 0
+            return text
+        body = bytearray(piece)
         while more:
-            message = await budget.client(receive(), deadline)
-            if message["type"] != "http.request":
-                raise ClientDisconnect
+            if len(body) > limit:
+                raise _body_too_large(limit)
+            message = await self._message(receive, budget, deadline)
             body += message.get("body", b"")
             more = message.get("more_body", False)
-            if len(body) > limit:
-                raise BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
-        return body
+        if len(body) > limit:
+            raise _body_too_large(limit)
+        return terminated(body)
 
-    def _answer(self, body: bytes | bytearray, query: Options, *, line: bool = False) -> Iterator[bytes]:
-        """Answer one JSON text; what is returned writes it, piece by piece."""
-        text, view = terminated(body)
+    @staticmethod
+    async def _message(receive: Receive, budget: Budget, deadline: float) -> Message:
+        message = await budget.client(receive(), deadline)
+        if message["type"] != "http.request":
+            raise ClientDisconnect
+        return message
+
+    def _answer(self, text: Bytes, query: Options, *, line: bool = False) -> Iterator[bytes]:
+        """Answer one JSON text, which ends in 0 bytes; what is returned writes it, piece by piece."""
         rows = is_rows(text)
-        cases, given = read_batch(text, view, self._settings.max_batch)
+        cases, given = read_batch(text, self._settings.max_batch)
         options, place = merged_options(query, given)
         table = self._shelf.pick(options.tolerance, place)
         answers = answer_cases(table, cases, options.include, options.std)
@@ -266,7 +295,7 @@ class BatchEndpoint:
                 if not line or line.isspace():
                     continue
                 try:
-                    pieces.extend(self._answer(line, query, line=True))
+                    pieces.extend(self._answer(terminated(line), query, line=True))
                 except RequestError as error:
                     pieces.append(bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body))
                 pieces.append(b"\n")
@@ -278,10 +307,10 @@ class BatchEndpoint:
         for line in lines:
             if len(line) > _SHORT_LINE or line[:1] != b"{" or line.rstrip()[-1:] != b"}" or line.count(b"{") != 1:
                 return False
-        text, view = terminated(bytearray(b"[%b]" % b",".join(lines)))
+        text = terminated(bytearray(b"[%b]" % b",".join(lines)))
         try:
             options, place = merged_options(query, {})
-            cases, _ = read_batch(text, view, len(lines))
+            cases, _ = read_batch(text, len(lines))
             table = self._shelf.pick(options.tolerance, place)
         except RequestError:
             return False
@@ -315,10 +344,17 @@ def _wants_gzip(request: Request) -> bool:
     return False
 
 
+def _body_too_large(limit: int) -> BodyTooLargeError:
+    return BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+
+
 def _gather(pieces: Iterator[bytes]) -> Iterator[bytes]:
     """The same bytes in pieces of a size that is worth a message."""
     gathered = bytearray()
     for piece in pieces:
+        if len(piece) >= _PIECE and not gathered:
+            yield piece
+            continue
         gathered += piece
         if len(gathered) >= _PIECE:
             yield bytes(gathered)
