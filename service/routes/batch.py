@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import partial
+from importlib.util import find_spec
 from typing import TypeVar
 
 import numpy as np
@@ -47,8 +48,8 @@ T = TypeVar("T")
 
 _CLOSE = {"Connection": "close"}
 
-_SMALL = 64 * 1024  # bytes of a batch that is answered at once: it takes less than a millisecond
-_STREAM_SMALL = 256 * 1024
+_SMALL = 64 * 1024  # bytes of a batch that needs no place
+_AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _SHORT_LINE = 1024  # bytes of one case on a line of its own
 _PIECE = 256 * 1024  # bytes that are handed to the connection at a time
 _COMPRESS_FROM = 16 * 1024
@@ -86,6 +87,8 @@ class BatchEndpoint:
         self._settings = settings
         self._metrics = metrics
         self._threads: ThreadPoolExecutor | None = None
+        self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
+        self._arrow_known = False
         self.running = 0
 
     def start(self, threads: ThreadPoolExecutor) -> None:
@@ -103,7 +106,7 @@ class BatchEndpoint:
             await send(message)
 
         try:
-            kind = media_type(request, (JSON, NDJSON, ARROW))
+            kind = media_type(request, self._kinds)
             options = options_from_query(request)
             budget = Budget(self._settings)
             given = request.headers.get("content-length", "")
@@ -133,7 +136,7 @@ class BatchEndpoint:
 
     async def _run(self, size: int, work: Callable[[], T]) -> T:
         """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
-        if size <= _SMALL or self._threads is None:
+        if size <= _AT_ONCE or self._threads is None:
             return work()
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
@@ -147,13 +150,13 @@ class BatchEndpoint:
         if size == 0:
             raise MalformedBodyError("the body is empty")
         if kind == ARROW:
-            from service.arrow import answer_arrow
-
             query, place = merged_options(query, {})
             table = self._shelf.pick(query.tolerance, place)
-            pieces = answer_arrow(body[:size], table, query, self._settings.max_batch, self._count)
+            if not self._arrow_known:
+                size += _AT_ONCE  # into a thread, where the first one loads pyarrow
+            pieces = self._arrow_pieces(body, table, query)
         else:
-            pieces = await self._run(size, partial(self._answer, body, query))
+            pieces = self._pieces(body, query)
         del body  # or it would be held until the last piece is sent
         await self._send(request, send, kind, size, _gather(pieces), budget)
 
@@ -201,6 +204,18 @@ class BatchEndpoint:
             raise ClientDisconnect
         return message
 
+    def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
+        """Answer one JSON text when the first piece is asked for."""
+        answered = self._answer(text, query)
+        del text
+        yield from answered
+
+    def _arrow_pieces(self, body: Bytes, table: LoadedTable, query: Options) -> Iterator[bytes]:
+        from service.arrow import answer_arrow
+
+        self._arrow_known = True
+        yield from answer_arrow(body[: body.size - PADDING], table, query, self._settings.max_batch, self._count)
+
     def _answer(self, text: Bytes, query: Options, *, line: bool = False) -> Iterator[bytes]:
         """Answer one JSON text, which ends in 0 bytes; what is returned writes it, piece by piece."""
         rows = is_rows(text)
@@ -221,8 +236,7 @@ class BatchEndpoint:
         self, request: Request, send: Send, kind: str, size: int, pieces: Iterator[bytes], budget: Budget
     ) -> None:
         """Send the pieces, no faster than the caller takes them."""
-        piece = await self._run(size, lambda: next(pieces, b""))
-        following = await self._run(size, lambda: next(pieces, None))
+        piece, following = await self._run(size, lambda: (next(pieces, b""), next(pieces, None)))
         headers = [(b"content-type", kind.encode("ascii"))]
         packer = Packer() if len(piece) >= _COMPRESS_FROM and _wants_gzip(request) else None
         if packer is not None:
@@ -254,7 +268,7 @@ class BatchEndpoint:
         async for lines in self._lines(receive, budget):
             size = sum(map(len, lines))
             work = partial(self._answer_lines, lines, number, query, packer)
-            answer = await self._run(0 if size <= _STREAM_SMALL else size, work)
+            answer = await self._run(size, work)
             number += len(lines)
             await budget.client(send({"type": "http.response.body", "body": answer, "more_body": True}))
         end = b"" if packer is None else packer.pack(b"", last=True)
