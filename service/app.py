@@ -25,7 +25,7 @@ from service.drain import draining
 from service.errors import answer_problem
 from service.logs import AccessLog
 from service.metrics import Metrics
-from service.middleware import ApiKeyGate, BodyLimit, RequestRecord
+from service.middleware import ApiKeyGate, BodyLimit, Compression, RequestRecord
 from service.openapi import install
 from service.routes import batch, docs, health, inverse, law, mu_macro, page, table, umbridge
 from service.routes import metrics as metrics_route
@@ -91,6 +91,7 @@ def create_app(settings: Settings | None = None) -> Application:
             Middleware(RequestRecord, metrics=metrics, log=access_log),
             Middleware(ApiKeyGate, key=key),
             Middleware(BodyLimit, max_bytes=settings.max_body_bytes),
+            Middleware(Compression),
         ],
     )
     app.state.settings = settings

@@ -199,6 +199,15 @@ def test_an_arrow_batch_over_the_limit_is_refused(tables_dir, case, problem):
         assert problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 413)["max_batch"] == 3
 
 
+def test_arrow_is_refused_where_it_is_not_installed(tables_dir, case, problem, monkeypatch):
+    monkeypatch.setattr("service.routes.batch.find_spec", lambda _name: None)
+    with TestClient(create_app(Settings(tables=(tables_dir,)))) as client:
+        body = stream_of(pa.record_batch({name: [value] for name, value in case.items()}))
+        response = client.post(PATH, content=body, headers={"Content-Type": ARROW})
+        assert ARROW not in problem(response, 415)["detail"].split("not ")[0]
+        assert client.post(PATH, json=[case]).status_code == 200
+
+
 # --- compression --------------------------------------------------------------------------------------
 
 
@@ -216,6 +225,20 @@ def test_a_large_answer_is_compressed_where_that_is_wanted(client, case, offer, 
     if taken:
         assert response.headers["vary"] == "accept-encoding"
         assert len(raw) < len(plain) / 1.5
+
+
+def test_other_large_answers_are_compressed_but_not_the_file(client, case):
+    known = {name: value for name, value in case.items() if name != "v0"}
+    law = {**known, "along": "v0", "start": 1e-4, "stop": 1.0, "points": 2001}
+    for method, path, options in (("POST", "/v1/law", {"json": law}), ("GET", "/openapi.json", {})):
+        plain = client.request(method, path, headers={"Accept-Encoding": "identity"}, **options)
+        packed = client.request(method, path, headers={"Accept-Encoding": "gzip"}, **options)
+        assert "content-encoding" not in plain.headers
+        assert packed.headers["content-encoding"] == "gzip"
+        assert "accept-encoding" in packed.headers["vary"].lower()
+        assert packed.content == plain.content
+    # Packed already, and its tag is the tag of its bytes.
+    assert "content-encoding" not in client.get("/v1/table.nc", headers={"Accept-Encoding": "gzip"}).headers
 
 
 def test_a_small_answer_is_not_compressed(client, case):

@@ -36,7 +36,7 @@ from service.errors import (
 )
 from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
 from service.metrics import Metrics
-from service.middleware import BATCH_PATH
+from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.openapi import batch_bodies, describe_batch, option_parameters
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
@@ -52,7 +52,6 @@ _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _SHORT_LINE = 1024  # bytes of one case on a line of its own
 _PIECE = 256 * 1024  # bytes that are handed to the connection at a time
-_COMPRESS_FROM = 16 * 1024
 
 
 class Budget:
@@ -238,7 +237,7 @@ class BatchEndpoint:
         """Send the pieces, no faster than the caller takes them."""
         piece, following = await self._run(size, lambda: (next(pieces, b""), next(pieces, None)))
         headers = [(b"content-type", kind.encode("ascii"))]
-        packer = Packer() if len(piece) >= _COMPRESS_FROM and _wants_gzip(request) else None
+        packer = Packer() if len(piece) >= COMPRESS_FROM and _wants_gzip(request) else None
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
         elif following is None:
