@@ -25,7 +25,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ from measuring import IMAGES, ROOT, machine, markdown, progress, quantity
 
 from friction.nondim import FIELDS
 from service.answers import answer_cases
-from service.codecs import read_batch, terminated
+from service.codecs import columns_text, read_batch, rows_text, terminated
 from service.shelf import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
@@ -54,6 +54,8 @@ KINDS = {
     "lines": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
 }
+AT_ONCE = (1, 4, 8)
+WAITED_FOR = 5  # batches that short requests are asked beside
 LABELS = {
     "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
 }  # fmt: skip
@@ -93,6 +95,26 @@ class Server:
             received = reply.read()
             sender.join()
             return reply.status, received
+
+
+class Caller:
+    """A connection that is kept, as clients who ask often do."""
+
+    def __init__(self, port: int) -> None:
+        self._raw = socket.create_connection(("127.0.0.1", port), timeout=120)
+        self._raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def ask(self, path: str, body: bytes, kind: str) -> int:
+        """POST; sends and reads at the same time, as a stream wants it.  Return the status."""
+        head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
+        sender = threading.Thread(target=self._raw.sendall, args=(head.encode() + body,))
+        sender.start()
+        reply = http.client.HTTPResponse(self._raw, method="POST")
+        reply.begin()
+        while reply.read(1 << 20):
+            pass
+        sender.join()
+        return reply.status
 
 
 def free_port() -> int:
@@ -320,38 +342,35 @@ def measure_batches(rounds: int) -> dict[str, dict[int, float]]:
 
 
 def _rate(server: Server, path: str, body: bytes, kind: str, n: int, rounds: int) -> float:
-    status, _ = server.ask("POST", path, body, kind)
+    caller = Caller(server.port)
+    status = caller.ask(path, body, kind)
     if status != 200:
         raise RuntimeError(f"{server.name}: {status}")
     found = []
     for _ in range(rounds):
         before, asked = server.cpu(), 0
         while server.cpu() - before < ENOUGH_S:
-            server.ask("POST", path, body, kind)
+            caller.ask(path, body, kind)
             asked += 1
         found.append(asked * n / (server.cpu() - before) / 1e6)
     return statistics.median(found)
 
 
-def limits(rounds: int) -> dict[str, float]:
-    """Million cases a second of the parts alone, in this process, one thread: parsing, evaluating."""
+def parts(rounds: int) -> dict[str, float]:
+    """Million cases a second of the parts alone, in this process, one thread: parsing, evaluating, writing."""
     n = 100_000
-    body = body_of("columns", n)
     table = LoadedTable.open(TABLE)
-    batch, _ = read_batch(terminated(body), n)
+    bodies = {form: body_of(form, n) for form in ("columns", "rows")}
+    batch, _ = read_batch(terminated(bodies["columns"]), n)
+    answers = answer_cases(table, batch, ())
     work: dict[str, Callable[[], object]] = {
-        "orjson.loads": lambda: orjson.loads(body),
-        "json.loads": lambda: json.loads(body),
-        "our scanner": lambda: read_batch(terminated(body), n),
         "evaluation": lambda: answer_cases(table, batch, ()),
+        "writing columns": lambda: sum(map(len, columns_text(replace(answers), {}))),
+        "writing rows": lambda: sum(map(len, rows_text(replace(answers), {}))),
     }
-    try:
-        import simdjson
-    except ImportError:
-        pass
-    else:
-        parser = simdjson.Parser()
-        work["simdjson"] = lambda: [parser.parse(body)[name].as_buffer(of_type="d") for name in FIELDS]
+    for form, body in bodies.items():
+        for name, read in readers(form, body, n).items():
+            work[f"{name}, {form}"] = read
     found: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(rounds + 1):
         for name, call in work.items():
@@ -359,6 +378,61 @@ def limits(rounds: int) -> dict[str, float]:
             call()
             found[name].append(n / (time.process_time() - before) / 1e6)
     return {name: statistics.median(values[1:]) for name, values in found.items()}
+
+
+def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
+    """Ways from the text of a batch to six arrays, and two that stop at Python objects."""
+    from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+    class Columns(BaseModel):
+        model_config = ConfigDict(strict=True)
+        mu0: list[float]
+        Fz: list[float]
+        k: list[float]
+        y0: list[float]
+        omega: list[float]
+        v0: list[float]
+
+    class Row(BaseModel):
+        model_config = ConfigDict(strict=True)
+        mu0: float
+        Fz: float
+        k: float
+        y0: float
+        omega: float
+        v0: float
+
+    def arrays(values: Any, get: Callable[[Any, str], Any]) -> object:
+        if form == "rows":
+            return [np.array([get(row, name) for row in values]) for name in FIELDS]
+        return [np.array(get(values, name)) for name in FIELDS]
+
+    item: Callable[[Any, str], Any] = lambda value, name: value[name]  # noqa: E731
+    adapter: TypeAdapter[Any] = TypeAdapter(list[Row] if form == "rows" else Columns)
+    found: dict[str, Callable[[], object]] = {
+        "our scanner": lambda: read_batch(terminated(body), n),
+        "orjson, objects only": lambda: orjson.loads(body),
+        "orjson and numpy": lambda: arrays(orjson.loads(body), item),
+        "json and numpy": lambda: arrays(json.loads(body), item),
+        "pydantic and numpy": lambda: arrays(adapter.validate_json(body), getattr),
+    }
+    if has(sys.executable, "msgspec"):
+        import msgspec
+
+        fields = [(name, float if form == "rows" else list[float]) for name in FIELDS]
+        struct: Any = msgspec.defstruct("Batch", fields)
+        decoder = msgspec.json.Decoder(list[struct] if form == "rows" else struct)
+        found["msgspec, objects only"] = lambda: decoder.decode(body)
+        found["msgspec and numpy"] = lambda: arrays(decoder.decode(body), getattr)
+    if has(sys.executable, "simdjson") and form == "columns":
+        import simdjson
+
+        def flat() -> object:
+            document = simdjson.Parser().parse(body)
+            return [np.frombuffer(document[name].as_buffer(of_type="d")) for name in FIELDS]
+
+        found["simdjson, flattened"] = flat
+    return found
 
 
 # --- the rest -----------------------------------------------------------------------------------------
@@ -388,56 +462,88 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
 
 def measure_start(rounds: int) -> list[list[str]]:
     """Seconds until ready, and memory then and after work."""
-    seconds, fresh, worked = [], [], []
+    seconds, fresh, own, worked = [], [], [], []
     body = body_of("columns", 100_000)
     for _ in range(rounds):
         started = time.monotonic()
         with ours() as server:
             seconds.append(time.monotonic() - started)
             fresh.append(server.memory())
+            own.append(server.memory("RssAnon"))
             for _ in range(5):
                 server.ask("POST", BATCH, body)
             worked.append(server.memory())
     return [
         ["ready after [s]", quantity(statistics.median(seconds))],
         ["memory when ready [MB]", quantity(statistics.median(fresh), 3)],
+        ["of it its own; the rest is libraries, which all workers share [MB]", quantity(statistics.median(own), 3)],
         ["memory after five batches of 100,000 [MB]", quantity(statistics.median(worked), 3)],
     ]
 
 
 def measure_waiting() -> list[list[str]]:
-    """Longest wait for short requests while large batches run, and what long streams hold."""
+    """Longest wait for short requests while large batches run, beside one for a server that has nothing to do."""
     rows = []
     case = json.dumps(cases(1)[0]).encode()
-    with ours() as server:
+    path = get().paths[0]
+    with ours() as server, peer("raw") as idle:
         for form in KINDS:
             progress(f"short requests beside {form}")
             body = body_of(form, 1_000_000)
-            waits: dict[str, list[float]] = {"GET": [], "POST": []}
-            done = threading.Event()
+            asked = {
+                "livez": (server, "GET", "/livez", b""), "case": (server, "POST", "/v1/mu-macro", case),
+                "idle": (idle, "GET", path, b""),
+            }  # fmt: skip
+            waits: dict[str, list[float]] = {name: [] for name in asked}
+            for _ in range(WAITED_FOR):
+                done = threading.Event()
 
-            def large(form: str = form, body: bytes = body, done: threading.Event = done) -> None:
-                _in_another_process(server.port, body, KINDS[form])
-                done.set()
+                def large(form: str = form, body: bytes = body, done: threading.Event = done) -> None:
+                    _in_another_process(server.port, body, KINDS[form])
+                    done.set()
 
-            thread = threading.Thread(target=large)
-            thread.start()
-            while not done.is_set():
-                for method, path, content in (("GET", "/livez", b""), ("POST", "/v1/mu-macro", case)):
-                    begun = time.perf_counter()
-                    server.ask(method, path, content)
-                    waits[method].append(time.perf_counter() - begun)
-            thread.join()
-            both = waits["GET"] + waits["POST"]
-            middle = statistics.median(both)
-            rows.append(
-                [
-                    LABELS[form],
-                    quantity(1e3 * middle),
-                    quantity(1e3 * max(waits["GET"])),
-                    quantity(1e3 * max(waits["POST"])),
-                ]
-            )
+                thread = threading.Thread(target=large)
+                thread.start()
+                while not done.is_set():
+                    for name, (other, method, target, content) in asked.items():
+                        begun = time.perf_counter()
+                        other.ask(method, target, content)
+                        waits[name].append(time.perf_counter() - begun)
+                thread.join()
+            middle = statistics.median(waits["livez"] + waits["case"])
+            longest = [quantity(1e3 * max(waits[name])) for name in asked]
+            rows.append([LABELS[form], str(len(waits["case"])), quantity(1e3 * middle), *longest])
+    return rows
+
+
+def measure_at_once() -> list[list[str]]:
+    """Peak memory above the start while so many batches of 100,000 cases are asked for at once."""
+    rows = []
+    for form in ("columns", "rows", "arrow"):
+        body = body_of(form, 100_000)
+        row = [LABELS[form], quantity(len(body) / 1e6, 3)]
+        for number in AT_ONCE:
+            progress(f"{number} batches as {form} at once")
+            with ours() as server:
+                server.ask("POST", BATCH, body_of(form, 1000), KINDS[form])
+                base = server.memory("VmHWM")
+                statuses: list[int] = []
+
+                def ask(
+                    body: bytes = body, form: str = form, server: Server = server, to: list[int] = statuses
+                ) -> None:
+                    to.append(server.ask("POST", BATCH, body, KINDS[form])[0])
+
+                given = (statuses, server, body, KINDS[form])
+                threads = [threading.Thread(target=ask, args=given) for _ in range(number)]
+                for thread in threads:
+                    thread.start()
+                for thread in threads:
+                    thread.join()
+                if statuses != [200] * number:
+                    raise RuntimeError(f"{form}: {statuses}")
+                row.append(quantity(server.memory("VmHWM") - base, 3))
+        rows.append(row)
     return rows
 
 
@@ -480,7 +586,7 @@ def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path
         label = LABELS.get(form, "FastAPI, list of models")
         left.loglog(sizes, cases_a_second / sizes, "o-", color=colours[form], label=label, ms=4)
         right.loglog(sizes, cases_a_second / 1e6, "o-", color=colours[form], label=label, ms=4)
-    for name, style in (("orjson.loads", ":"), ("evaluation", "--")):
+    for name, style in (("orjson, objects only, columns", ":"), ("evaluation", "--")):
         right.axhline(alone[name], color="#222222", ls=style, lw=1, label=f"{name} alone")
     left.set_ylabel("requests per second of processor time")
     right.set_ylabel("million cases per second of processor time")
@@ -524,7 +630,7 @@ def report(
         "single": markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table),
     }
     rates = measure_batches(options.rounds)
-    alone = limits(options.rounds)
+    alone = parts(options.rounds)
     rows = [
         [
             LABELS.get(form, "FastAPI, list of models in and out"),
@@ -540,10 +646,20 @@ def report(
         ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
     )
     sections["waiting"] = markdown(
-        ["beside a batch of 1,000,000 as", "median [ms]", "longest `/livez` [ms]", "longest case [ms]"],
+        [
+            "beside batches of 1,000,000 as",
+            "asked",
+            "median [ms]",
+            "longest `/livez` [ms]",
+            "longest case [ms]",
+            "longest, idle server [ms]",
+        ],
         measure_waiting(),
     )
     sections["streams"] = markdown(["cases in a stream", "memory above the start [MB]"], measure_streams())
+    sections["once"] = markdown(
+        ["batches of 100,000 at once", "one body [MB]", *(f"{n} [MB]" for n in AT_ONCE)], measure_at_once()
+    )
     sections["start"] = markdown(["one worker, one table", ""], measure_start(options.rounds))
     note = machine("fastapi", "uvicorn", "orjson", "pydantic", "pyarrow")
     sections["machine"] = note

@@ -32,7 +32,7 @@ from service.routes import metrics as metrics_route
 from service.routes.batch import BatchEndpoint
 from service.settings import Settings, load_settings, unknown_variables
 from service.shelf import Shelf
-from service.warm import prepare
+from service.warm import prepare, settle_memory
 from service.wire import Application, ShortWay
 
 __all__ = ["create_app"]
@@ -55,6 +55,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         state.metrics.start([table.label for table in state.shelf.tables])
         state.access_log.start()
         state.batches.start(threads)
+        settle_memory()
         tasks = [asyncio.create_task(sweep(settings.client_timeout_s)), asyncio.create_task(state.metrics.share())]
         with draining(state.shelf, settings.drain_s):
             yield
