@@ -1,7 +1,7 @@
 """What a question over HTTP costs: processor time of the server, ours beside others.
 
     python benchmarks/service.py                                 prints the tables, takes about ten minutes
-    python benchmarks/service.py --write                         and puts them, with the plot, into docs/service.md
+    python benchmarks/service.py --write                         and puts them, with the plot, into docs/
     python benchmarks/service.py --peers /path/to/other/python   an interpreter that has umbridge or mlserver
 
 Needs ``wrk``, ``curl``, Linux, and two processors: the servers get one, who asks the other.  Servers run side by side
@@ -42,6 +42,7 @@ from service.codecs import columns_text, read_batch, rows_text, terminated
 from service.shelf import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
+DECISION = ROOT / "docs" / "decisions" / "0008-wire.md"
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SERVER_CORE, CLIENT_CORE = 0, 1
@@ -54,7 +55,8 @@ KINDS = {
     "lines": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
 }
-AT_ONCE = (1, 4, 8)
+AT_ONCE = (1, 4, 8)  # the last: as many as are answered at a time
+INCLUDED = ("groups", "limits", "gradient", "stick_fraction", "power")
 WAITED_FOR = 5  # batches that short requests are asked beside
 LABELS = {
     "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
@@ -380,6 +382,13 @@ def parts(rounds: int) -> dict[str, float]:
     return {name: statistics.median(values[1:]) for name, values in found.items()}
 
 
+def reader_rows(alone: dict[str, float]) -> list[list[str]]:
+    """The readers among the parts, both forms side by side."""
+    names = [name.removesuffix(", columns") for name in alone if name.endswith(", columns")]
+    pairs = [(name, alone.get(f"{name}, columns"), alone.get(f"{name}, rows")) for name in names]
+    return [[name, *("-" if rate is None else quantity(rate) for rate in rates)] for name, *rates in pairs]
+
+
 def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
     """Ways from the text of a batch to six arrays, and two that stop at Python objects."""
     from pydantic import BaseModel, ConfigDict, TypeAdapter
@@ -443,7 +452,7 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
     std = {"mu0": 0.01, "v0": 1e-4}
     wanted: dict[str, dict[str, Any]] = {
         "nothing": {},
-        **{name: {"include": [name]} for name in ("groups", "limits", "gradient", "stick_fraction", "power")},
+        **{name: {"include": [name]} for name in INCLUDED},
         "std": {"include": ["std"], "std": std},
     }
     n = 100_000
@@ -519,23 +528,20 @@ def measure_waiting() -> list[list[str]]:
 def measure_at_once() -> list[list[str]]:
     """Peak memory above the start while so many batches of 100,000 cases are asked for at once."""
     rows = []
-    for form in ("columns", "rows", "arrow"):
+    kinds = [(form, LABELS[form], BATCH) for form in ("columns", "rows", "arrow")]
+    kinds.append(("rows", "JSON rows, all of `include` but `std`", f"{BATCH}?include={','.join(INCLUDED)}"))
+    for form, label, path in kinds:
         body = body_of(form, 100_000)
-        row = [LABELS[form], quantity(len(body) / 1e6, 3)]
+        row = [label, quantity(len(body) / 1e6, 3)]
         for number in AT_ONCE:
             progress(f"{number} batches as {form} at once")
             with ours() as server:
-                server.ask("POST", BATCH, body_of(form, 1000), KINDS[form])
+                server.ask("POST", path, body_of(form, 1000), KINDS[form])
                 base = server.memory("VmHWM")
                 statuses: list[int] = []
 
-                def ask(
-                    body: bytes = body, form: str = form, server: Server = server, to: list[int] = statuses
-                ) -> None:
-                    to.append(server.ask("POST", BATCH, body, KINDS[form])[0])
-
-                given = (statuses, server, body, KINDS[form])
-                threads = [threading.Thread(target=ask, args=given) for _ in range(number)]
+                given = (statuses, server, path, body, KINDS[form])
+                threads = [threading.Thread(target=_note, args=given) for _ in range(number)]
                 for thread in threads:
                     thread.start()
                 for thread in threads:
@@ -545,6 +551,10 @@ def measure_at_once() -> list[list[str]]:
                 row.append(quantity(server.memory("VmHWM") - base, 3))
         rows.append(row)
     return rows
+
+
+def _note(statuses: list[int], server: Server, path: str, body: bytes, kind: str) -> None:
+    statuses.append(server.ask("POST", path, body, kind)[0])
 
 
 def _in_another_process(port: int, body: bytes, kind: str) -> None:
@@ -642,6 +652,7 @@ def report(
     sections["alone"] = markdown(
         ["alone, in one thread", "million cases/s"], [[k, quantity(v)] for k, v in alone.items()]
     )
+    sections["readers"] = markdown(["million cases/s from text to arrays", "columns", "rows"], reader_rows(alone))
     sections["includes"] = markdown(
         ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
     )
@@ -683,12 +694,12 @@ def main() -> None:
     for text in sections.values():
         print(text, end="\n\n")
     if options.write:
-        page = PAGE.read_text(encoding="utf-8")
         for name, text in sections.items():
+            path = DECISION if name == "readers" else PAGE
+            page = path.read_text(encoding="utf-8")
             begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
             before, _, rest = page.partition(begin)
-            page = before + begin + "\n" + text + "\n\n" + end + rest.partition(end)[2]
-        PAGE.write_text(page, encoding="utf-8")
+            path.write_text(before + begin + "\n" + text + "\n\n" + end + rest.partition(end)[2], encoding="utf-8")
         plot(rates, alone, IMAGES / "service.png")
 
 
