@@ -368,14 +368,15 @@ def _rows_pieces(answers: Answers, closing: bytes) -> Iterator[bytes]:
     yield b"]," + closing
 
 
-def lines_text(answers: Answers, signature: Mapping[str, Any]) -> bytes:
-    """Write the answers to good cases as objects, each on a line of its own."""
-    return b"".join(text for _, text in _objects(answers, b"," + encode(signature)[1:], b"\n"))
+def lines_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[tuple[int, bytes]]:
+    """Write the answers as objects, each on a line of its own, null for a bad case; with the index of each piece."""
+    return _objects(answers, b"," + encode(signature)[1:], b"\n")
 
 
 def row_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
     """Write the answer to one good case as an object: plain numbers that are bad refuse what they stand in."""
-    yield lines_text(answers, signature)[:-1]
+    for _, text in lines_text(answers, signature):
+        yield text[:-1]
 
 
 def _objects(answers: Answers, end: bytes, behind: bytes) -> Iterator[tuple[int, bytes]]:

@@ -282,3 +282,23 @@ def test_halves_of_objects_are_not_joined_over_lines(client, case):
     first, second = json.dumps(case)[:20].rstrip(", "), json.dumps(case)[20:].lstrip(", ")
     answers = lines_of(client.post(PATH, content=f"{first}\n{second}\n{json.dumps(case)}", headers=LINES))
     assert [answer.get("status") for answer in answers] == [400, 400, None]
+
+
+def test_bad_lines_among_many_plain_ones_are_told_by_their_number(client, case):
+    n, bad = 3000, range(3, 3000, 7)
+    lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(n)]
+    for index in bad:
+        lines[index] = {**case, "v0": -1.0} if index % 2 else {**case, "speed": 1.0}
+    lines[1000] = {**case, "v0": [0.1, 0.2]}  # a block of columns that looks plain
+    answers = lines_of(client.post(PATH, content="\n".join(map(json.dumps, lines)), headers=LINES))
+    v0 = [1e-4 * (i + 1) for i in range(n)]
+    expected = client.post(PATH, json={**case, "v0": v0}).json()["mu_macro"]
+    assert len(answers) == n
+    for index, answer in enumerate(answers):
+        if index == 1000:
+            assert len(answer["mu_macro"]) == 2
+        elif index in bad:
+            assert (answer["status"], answer["instance"]) == (422, f"{PATH}#line={index + 1}")
+            assert answer["errors"][0]["field"] == ("v0" if index % 2 else "speed")
+        else:
+            assert answer["mu_macro"] == expected[index]

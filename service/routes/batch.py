@@ -50,6 +50,7 @@ _CLOSE = {"Connection": "close"}
 
 _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
+_FEW_LINES = 16
 _SHORT_LINE = 1024  # bytes of one case on a line of its own
 _PIECE = 256 * 1024  # bytes that are handed to the connection at a time
 
@@ -227,31 +228,38 @@ class BatchEndpoint:
             return row_text(answers, signature(table))
         return (rows_text if rows else columns_text)(answers, signature(table))
 
-    def _count(self, table: LoadedTable, answers: Answers) -> None:
+    def _count(self, table: LoadedTable, answers: Answers, n_bad: int | None = None) -> None:
         by_source = np.bincount(answers.source + 1, minlength=len(SOURCES) + 1)[1:].tolist()
-        self._metrics.count_cases(table.metrics_place, by_source, answers.n_bad)
+        self._metrics.count_cases(table.metrics_place, by_source, answers.n_bad if n_bad is None else n_bad)
 
     async def _send(
         self, request: Request, send: Send, kind: str, size: int, pieces: Iterator[bytes], budget: Budget
     ) -> None:
         """Send the pieces, no faster than the caller takes them."""
-        piece, following = await self._run(size, lambda: (next(pieces, b""), next(pieces, None)))
-        headers = [(b"content-type", kind.encode("ascii"))]
-        packer = Packer() if len(piece) >= COMPRESS_FROM and _wants_gzip(request) else None
-        if packer is not None:
-            headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
-        elif following is None:
-            headers.append((b"content-length", b"%d" % len(piece)))
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        while True:
-            last = following is None
+        packer: Packer | None = None
+        started = False
+        async for piece, last in self._each(size, pieces):
+            if not started:
+                started = True
+                headers = [(b"content-type", kind.encode("ascii"))]
+                if len(piece) >= COMPRESS_FROM and _wants_gzip(request):
+                    packer = Packer()
+                    headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
+                elif last:
+                    headers.append((b"content-length", b"%d" % len(piece)))
+                await send({"type": "http.response.start", "status": 200, "headers": headers})
             if packer is not None:
                 piece = await self._run(len(piece), partial(packer.pack, piece, last=last))
             await budget.client(send({"type": "http.response.body", "body": piece, "more_body": not last}))
-            if following is None:
-                return
+
+    async def _each(self, size: int, pieces: Iterator[bytes]) -> AsyncIterator[tuple[bytes, bool]]:
+        """The pieces, each with whether it is the last; a thread is asked once for the first two."""
+        piece, following = await self._run(size, lambda: (next(pieces, None), next(pieces, None)))
+        while piece is not None:
+            yield piece, following is None
             piece = following
-            following = await self._run(size, lambda: next(pieces, None))
+            if piece is not None:
+                following = await self._run(size, lambda: next(pieces, None))
 
     # --- streams --------------------------------------------------------------------------------------
 
@@ -265,11 +273,14 @@ class BatchEndpoint:
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         number = 0
         async for lines in self._lines(receive, budget):
-            size = sum(map(len, lines))
-            work = partial(self._answer_lines, lines, number, query, packer)
-            answer = await self._run(size, work)
+            # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
+            size = sum(map(len, lines)) if len(lines) <= _FEW_LINES else _AT_ONCE + 1
+            pieces = _gather(self._line_pieces(lines, number, query))
             number += len(lines)
-            await budget.client(send({"type": "http.response.body", "body": answer, "more_body": True}))
+            async for piece, _ in self._each(size, pieces):
+                if packer is not None:
+                    piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
+                await budget.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
 
@@ -300,39 +311,55 @@ class BatchEndpoint:
         if rest:
             yield [rest]
 
-    def _answer_lines(self, lines: list[bytearray], number: int, query: Options, packer: "Packer | None") -> bytes:
-        pieces: list[bytes] = []
-        if not (len(lines) > 1 and self._answer_plain_lines(lines, query, pieces)):
-            for line in lines:
-                number += 1
-                if not line or line.isspace():
-                    continue
-                try:
-                    pieces.extend(self._answer(terminated(line), query, line=True))
-                except RequestError as error:
-                    pieces.append(bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body))
-                pieces.append(b"\n")
-        answers = b"".join(pieces)
-        return answers if packer is None else packer.pack(answers, flush=True)
+    def _line_pieces(self, lines: list[bytearray], number: int, query: Options) -> Iterator[bytes]:
+        """Answer lines; ``number`` is how many came before."""
+        plain = self._plain_lines(lines, number, query) if len(lines) > 1 else None
+        if plain is not None:
+            yield from plain
+            return
+        for index, line in enumerate(lines, number + 1):
+            yield from self._line(line, index, query)
 
-    def _answer_plain_lines(self, lines: list[bytearray], query: Options, pieces: list[bytes]) -> bool:
-        """Answer lines of one good case each all at once; False, and nothing done, where they are anything else."""
+    def _line(self, line: bytearray, number: int, query: Options) -> Iterator[bytes]:
+        if not line or line.isspace():
+            return
+        try:
+            answered = self._answer(terminated(line), query, line=True)
+        except RequestError as error:
+            yield bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body)
+        else:
+            yield from answered
+        yield b"\n"
+
+    def _plain_lines(self, lines: list[bytearray], number: int, query: Options) -> Iterator[bytes] | None:
+        """Answer lines of one object each all at once; None where they are anything else."""
         for line in lines:
             if len(line) > _SHORT_LINE or line[:1] != b"{" or line.rstrip()[-1:] != b"}" or line.count(b"{") != 1:
-                return False
+                return None
         text = terminated(bytearray(b"[%b]" % b",".join(lines)))
         try:
             options, place = merged_options(query, {})
             cases, _ = read_batch(text, len(lines))
             table = self._shelf.pick(options.tolerance, place)
         except RequestError:
-            return False
+            return None
         answers = answer_cases(table, cases, options.include, options.std)
-        if answers.n_bad or answers.size != len(lines):
-            return False
-        self._count(table, answers)
-        pieces.append(lines_text(answers, signature(table)))
-        return True
+        if answers.size != len(lines):
+            return None
+        self._count(table, answers, 0)  # whether a case is bad, and why, is found out line by line
+        return self._mended(lines_text(answers, signature(table)), answers, lines, number, query)
+
+    def _mended(
+        self, texts: Iterator[tuple[int, bytes]], answers: Answers, lines: list[bytearray], number: int, query: Options
+    ) -> Iterator[bytes]:
+        """The texts, with what a line by itself is answered in place of every null."""
+        for start, text in texts:
+            pieces = text.splitlines(keepends=True)
+            odd = np.flatnonzero(answers.flaws[start : start + len(pieces)]).tolist()
+            for index in odd:
+                line = start + index
+                pieces[index] = b"".join(self._line(lines[line], number + line + 1, query))
+            yield b"".join(pieces) if odd else text
 
 
 class Packer:
