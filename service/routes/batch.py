@@ -5,8 +5,7 @@ question has come, and so that no more of either is held than is being worked on
 """
 
 import asyncio
-import zlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import partial
@@ -30,14 +29,13 @@ from service.errors import (
     MalformedBodyError,
     OverloadedError,
     RequestError,
-    SlowClientError,
-    TookTooLongError,
     problem_of,
 )
 from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
 from service.metrics import Metrics
 from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.openapi import batch_bodies, describe_batch, option_parameters
+from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
 
@@ -46,37 +44,10 @@ __all__ = ["BatchEndpoint", "router"]
 router = APIRouter(tags=["answers"])
 T = TypeVar("T")
 
-_CLOSE = {"Connection": "close"}
-
 _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _FEW_LINES = 16
 _SHORT_LINE = 1024  # bytes of one case on a line of its own
-_PIECE = 256 * 1024  # bytes that are handed to the connection at a time
-
-
-class Budget:
-    """Time that is left for one request, and for the caller's next move."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._total = settings.time_limit_s
-        self._end = self._loop.time() + self._total
-        self.client_s = settings.client_timeout_s
-
-    async def client(self, move: Awaitable[T], deadline: float | None = None) -> T:
-        """Wait for the caller's move, until ``deadline`` or for as long as a caller may take."""
-        try:
-            async with asyncio.timeout_at(min(self._end, deadline or self.deadline())):
-                return await move
-        except TimeoutError:
-            if self._loop.time() >= self._end:
-                raise TookTooLongError(f"a batch may take up to {self._total} s", headers=_CLOSE) from None
-            raise SlowClientError(f"a caller may take up to {self.client_s} s", headers=_CLOSE) from None
-
-    def deadline(self) -> float:
-        """Until when a move that begins now has to be made."""
-        return self._loop.time() + self.client_s
 
 
 class BatchEndpoint:
@@ -127,7 +98,7 @@ class BatchEndpoint:
             yield
             return
         if self.running >= self._settings.max_batches:
-            raise OverloadedError(f"{self.running} large batches are being answered already", headers=_CLOSE)
+            raise OverloadedError(f"{self.running} large batches are being answered already", headers=CLOSE)
         self.running += 1
         try:
             yield
@@ -158,7 +129,7 @@ class BatchEndpoint:
         else:
             pieces = self._pieces(body, query)
         del body  # or it would be held until the last piece is sent
-        await self._send(request, send, kind, size, _gather(pieces), budget)
+        await self._send(request, send, kind, size, gather(pieces), budget)
 
     async def _body(self, scope: Scope, length: int, receive: Receive, budget: Budget) -> Bytes:
         """The body, with 0 bytes behind it.  Memory is taken as it comes in, not as it is announced."""
@@ -242,7 +213,7 @@ class BatchEndpoint:
             if not started:
                 started = True
                 headers = [(b"content-type", kind.encode("ascii"))]
-                if len(piece) >= COMPRESS_FROM and _wants_gzip(request):
+                if len(piece) >= COMPRESS_FROM and wants_gzip(request):
                     packer = Packer()
                     headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
                 elif last:
@@ -267,7 +238,7 @@ class BatchEndpoint:
         """Answer line by line, each as soon as it is there: what is held does not grow with the stream."""
         self._shelf.pick(query.tolerance, "parameter")  # refused before the first byte, if at all
         headers = [(b"content-type", NDJSON.encode("ascii"))]
-        packer = Packer() if _wants_gzip(request) else None
+        packer = Packer() if wants_gzip(request) else None
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
@@ -275,7 +246,7 @@ class BatchEndpoint:
         async for lines in self._lines(receive, budget):
             # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
             size = sum(map(len, lines)) if len(lines) <= _FEW_LINES else _AT_ONCE + 1
-            pieces = _gather(self._line_pieces(lines, number, query))
+            pieces = gather(self._line_pieces(lines, number, query))
             number += len(lines)
             async for piece, _ in self._each(size, pieces):
                 if packer is not None:
@@ -304,7 +275,7 @@ class BatchEndpoint:
                 rest, start = bytearray(), end + 1
             rest += seen[start:]
             if len(rest) > limit:
-                raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+                raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
             if lines:
                 yield lines
                 deadline = budget.deadline()
@@ -362,45 +333,8 @@ class BatchEndpoint:
             yield b"".join(pieces) if odd else text
 
 
-class Packer:
-    """gzip, at the level that costs least."""
-
-    def __init__(self) -> None:
-        self._packer = zlib.compressobj(1, zlib.DEFLATED, 31)
-
-    def pack(self, piece: bytes, *, last: bool = False, flush: bool = False) -> bytes:
-        """Return what can be sent after this piece."""
-        packed = self._packer.compress(piece)
-        if last or flush:
-            packed += self._packer.flush(zlib.Z_FINISH if last else zlib.Z_SYNC_FLUSH)
-        return packed
-
-
-def _wants_gzip(request: Request) -> bool:
-    for offer in request.headers.get("accept-encoding", "").lower().split(","):
-        name, _, parameters = offer.partition(";")
-        if name.strip() in ("gzip", "*"):
-            return parameters.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
-    return False
-
-
 def _body_too_large(limit: int) -> BodyTooLargeError:
-    return BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
-
-
-def _gather(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes in pieces of a size that is worth a message."""
-    gathered = bytearray()
-    for piece in pieces:
-        if len(piece) >= _PIECE and not gathered:
-            yield piece
-            continue
-        gathered += piece
-        if len(gathered) >= _PIECE:
-            yield bytes(gathered)
-            gathered.clear()
-    if gathered:
-        yield bytes(gathered)
+    return BodyTooLargeError(f"the body may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
 
 
 class Direct(Response):
