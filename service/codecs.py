@@ -5,7 +5,9 @@ different lengths, a bad plain number that would hold for every case.  A bad ent
 Cases go from text to arrays and back in compiled loops; Python objects are made for names, options and faults only.
 """
 
+import mmap
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
@@ -68,6 +70,8 @@ MAX_ERRORS = 1000
 _REQUIRED = tuple(name for name in FIELDS if name != "k")
 _NOT_A_NUMBER = "must be a number"
 _SLICE = 8192  # cases that are written at a time: about half a millisecond
+_MAPPED_FROM = 1024 * 1024
+_PRIVATE: dict[str, Any] = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
 _MAX_OPTION = 64 * 1024  # bytes of a value that is neither a column nor a number
 _NAME = re.compile(rb'"(?:[^"\\\x00-\x1f]|\\.)*"')
 
@@ -81,7 +85,13 @@ def encode(values: Mapping[str, Any]) -> bytes:
 
 
 def room_for(length: int) -> Bytes:
-    """Room for a text of so many bytes, with the 0 bytes behind it that stop every scan."""
+    """Room for a text of so many bytes, with the 0 bytes behind it that stop every scan.
+
+    Large ones are mapped: numpy would ask for huge pages, and while the system gathers one of those, which can take
+    many milliseconds, the thread that fills the room answers nobody.
+    """
+    if length >= _MAPPED_FROM:
+        return np.frombuffer(mmap.mmap(-1, length + PADDING, **_PRIVATE), dtype=np.uint8)
     text = np.empty(length + PADDING, dtype=np.uint8)
     text[length:] = 0
     return text
