@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from friction import Surrogate
-from friction.nondim import FIELDS, dimensional
+from friction.nondim import FIELDS, dimensional, evaluate_block
 from friction.regions import REGIMES, SOURCES
 from friction.surrogate import REGIME_OF_SOURCE
 from service import API_VERSION
-from service.compiled.block import evaluate_cases
+from service.compiled.block import mark_flaws
 from service.limits import groups, limits, power, stick_fraction
 from service.schemas import CaseRequest, Groups, InputStd, Limits
 from service.shelf import LoadedTable
@@ -145,7 +145,9 @@ def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: 
     source = np.empty(n, dtype=np.int8)
     mu0, fz, k, y0, omega, v0 = map(_read_only, cases.columns)
     a, b, c, d = table.arrays
-    n_bad = evaluate_cases(*(mu0, fz, k, y0, omega, v0), a, b, c, d, mu_macro, mu_ratio, bound, source, cases.flaws)
+    n_bad = evaluate_block(mu0, fz, k, y0, omega, v0, a, b, c, d, mu_macro, mu_ratio, bound, source)
+    if n_bad or cases.flaws.any():
+        n_bad = mark_flaws(mu0, fz, k, y0, omega, v0, mu_macro, mu_ratio, bound, source, cases.flaws)
     answers = Answers(cases, n, mu_macro, mu_ratio, bound, source, cases.flaws, n_bad)
     if include:
         answers.extras = _batch_extras(table.surrogate, cases, include, std)

@@ -1,9 +1,8 @@
-"""The compiled middle of a batch: columns -> answers and faults, answers -> text; without the interpreter's lock."""
+"""The compiled middle of a batch: faults, answers -> text; without the interpreter's lock."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from friction.nondim import dimensional
 from service.compiled.digits import Bytes, write_number
 from service.compiled.machine import inlined, load_eight, loop, store_eight
 from service.compiled.scan import MISSING, NOT_A_NUMBER
@@ -12,7 +11,7 @@ __all__ = [
     "BOUND_FLAW",
     "MISSING_FLAW",
     "NUMBER_FLAW",
-    "evaluate_cases",
+    "mark_flaws",
     "write_names",
     "write_numbers",
     "write_rows",
@@ -44,40 +43,23 @@ def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -
 
 
 @loop
-def evaluate_cases(
+def mark_flaws(
     mu0: Array, fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
-    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
     mu_macro: Array, mu_ratio: Array, bound: Array, source: Codes, flaws: Flaws,
 ) -> int:  # fmt: skip
-    """Answer n cases; return how many are bad.
+    """Give every bad case its code, NaN in the answers and -1 in ``source``; return how many are bad.
 
-    Columns have the size n, or 1 where one value holds for all; k = inf is rigid contact.  A bad case gets its code in
-    ``flaws`` unless it has one already, NaN in the answers and -1 in ``source``.
+    Columns have the size n, or 1 where one value holds for all.  A case is bad that has a code already, or that the
+    evaluation left without a source.
     """
     s0, s1, s2 = min(mu0.size - 1, 1), min(fz.size - 1, 1), min(k.size - 1, 1)
     s3, s4, s5 = min(y0.size - 1, 1), min(omega.size - 1, 1), min(v0.size - 1, 1)
     bad = 0
-    inf = np.inf
     for i in range(flaws.size):
-        a, b, c, d, e, f = mu0[i * s0], fz[i * s1], k[i * s2], y0[i * s3], omega[i * s4], v0[i * s5]
-        if (
-            flaws[i] == 0
-            and 0.0 < a < inf
-            and 0.0 < b < inf
-            and c > 0.0
-            and 0.0 <= d < inf
-            and 0.0 <= e < inf
-            and 0.0 <= f < inf
-        ):
-            mu, eps, code, _, _ = dimensional(a, b, c, d, e, f, coef, meta, bcoef, bmeta)
-            mu_macro[i] = a * mu
-            mu_ratio[i] = mu
-            bound[i] = a * eps
-            source[i] = code
-        else:
+        if flaws[i] != 0 or source[i] < 0:
             bad += 1
             if flaws[i] == 0:
-                flaws[i] = _flaw(a, b, c, d, e, f)
+                flaws[i] = _flaw(mu0[i * s0], fz[i * s1], k[i * s2], y0[i * s3], omega[i * s4], v0[i * s5])
             mu_macro[i] = np.nan
             mu_ratio[i] = np.nan
             bound[i] = np.nan
