@@ -1,7 +1,7 @@
 """What a question over HTTP costs: processor time of the server, ours beside others.
 
     python benchmarks/service.py                                 prints the tables, takes about ten minutes
-    python benchmarks/service.py --write                         and puts them, with the plot, into docs/service.md
+    python benchmarks/service.py --write                         and puts them, with the plot, into docs/
     python benchmarks/service.py --peers /path/to/other/python   an interpreter that has umbridge or mlserver
 
 Needs ``wrk``, ``curl``, Linux, and two processors: the servers get one, who asks the other.  Servers run side by side
@@ -25,7 +25,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +38,11 @@ from measuring import IMAGES, ROOT, machine, markdown, progress, quantity
 
 from friction.nondim import FIELDS
 from service.answers import answer_cases
-from service.codecs import read_batch, terminated
+from service.codecs import columns_text, read_batch, rows_text, terminated
 from service.shelf import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
+DECISION = ROOT / "docs" / "decisions" / "0008-wire.md"
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SERVER_CORE, CLIENT_CORE = 0, 1
@@ -54,6 +55,9 @@ KINDS = {
     "lines": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
 }
+AT_ONCE = (1, 4, 8)  # the last: as many as are answered at a time
+INCLUDED = ("groups", "limits", "gradient", "stick_fraction", "power")
+WAITED_FOR = 5  # batches that short requests are asked beside
 LABELS = {
     "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
 }  # fmt: skip
@@ -93,6 +97,26 @@ class Server:
             received = reply.read()
             sender.join()
             return reply.status, received
+
+
+class Caller:
+    """A connection that is kept, as clients who ask often do."""
+
+    def __init__(self, port: int) -> None:
+        self._raw = socket.create_connection(("127.0.0.1", port), timeout=120)
+        self._raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def ask(self, path: str, body: bytes, kind: str) -> int:
+        """POST; sends and reads at the same time, as a stream wants it.  Return the status."""
+        head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
+        sender = threading.Thread(target=self._raw.sendall, args=(head.encode() + body,))
+        sender.start()
+        reply = http.client.HTTPResponse(self._raw, method="POST")
+        reply.begin()
+        while reply.read(1 << 20):
+            pass
+        sender.join()
+        return reply.status
 
 
 def free_port() -> int:
@@ -216,10 +240,10 @@ def mlserver_question() -> Question:
     return Question("POST", ["/v2/models/mu_macro/infer"] * 64, bodies)
 
 
-def load(server: Server, script: Path, seconds: float) -> tuple[float, float]:
+def load(server: Server, script: Path, seconds: int) -> tuple[float, float]:
     """Processor time [us] a request, and requests a second, under 16 connections that never pause."""
     before = server.cpu()
-    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", "-c16", f"-d{seconds:g}s", "-s", str(script)]
+    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", "-c16", f"-d{seconds}s", "-s", str(script)]
     done = subprocess.run(
         [*command, f"http://127.0.0.1:{server.port}"], capture_output=True, text=True, check=True
     ).stdout
@@ -231,7 +255,7 @@ def load(server: Server, script: Path, seconds: float) -> tuple[float, float]:
     return 1e6 * spent / requests, float(words[words.index("Requests/sec:") + 1])
 
 
-def measure_single(peers: dict[str, str], rounds: int, seconds: float, folder: Path) -> dict[str, tuple[float, float]]:
+def measure_single(peers: dict[str, str], rounds: int, seconds: int, folder: Path) -> dict[str, tuple[float, float]]:
     """Median processor time [us] and rate for every server and kind of question."""
     asked: dict[str, list[tuple[str, Question]]] = {
         "mumacro": [("POST", post()), ("GET", get())],
@@ -320,38 +344,35 @@ def measure_batches(rounds: int) -> dict[str, dict[int, float]]:
 
 
 def _rate(server: Server, path: str, body: bytes, kind: str, n: int, rounds: int) -> float:
-    status, _ = server.ask("POST", path, body, kind)
+    caller = Caller(server.port)
+    status = caller.ask(path, body, kind)
     if status != 200:
         raise RuntimeError(f"{server.name}: {status}")
     found = []
     for _ in range(rounds):
         before, asked = server.cpu(), 0
         while server.cpu() - before < ENOUGH_S:
-            server.ask("POST", path, body, kind)
+            caller.ask(path, body, kind)
             asked += 1
         found.append(asked * n / (server.cpu() - before) / 1e6)
     return statistics.median(found)
 
 
-def limits(rounds: int) -> dict[str, float]:
-    """Million cases a second of the parts alone, in this process, one thread: parsing, evaluating."""
+def parts(rounds: int) -> dict[str, float]:
+    """Million cases a second of the parts alone, in this process, one thread: parsing, evaluating, writing."""
     n = 100_000
-    body = body_of("columns", n)
     table = LoadedTable.open(TABLE)
-    batch, _ = read_batch(*terminated(body), n)
+    bodies = {form: body_of(form, n) for form in ("columns", "rows")}
+    batch, _ = read_batch(terminated(bodies["columns"]), n)
+    answers = answer_cases(table, batch, ())
     work: dict[str, Callable[[], object]] = {
-        "orjson.loads": lambda: orjson.loads(body),
-        "json.loads": lambda: json.loads(body),
-        "our scanner": lambda: read_batch(*terminated(body), n),
         "evaluation": lambda: answer_cases(table, batch, ()),
+        "writing columns": lambda: sum(map(len, columns_text(replace(answers), {}))),
+        "writing rows": lambda: sum(map(len, rows_text(replace(answers), {}))),
     }
-    try:
-        import simdjson
-    except ImportError:
-        pass
-    else:
-        parser = simdjson.Parser()
-        work["simdjson"] = lambda: [parser.parse(body)[name].as_buffer(of_type="d") for name in FIELDS]
+    for form, body in bodies.items():
+        for name, read in readers(form, body, n).items():
+            work[f"{name}, {form}"] = read
     found: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(rounds + 1):
         for name, call in work.items():
@@ -359,6 +380,68 @@ def limits(rounds: int) -> dict[str, float]:
             call()
             found[name].append(n / (time.process_time() - before) / 1e6)
     return {name: statistics.median(values[1:]) for name, values in found.items()}
+
+
+def reader_rows(alone: dict[str, float]) -> list[list[str]]:
+    """The readers among the parts, both forms side by side."""
+    names = [name.removesuffix(", columns") for name in alone if name.endswith(", columns")]
+    pairs = [(name, alone.get(f"{name}, columns"), alone.get(f"{name}, rows")) for name in names]
+    return [[name, *("-" if rate is None else quantity(rate) for rate in rates)] for name, *rates in pairs]
+
+
+def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
+    """Ways from the text of a batch to six arrays, and two that stop at Python objects."""
+    from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+    class Columns(BaseModel):
+        model_config = ConfigDict(strict=True)
+        mu0: list[float]
+        Fz: list[float]
+        k: list[float]
+        y0: list[float]
+        omega: list[float]
+        v0: list[float]
+
+    class Row(BaseModel):
+        model_config = ConfigDict(strict=True)
+        mu0: float
+        Fz: float
+        k: float
+        y0: float
+        omega: float
+        v0: float
+
+    def arrays(values: Any, get: Callable[[Any, str], Any]) -> object:
+        if form == "rows":
+            return [np.array([get(row, name) for row in values]) for name in FIELDS]
+        return [np.array(get(values, name)) for name in FIELDS]
+
+    item: Callable[[Any, str], Any] = lambda value, name: value[name]  # noqa: E731
+    adapter: TypeAdapter[Any] = TypeAdapter(list[Row] if form == "rows" else Columns)
+    found: dict[str, Callable[[], object]] = {
+        "our scanner": lambda: read_batch(terminated(body), n),
+        "orjson, objects only": lambda: orjson.loads(body),
+        "orjson and numpy": lambda: arrays(orjson.loads(body), item),
+        "json and numpy": lambda: arrays(json.loads(body), item),
+        "pydantic and numpy": lambda: arrays(adapter.validate_json(body), getattr),
+    }
+    if has(sys.executable, "msgspec"):
+        import msgspec
+
+        fields = [(name, float if form == "rows" else list[float]) for name in FIELDS]
+        struct: Any = msgspec.defstruct("Batch", fields)
+        decoder = msgspec.json.Decoder(list[struct] if form == "rows" else struct)
+        found["msgspec, objects only"] = lambda: decoder.decode(body)
+        found["msgspec and numpy"] = lambda: arrays(decoder.decode(body), getattr)
+    if has(sys.executable, "simdjson") and form == "columns":
+        import simdjson
+
+        def flat() -> object:
+            document = simdjson.Parser().parse(body)
+            return [np.frombuffer(document[name].as_buffer(of_type="d")) for name in FIELDS]
+
+        found["simdjson, flattened"] = flat
+    return found
 
 
 # --- the rest -----------------------------------------------------------------------------------------
@@ -369,7 +452,7 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
     std = {"mu0": 0.01, "v0": 1e-4}
     wanted: dict[str, dict[str, Any]] = {
         "nothing": {},
-        **{name: {"include": [name]} for name in ("groups", "limits", "gradient", "stick_fraction", "power")},
+        **{name: {"include": [name]} for name in INCLUDED},
         "std": {"include": ["std"], "std": std},
     }
     n = 100_000
@@ -379,7 +462,7 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
         for name, options in wanted.items():
             progress(f"include {name}")
             script = post(**options).script(folder)
-            load(server, script, 0.5)
+            load(server, script, 1)
             single = statistics.median(load(server, script, 2)[0] for _ in range(rounds))
             rate = _rate(server, BATCH, orjson.dumps({**table, **options}), "application/json", n, rounds)
             rows.append([name, quantity(single, 3), quantity(1e3 / rate, 3)])
@@ -388,57 +471,90 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
 
 def measure_start(rounds: int) -> list[list[str]]:
     """Seconds until ready, and memory then and after work."""
-    seconds, fresh, worked = [], [], []
+    seconds, fresh, own, worked = [], [], [], []
     body = body_of("columns", 100_000)
     for _ in range(rounds):
         started = time.monotonic()
         with ours() as server:
             seconds.append(time.monotonic() - started)
             fresh.append(server.memory())
+            own.append(server.memory("RssAnon"))
             for _ in range(5):
                 server.ask("POST", BATCH, body)
             worked.append(server.memory())
     return [
         ["ready after [s]", quantity(statistics.median(seconds))],
         ["memory when ready [MB]", quantity(statistics.median(fresh), 3)],
+        ["of it its own; the rest is libraries, which all workers share [MB]", quantity(statistics.median(own), 3)],
         ["memory after five batches of 100,000 [MB]", quantity(statistics.median(worked), 3)],
     ]
 
 
 def measure_waiting() -> list[list[str]]:
-    """Longest wait for short requests while large batches run, and what long streams hold."""
+    """Longest wait for short requests while large batches run, beside one for a server that has nothing to do."""
     rows = []
     case = json.dumps(cases(1)[0]).encode()
-    with ours() as server:
+    path = get().paths[0]
+    with ours() as server, peer("raw") as idle:
         for form in KINDS:
             progress(f"short requests beside {form}")
             body = body_of(form, 1_000_000)
-            waits: dict[str, list[float]] = {"GET": [], "POST": []}
-            done = threading.Event()
+            asked = {
+                "livez": (server, "GET", "/livez", b""), "case": (server, "POST", "/v1/mu-macro", case),
+                "idle": (idle, "GET", path, b""),
+            }  # fmt: skip
+            waits: dict[str, list[float]] = {name: [] for name in asked}
+            for _ in range(WAITED_FOR):
+                done = threading.Event()
 
-            def large(form: str = form, body: bytes = body, done: threading.Event = done) -> None:
-                _in_another_process(server.port, body, KINDS[form])
-                done.set()
+                def large(form: str = form, body: bytes = body, done: threading.Event = done) -> None:
+                    _in_another_process(server.port, body, KINDS[form])
+                    done.set()
 
-            thread = threading.Thread(target=large)
-            thread.start()
-            while not done.is_set():
-                for method, path, content in (("GET", "/livez", b""), ("POST", "/v1/mu-macro", case)):
-                    begun = time.perf_counter()
-                    server.ask(method, path, content)
-                    waits[method].append(time.perf_counter() - begun)
-            thread.join()
-            both = waits["GET"] + waits["POST"]
-            middle = statistics.median(both)
-            rows.append(
-                [
-                    LABELS[form],
-                    quantity(1e3 * middle),
-                    quantity(1e3 * max(waits["GET"])),
-                    quantity(1e3 * max(waits["POST"])),
-                ]
-            )
+                thread = threading.Thread(target=large)
+                thread.start()
+                while not done.is_set():
+                    for name, (other, method, target, content) in asked.items():
+                        begun = time.perf_counter()
+                        other.ask(method, target, content)
+                        waits[name].append(time.perf_counter() - begun)
+                thread.join()
+            middle = statistics.median(waits["livez"] + waits["case"])
+            longest = [quantity(1e3 * max(waits[name])) for name in asked]
+            rows.append([LABELS[form], str(len(waits["case"])), quantity(1e3 * middle), *longest])
     return rows
+
+
+def measure_at_once() -> list[list[str]]:
+    """Peak memory above the start while so many batches of 100,000 cases are asked for at once."""
+    rows = []
+    kinds = [(form, LABELS[form], BATCH) for form in ("columns", "rows", "arrow")]
+    kinds.append(("rows", "JSON rows, all of `include` but `std`", f"{BATCH}?include={','.join(INCLUDED)}"))
+    for form, label, path in kinds:
+        body = body_of(form, 100_000)
+        row = [label, quantity(len(body) / 1e6, 3)]
+        for number in AT_ONCE:
+            progress(f"{number} batches as {form} at once")
+            with ours() as server:
+                server.ask("POST", path, body_of(form, 1000), KINDS[form])
+                base = server.memory("VmHWM")
+                statuses: list[int] = []
+
+                given = (statuses, server, path, body, KINDS[form])
+                threads = [threading.Thread(target=_note, args=given) for _ in range(number)]
+                for thread in threads:
+                    thread.start()
+                for thread in threads:
+                    thread.join()
+                if statuses != [200] * number:
+                    raise RuntimeError(f"{form}: {statuses}")
+                row.append(quantity(server.memory("VmHWM") - base, 3))
+        rows.append(row)
+    return rows
+
+
+def _note(statuses: list[int], server: Server, path: str, body: bytes, kind: str) -> None:
+    statuses.append(server.ask("POST", path, body, kind)[0])
 
 
 def _in_another_process(port: int, body: bytes, kind: str) -> None:
@@ -480,7 +596,7 @@ def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path
         label = LABELS.get(form, "FastAPI, list of models")
         left.loglog(sizes, cases_a_second / sizes, "o-", color=colours[form], label=label, ms=4)
         right.loglog(sizes, cases_a_second / 1e6, "o-", color=colours[form], label=label, ms=4)
-    for name, style in (("orjson.loads", ":"), ("evaluation", "--")):
+    for name, style in (("orjson, objects only, columns", ":"), ("evaluation", "--")):
         right.axhline(alone[name], color="#222222", ls=style, lw=1, label=f"{name} alone")
     left.set_ylabel("requests per second of processor time")
     right.set_ylabel("million cases per second of processor time")
@@ -524,7 +640,7 @@ def report(
         "single": markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table),
     }
     rates = measure_batches(options.rounds)
-    alone = limits(options.rounds)
+    alone = parts(options.rounds)
     rows = [
         [
             LABELS.get(form, "FastAPI, list of models in and out"),
@@ -536,14 +652,25 @@ def report(
     sections["alone"] = markdown(
         ["alone, in one thread", "million cases/s"], [[k, quantity(v)] for k, v in alone.items()]
     )
+    sections["readers"] = markdown(["million cases/s from text to arrays", "columns", "rows"], reader_rows(alone))
     sections["includes"] = markdown(
         ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
     )
     sections["waiting"] = markdown(
-        ["beside a batch of 1,000,000 as", "median [ms]", "longest `/livez` [ms]", "longest case [ms]"],
+        [
+            "beside batches of 1,000,000 as",
+            "asked",
+            "median [ms]",
+            "longest `/livez` [ms]",
+            "longest case [ms]",
+            "longest, idle server [ms]",
+        ],
         measure_waiting(),
     )
     sections["streams"] = markdown(["cases in a stream", "memory above the start [MB]"], measure_streams())
+    sections["once"] = markdown(
+        ["batches of 100,000 at once", "one body [MB]", *(f"{n} [MB]" for n in AT_ONCE)], measure_at_once()
+    )
     sections["start"] = markdown(["one worker, one table", ""], measure_start(options.rounds))
     note = machine("fastapi", "uvicorn", "orjson", "pydantic", "pyarrow")
     sections["machine"] = note
@@ -554,7 +681,7 @@ def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--seconds", type=int, default=3)
     parser.add_argument("--peers", nargs="*", default=[], metavar="PYTHON")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
@@ -567,12 +694,12 @@ def main() -> None:
     for text in sections.values():
         print(text, end="\n\n")
     if options.write:
-        page = PAGE.read_text(encoding="utf-8")
         for name, text in sections.items():
+            path = DECISION if name == "readers" else PAGE
+            page = path.read_text(encoding="utf-8")
             begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
             before, _, rest = page.partition(begin)
-            page = before + begin + "\n" + text + "\n\n" + end + rest.partition(end)[2]
-        PAGE.write_text(page, encoding="utf-8")
+            path.write_text(before + begin + "\n" + text + "\n\n" + end + rest.partition(end)[2], encoding="utf-8")
         plot(rates, alone, IMAGES / "service.png")
 
 

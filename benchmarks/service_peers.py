@@ -7,6 +7,7 @@
 
 import json
 import os
+import socket
 import sys
 from pathlib import Path
 from typing import Any
@@ -143,8 +144,12 @@ def serve_mlserver(port: int) -> None:
     (folder / "model-settings.json").write_text(
         json.dumps({"name": "mu_macro", "implementation": "friction_runtime.Friction"})
     )
+    with socket.socket() as first, socket.socket() as second:
+        for probe in (first, second):
+            probe.bind(("127.0.0.1", 0))
+        grpc, metrics = first.getsockname()[1], second.getsockname()[1]
     settings = {
-        "host": "127.0.0.1", "http_port": port, "grpc_port": port + 1, "metrics_port": port + 2,
+        "host": "127.0.0.1", "http_port": port, "grpc_port": grpc, "metrics_port": metrics,
         "parallel_workers": 0, "access_log": False, "debug": False,
     }  # fmt: skip
     (folder / "settings.json").write_text(json.dumps(settings))

@@ -5,6 +5,7 @@ Exit codes: 0 stopped on request (or ready), 1 could not run (or not ready), 2 b
 """
 
 import argparse
+import gc
 import os
 import signal
 import sys
@@ -66,6 +67,9 @@ def _serve(settings: Settings) -> int:
     # with the signal's own exit status.  A stop that was asked for is a success.
     # Set before the slow imports: as a container's first process this one would ignore the signal until then.
     signal.signal(signal.SIGTERM, _stop)
+
+    # Importing makes no garbage worth looking for; service.warm.settle_memory turns the collector on again.
+    gc.disable()
 
     # Imported here: a health check must not pay for the server and the kernels.
     import uvicorn

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from friction import Surrogate
-from friction.nondim import FIELDS, dimensional
+from friction.nondim import FIELDS, dimensional, evaluate_block
 from friction.regions import REGIMES, SOURCES
 from friction.surrogate import REGIME_OF_SOURCE
 from service import API_VERSION
-from service.compiled.block import evaluate_cases
+from service.compiled.block import mark_flaws
 from service.limits import groups, limits, power, stick_fraction
 from service.schemas import CaseRequest, Groups, InputStd, Limits, Power
 from service.shelf import LoadedTable
@@ -62,7 +62,7 @@ class Cases:
     columns: list[Array]
     flaws: NDArray[np.uint8]
     names: NDArray[np.int64] | None = None
-    text: bytearray = field(default_factory=bytearray)
+    text: NDArray[np.uint8] | None = None
     listed: bool = True
 
 
@@ -70,10 +70,11 @@ class Cases:
 class Answers:
     """Answers to a batch, order kept: NaN, and -1 in ``source``, where ``flaws`` is not 0.
 
-    ``extras`` holds what was included: an array, or a mapping of arrays, a name.
+    ``extras`` holds what was included: an array, or a mapping of arrays, a name.  ``cases`` is what locates a fault;
+    who writes the answers lets go of it before the first byte.
     """
 
-    cases: Cases
+    cases: Cases | None
     size: int
     mu_macro: Array
     mu_ratio: Array
@@ -140,13 +141,13 @@ def _read_only(column: Array) -> Array:
 def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: InputStd | None = None) -> Answers:
     """Answer every good case; a bad one gets NaN and its code in ``flaws``.  Runs without the interpreter's lock."""
     n = cases.size
-    mu_macro, mu_ratio, bound, v_tilde, y_tilde = (np.empty(n) for _ in range(5))
+    mu_macro, mu_ratio, bound = (np.empty(n) for _ in range(3))
     source = np.empty(n, dtype=np.int8)
     mu0, fz, k, y0, omega, v0 = map(_read_only, cases.columns)
     a, b, c, d = table.arrays
-    n_bad = evaluate_cases(
-        *(mu0, fz, k, y0, omega, v0), a, b, c, d, mu_macro, mu_ratio, bound, source, v_tilde, y_tilde, cases.flaws
-    )
+    n_bad = evaluate_block(mu0, fz, k, y0, omega, v0, a, b, c, d, mu_macro, mu_ratio, bound, source)
+    if n_bad or cases.flaws.any():
+        n_bad = mark_flaws(mu0, fz, k, y0, omega, v0, mu_macro, mu_ratio, bound, source, cases.flaws)
     answers = Answers(cases, n, mu_macro, mu_ratio, bound, source, cases.flaws, n_bad)
     if include:
         answers.extras = _batch_extras(table.surrogate, cases, include, std)

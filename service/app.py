@@ -25,14 +25,14 @@ from service.drain import draining
 from service.errors import answer_problem
 from service.logs import AccessLog
 from service.metrics import Metrics
-from service.middleware import HEALTH_PATHS, ApiKeyGate, BodyLimit, RequestRecord
+from service.middleware import HEALTH_PATHS, ApiKeyGate, BodyLimit, Compression, RequestRecord
 from service.openapi import install
 from service.routes import batch, docs, health, inverse, law, mu_macro, page, table, umbridge
 from service.routes import metrics as metrics_route
 from service.routes.batch import BatchEndpoint
 from service.settings import Settings, load_settings, unknown_variables
 from service.shelf import Shelf
-from service.warm import prepare
+from service.warm import prepare, settle_memory
 from service.wire import Application, ShortWay
 
 __all__ = ["create_app"]
@@ -57,6 +57,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         state.metrics.start([table.label for table in state.shelf.tables])
         state.access_log.start()
         state.batches.start(threads)
+        settle_memory()
         tasks = [asyncio.create_task(sweep(settings.client_timeout_s)), asyncio.create_task(state.metrics.share())]
         with draining(state.shelf, settings.drain_s):
             yield
@@ -93,6 +94,7 @@ def create_app(settings: Settings | None = None) -> Application:
             Middleware(RequestRecord, metrics=metrics, log=access_log),
             Middleware(ApiKeyGate, key=key, open_paths=_OPEN_PATHS),
             Middleware(BodyLimit, max_bytes=settings.max_body_bytes),
+            Middleware(Compression),
         ],
     )
     app.state.settings = settings

@@ -28,7 +28,7 @@ _SLICE = 65536  # cases of a record batch of the answer
 
 
 def answer_arrow(
-    body: bytearray, table: LoadedTable, options: Options, max_batch: int, count: Count
+    body: NDArray[np.uint8], table: LoadedTable, options: Options, max_batch: int, count: Count
 ) -> Iterator[bytes]:
     """Answer a stream, order kept; what is yielded is a stream again.
 
@@ -67,11 +67,11 @@ class _Sink:
     closed = False
 
     def __init__(self) -> None:
-        self._pieces: list[bytes] = []
+        self._pieces: list[Any] = []
 
     def write(self, piece: Any) -> int:
         """Keep a piece."""
-        self._pieces.append(bytes(piece))
+        self._pieces.append(piece)
         return len(piece)
 
     def flush(self) -> None:
@@ -86,7 +86,7 @@ class _Sink:
         return b"".join(pieces)
 
 
-def _read(body: bytearray) -> tuple[list[Any], Any]:
+def _read(body: NDArray[np.uint8]) -> tuple[list[Any], Any]:
     try:
         with pa.ipc.open_stream(pa.py_buffer(body)) as reader:
             batches = list(reader)

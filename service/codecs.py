@@ -5,7 +5,9 @@ different lengths, a bad plain number that would hold for every case.  A bad ent
 Cases go from text to arrays and back in compiled loops; Python objects are made for names, options and faults only.
 """
 
+import mmap
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
@@ -27,7 +29,7 @@ from service.compiled.block import (
     write_numbers,
     write_rows,
 )
-from service.compiled.digits import TEXT_WIDTH, Bytes
+from service.compiled.digits import PADDING, TEXT_WIDTH, Bytes
 from service.compiled.scan import (
     DEEP,
     FULL,
@@ -51,12 +53,25 @@ from service.errors import (
 )
 from service.intake import KNOWN_FIELDS
 
-__all__ = ["MAX_ERRORS", "columns_text", "encode", "is_rows", "read_batch", "row_text", "rows_text", "terminated"]
+__all__ = [
+    "MAX_ERRORS",
+    "columns_text",
+    "encode",
+    "is_rows",
+    "lines_text",
+    "read_batch",
+    "room_for",
+    "row_text",
+    "rows_text",
+    "terminated",
+]
 
 MAX_ERRORS = 1000
 _REQUIRED = tuple(name for name in FIELDS if name != "k")
 _NOT_A_NUMBER = "must be a number"
 _SLICE = 8192  # cases that are written at a time: about half a millisecond
+_MAPPED_FROM = 1024 * 1024
+_PRIVATE: dict[str, Any] = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
 _MAX_OPTION = 64 * 1024  # bytes of a value that is neither a column nor a number
 _NAME = re.compile(rb'"(?:[^"\\\x00-\x1f]|\\.)*"')
 
@@ -69,44 +84,59 @@ def encode(values: Mapping[str, Any]) -> bytes:
 # --- reading ------------------------------------------------------------------------------------------
 
 
-def terminated(body: bytes | bytearray) -> tuple[bytearray, Bytes]:
-    """The text with the 0 byte that stops every scan, as Python's and as numpy's; without a copy of a bytearray."""
+def room_for(length: int) -> Bytes:
+    """Room for a text of so many bytes, with the 0 bytes behind it that stop every scan.
+
+    Large ones are mapped: numpy would ask for huge pages, and while the system gathers one of those, which can take
+    many milliseconds, the thread that fills the room answers nobody.
+    """
+    if length >= _MAPPED_FROM:
+        return np.frombuffer(mmap.mmap(-1, length + PADDING, **_PRIVATE), dtype=np.uint8)
+    text = np.empty(length + PADDING, dtype=np.uint8)
+    text[length:] = 0
+    return text
+
+
+def terminated(body: bytes | bytearray) -> Bytes:
+    """The text with the 0 bytes that stop every scan; without a copy of a bytearray."""
     text = body if isinstance(body, bytearray) else bytearray(body)
-    text.append(0)
-    return text, np.frombuffer(text, dtype=np.uint8)
+    text += bytes(PADDING)
+    return np.frombuffer(text, dtype=np.uint8)
 
 
-def is_rows(text: bytearray) -> bool:
+def is_rows(text: Bytes) -> bool:
     """Whether the text is a list."""
-    return text.lstrip(b" \t\r\n")[:1] == b"[" if text[:1].isspace() else text[:1] == b"["
+    return bool(text[skip_space(text, 0)] == ord("["))
 
 
-def read_batch(text: bytearray, view: Bytes, max_batch: int) -> tuple[Cases, dict[str, Any]]:
-    """Read a batch in either form.  For columns, return ``include``, ``tolerance`` and ``std`` as they stand there.
+def read_batch(text: Bytes, max_batch: int) -> tuple[Cases, dict[str, Any]]:
+    """Read a batch in either form from a text that ends in 0 bytes.
+
+    For columns, return ``include``, ``tolerance`` and ``std`` as they stand there.
 
     Raises
     ------
     MalformedBodyError, InvalidFieldsError, BatchTooLargeError
         See the module's docstring; too many cases.
     """
-    i = skip_space(view, 0)
-    first = view[i]
+    i = skip_space(text, 0)
+    first = text[i]
     if first == ord("["):
-        cases, end = _read_rows(text, view, i + 1, max_batch)
+        cases, end = _read_rows(text, i + 1, max_batch)
         options: dict[str, Any] = {}
     elif first == ord("{"):
-        columns, end = _read_columns(text, view, i, max_batch)
-        _expect_end(view, end, len(text))
+        columns, end = _read_columns(text, i, max_batch)
+        _expect_end(text, end, len(text))
         cases, options = _columns(columns)
     else:
-        end, state = skip_value(view, i)
+        end, state = skip_value(text, i)
         if state != SOUND:
             raise _unreadable(state, end)
-        _expect_end(view, end, len(text))
+        _expect_end(text, end, len(text))
         value = _small_value(text, i, end)
         fault = FieldFault("body", "must be an object of columns or a list of rows", value, path=())
         raise InvalidFieldsError("the body must be an object of columns or a list of rows", [fault])
-    _expect_end(view, end, len(text))
+    _expect_end(text, end, len(text))
     return cases, options
 
 
@@ -115,9 +145,9 @@ def _unreadable(state: int, where: int) -> MalformedBodyError:
     return MalformedBodyError(f"the body is not JSON: {reason} at byte {where}")
 
 
-def _expect_end(view: Bytes, end: int, length: int) -> None:
-    i = skip_space(view, end)
-    if i != length - 1:
+def _expect_end(text: Bytes, end: int, length: int) -> None:
+    i = skip_space(text, end)
+    if i != length - PADDING:
         raise _unreadable(SOUND, i)
 
 
@@ -125,7 +155,7 @@ def _too_large(max_batch: int) -> BatchTooLargeError:
     return BatchTooLargeError(f"a batch may have up to {max_batch} cases, this one has more", max_batch=max_batch)
 
 
-def _read_rows(text: bytearray, view: Bytes, i: int, max_batch: int) -> tuple[Cases, int]:
+def _read_rows(text: Bytes, i: int, max_batch: int) -> tuple[Cases, int]:
     capacity = min(max_batch, len(text) // 2 + 1)
     words = np.empty((6, capacity), dtype=np.uint64)
     flaws = np.empty(capacity, dtype=np.uint8)
@@ -133,7 +163,7 @@ def _read_rows(text: bytearray, view: Bytes, i: int, max_batch: int) -> tuple[Ca
     hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
     count = waiting = 0
     while True:
-        i, count, waiting, state = read_rows(view, i, words, flaws, names, count, hard, waiting)
+        i, count, waiting, state = read_rows(text, i, words, flaws, names, count, hard, waiting)
         for case, field, start, end in hard[:waiting].tolist():
             if words[field, case] == LONG:
                 words[field, case] = _long_number(text, start, end)
@@ -148,12 +178,12 @@ def _read_rows(text: bytearray, view: Bytes, i: int, max_batch: int) -> tuple[Ca
     return Cases(count, columns, flaws[:count], names, text), i
 
 
-def _read_list(text: bytearray, view: Bytes, i: int, nullable: bool, max_batch: int) -> tuple[NDArray[np.float64], int]:
+def _read_list(text: Bytes, i: int, nullable: bool, max_batch: int) -> tuple[NDArray[np.float64], int]:
     column = np.empty(min(max_batch, (len(text) - i) // 2 + 1), dtype=np.uint64)
     hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
     count = waiting = 0
     while True:
-        i, count, waiting, state = read_list(view, i, column, count, nullable, hard, waiting)
+        i, count, waiting, state = read_list(text, i, column, count, nullable, hard, waiting)
         for case, _, start, end in hard[:waiting].tolist():
             column[case] = _long_number(text, start, end)
         waiting = 0
@@ -166,54 +196,54 @@ def _read_list(text: bytearray, view: Bytes, i: int, nullable: bool, max_batch: 
     return column[:count].view(np.float64), i
 
 
-def _long_number(text: bytearray, start: int, end: int) -> np.uint64:
-    value = np.float64(text[start:end].decode("ascii"))
+def _long_number(text: Bytes, start: int, end: int) -> np.uint64:
+    value = np.float64(text[start:end].tobytes().decode("ascii"))
     return value.view(np.uint64) if np.isfinite(value) else OUT_OF_BOUNDS
 
 
-def _small_value(text: bytearray, start: int, end: int) -> Any:
+def _small_value(text: Bytes, start: int, end: int) -> Any:
     """The value of text[start:end], or one of its kind if it is long: it is wanted for a message, or is an option."""
     if end - start > _MAX_OPTION:
-        return {ord("["): [], ord("{"): {}}.get(text[start], "a long value")
+        return {ord("["): [], ord("{"): {}}.get(int(text[start]), "a long value")
     try:
-        return from_json(bytes(text[start:end]))
+        return from_json(text[start:end].tobytes())
     except ValueError as error:
         if str(error).startswith("number out of range"):
             return 10**400
         raise MalformedBodyError(f"the body is not JSON: {error}") from None
 
 
-def _read_columns(text: bytearray, view: Bytes, i: int, max_batch: int) -> tuple[dict[str, Any], int]:
+def _read_columns(text: Bytes, i: int, max_batch: int) -> tuple[dict[str, Any], int]:
     columns: dict[str, Any] = {}
-    i = skip_space(view, i + 1)
-    if view[i] == ord("}"):
+    i = skip_space(text, i + 1)
+    if text[i] == ord("}"):
         return columns, i + 1
     while True:
-        name = _NAME.match(text, i)
+        name = _NAME.match(text.data, i)
         if name is None:
             raise _unreadable(SOUND, i)
         try:
             key = orjson.loads(name[0])
         except ValueError:
             raise _unreadable(SOUND, i) from None
-        i = skip_space(view, name.end())
-        if view[i] != ord(":"):
+        i = skip_space(text, name.end())
+        if text[i] != ord(":"):
             raise _unreadable(SOUND, i)
-        i = skip_space(view, i + 1)
-        if view[i] == ord("[") and key in FIELDS:
-            columns[key], i = _read_list(text, view, i + 1, key == "k", max_batch)
+        i = skip_space(text, i + 1)
+        if text[i] == ord("[") and key in FIELDS:
+            columns[key], i = _read_list(text, i + 1, key == "k", max_batch)
         else:
-            end, state = skip_value(view, i)
+            end, state = skip_value(text, i)
             if state != SOUND:
                 raise _unreadable(state, end)
             columns[key] = _small_value(text, i, end)
             i = end
-        i = skip_space(view, i)
-        if view[i] == ord("}"):
+        i = skip_space(text, i)
+        if text[i] == ord("}"):
             return columns, i + 1
-        if view[i] != ord(","):
+        if text[i] != ord(","):
             raise _unreadable(SOUND, i)
-        i = skip_space(view, i + 1)
+        i = skip_space(text, i + 1)
 
 
 def _columns(body: dict[str, Any]) -> tuple[Cases, dict[str, Any]]:
@@ -273,7 +303,7 @@ def _words(names: tuple[str, ...]) -> tuple[Bytes, NDArray[np.int64]]:
     """The names as JSON strings, one behind the other, and where each begins."""
     texts = [orjson.dumps(name) for name in names]
     ends = np.cumsum([0, *map(len, texts)]).astype(np.int64)
-    return np.frombuffer(b"".join(texts), dtype=np.uint8).copy(), ends
+    return np.frombuffer(b"".join(texts) + bytes(PADDING), dtype=np.uint8).copy(), ends
 
 
 _SOURCE_NAMES = tuple(SOURCES)
@@ -282,9 +312,20 @@ _NAME_WIDTH = max(map(len, (*_SOURCE_NAMES, *_REGIME_NAMES))) + 3
 
 
 def columns_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
-    """Write the answers as an object of lists, piece by piece."""
+    """Write the answers as an object of lists, piece by piece.  Lets go of the cases."""
+    return _columns_pieces(answers, _closing(answers, signature))
+
+
+def _closing(answers: Answers, signature: Mapping[str, Any]) -> bytes:
+    """The end of an answer: faults and signature.  Nothing of the cases is needed after it."""
+    text = encode({**errors_of(answers), **signature})[1:]
+    answers.cases = None
+    return text
+
+
+def _columns_pieces(answers: Answers, closing: bytes) -> Iterator[bytes]:
     opening = b"{"
-    room = np.empty(_SLICE * max(TEXT_WIDTH + 1, _NAME_WIDTH), dtype=np.uint8)
+    room = np.empty(_SLICE * max(TEXT_WIDTH + 1, _NAME_WIDTH) + PADDING, dtype=np.uint8)
     for key, column in _default_columns(answers):
         yield opening + b'"' + key.encode() + b'":['
         yield from _list_text(room, column, key)
@@ -301,7 +342,7 @@ def columns_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[byt
             yield opening + orjson.dumps(name) + b":["
             yield from _list_text(room, group, name)
             opening = b"],"
-    yield opening + encode({**errors_of(answers), **signature})[1:]
+    yield opening + closing
 
 
 def _default_columns(answers: Answers) -> list[tuple[str, NDArray[Any]]]:
@@ -326,7 +367,30 @@ def _list_text(room: Bytes, column: NDArray[Any], key: str) -> Iterator[bytes]:
 
 
 def rows_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
-    """Write the answers as a list of objects, piece by piece."""
+    """Write the answers as a list of objects, piece by piece.  Lets go of the cases."""
+    return _rows_pieces(answers, _closing(answers, signature))
+
+
+def _rows_pieces(answers: Answers, closing: bytes) -> Iterator[bytes]:
+    yield b'{"results":['
+    for start, text in _objects(answers, b"}", b","):
+        yield text[:-1] if start + _SLICE >= answers.size else text
+    yield b"]," + closing
+
+
+def lines_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[tuple[int, bytes]]:
+    """Write the answers as objects, each on a line of its own, null for a bad case; with the index of each piece."""
+    return _objects(answers, b"," + encode(signature)[1:], b"\n")
+
+
+def row_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
+    """Write the answer to one good case as an object: plain numbers that are bad refuse what they stand in."""
+    for _, text in lines_text(answers, signature):
+        yield text[:-1]
+
+
+def _objects(answers: Answers, end: bytes, behind: bytes) -> Iterator[tuple[int, bytes]]:
+    """Index of the first case, and objects with ``behind`` behind each of them."""
     numbers = [answers.mu_macro, answers.mu_ratio, answers.error_bound]
     pieces = [b'{"mu_macro":', b',"mu_ratio":', b',"regime":', b',"error_bound":', b',"source":']
     closing = b""
@@ -342,28 +406,17 @@ def rows_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]
             pieces.append(closing + b"," + orjson.dumps(name) + b":")
             numbers.append(group)
             closing = b""
-    pieces.append(closing + b"}")
-    text = np.frombuffer(b"".join(pieces), dtype=np.uint8).copy()
+    pieces.append(closing + end)
+    text = np.frombuffer(b"".join(pieces) + bytes(PADDING), dtype=np.uint8).copy()
     ends = np.cumsum([0, *map(len, pieces)]).astype(np.int64)
     width = text.size + len(numbers) * TEXT_WIDTH + 2 * _NAME_WIDTH
-    step = min(_SLICE, answers.size)
-    room = np.empty(max(step, 1) * width, dtype=np.uint8)
-    yield b'{"results":['
+    room = np.empty(min(_SLICE, answers.size) * width + PADDING, dtype=np.uint8)
+    names = (*_words(_REGIME_NAMES), *_words(_SOURCE_NAMES))
     for start in range(0, answers.size, _SLICE):
         part = slice(start, start + _SLICE)
         table = np.stack([column[part] for column in numbers])
-        flaws = answers.flaws[part]
-        end = write_rows(
-            room, 0, flaws, text, ends, table, answers.source[part], *_words(_REGIME_NAMES), *_words(_SOURCE_NAMES)
-        )
-        yield room[: end - (start + flaws.size == answers.size)].tobytes()
-    yield b"]," + encode({**errors_of(answers), **signature})[1:]
-
-
-def row_text(answers: Answers, signature: Mapping[str, Any]) -> Iterator[bytes]:
-    """Write the answer to one good case as an object: plain numbers that are bad refuse what they stand in."""
-    text = b"".join(rows_text(answers, {}))
-    yield text[len(b'{"results":[') : text.rindex(b'],"errors"') - 1] + b"," + encode(signature)[1:]
+        last = write_rows(room, 0, answers.flaws[part], behind[0], text, ends, table, answers.source[part], *names)
+        yield start, room[:last].tobytes()
 
 
 def errors_of(answers: Answers) -> dict[str, Any]:
@@ -393,8 +446,10 @@ def _error(answers: Answers, index: int) -> dict[str, Any]:
 
 def _unknown_name(answers: Answers, index: int) -> str:
     cases = answers.cases
+    assert cases is not None  # noqa: S101  (faults are located before the cases are let go)
     assert cases.names is not None  # noqa: S101  (only rows can have an unknown name)
-    name = _NAME.match(cases.text, int(cases.names[index]))
+    assert cases.text is not None  # noqa: S101
+    name = _NAME.match(cases.text.data, int(cases.names[index]))
     try:
         return str(safe_value(orjson.loads(name[0] if name else b'""')))
     except ValueError:

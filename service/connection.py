@@ -6,14 +6,20 @@ callers are that server's business.
 
 import asyncio
 import time
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 from weakref import WeakSet
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from service.middleware import BATCH_PATH
 from service.wire import CASE_PATH, Application, ShortWay
 
-__all__ = ["Connection", "sweep"]
+__all__ = ["FILL", "Connection", "sweep"]
+
+#: extension of the protocol: puts the rest of a body where the application wants it, see Connection.fill
+FILL = "mumacro.fill"
 
 _EVERY_S = 1.0
 _open: "WeakSet[Connection]" = WeakSet()
@@ -30,6 +36,7 @@ class Connection(HttpToolsProtocol):
     owed_since = 0.0
     owed: object = None
     _short: ShortWay | None = None
+    _filling: "_Filling | None" = None
     _held: tuple[Any, Any] | None = None
     _date: tuple[Any, bytes] = (None, b"")
 
@@ -44,6 +51,8 @@ class Connection(HttpToolsProtocol):
     def _start_asgi_task(self, cycle: Any, app: Any) -> None:
         """Start the application, unless the rest of a short request is worth waiting for."""
         scope = cycle.scope
+        if scope["path"] == BATCH_PATH:
+            scope["extensions"] = {FILL: partial(self.fill, cycle)}
         if self._short is not None and scope["path"] == CASE_PATH and cycle is self.cycle and app is self.app:
             headers = dict(scope["headers"])
             if (
@@ -57,9 +66,39 @@ class Connection(HttpToolsProtocol):
                 return
         super()._start_asgi_task(cycle, app)
 
+    async def fill(self, cycle: Any, room: memoryview, start: int) -> bool:
+        """Put the rest of the body into ``room``, from ``start`` on; False if the caller leaves before all is there.
+
+        Raises
+        ------
+        ValueError
+            There is more than room.
+        """
+        filling = _Filling(cycle, room, start, asyncio.get_running_loop().create_future())
+        filling.put(cycle.body)
+        cycle.body = bytearray()
+        if cycle.disconnected or not cycle.more_body:
+            return not cycle.disconnected
+        self._filling = filling
+        self.flow.resume_reading()
+        try:
+            return await filling.done
+        finally:
+            self._filling = None
+
+    def on_body(self, body: bytes) -> None:
+        """Put a piece where it belongs."""
+        filling = self._filling
+        if filling is None or filling.cycle is not self.cycle:
+            super().on_body(body)
+        else:
+            filling.put(body)
+
     def on_message_complete(self) -> None:
         """Answer what was held back, or start the application after all."""
         super().on_message_complete()
+        if self._filling is not None and self._filling.cycle is self.cycle:
+            self._filling.end(whole=True)
         if self._held is not None:
             (cycle, headers), self._held = self._held, None
             if cycle.disconnected or not self._reply(cycle, headers):
@@ -103,6 +142,8 @@ class Connection(HttpToolsProtocol):
         """Leave them."""
         _open.discard(self)
         super().connection_lost(exc)
+        if self._filling is not None:
+            self._filling.end(whole=False)
 
     def pause_writing(self) -> None:
         """Note since when the caller does not read."""
@@ -125,6 +166,25 @@ class Connection(HttpToolsProtocol):
         if self.owed != owed:
             self.owed, self.owed_since = owed, now
         return now - self.owed_since > limit_s
+
+
+@dataclass
+class _Filling:
+    """A body on its way into the application's memory."""
+
+    cycle: Any
+    room: memoryview
+    end_of_text: int
+    done: "asyncio.Future[bool]"
+
+    def put(self, piece: bytes | bytearray) -> None:
+        end = self.end_of_text + len(piece)
+        self.room[self.end_of_text : end] = piece
+        self.end_of_text = end
+
+    def end(self, whole: bool) -> None:
+        if not self.done.done():
+            self.done.set_result(whole)
 
 
 def _nothing() -> None:

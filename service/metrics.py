@@ -28,8 +28,9 @@ CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 FOLDER_VARIABLE = "_MUMACRO_METRICS_FOLDER"
 
 ROUTES = (
-    "/v1/mu-macro", "/v1/mu-macro/batch", "/v1/table", "/v1/table.nc", "/livez", "/readyz", "/healthz", "/metrics",
-    "/docs", "/openapi.json", "other",
+    "/v1/mu-macro", "/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/law.csv", "/v1/table", "/v1/table.nc",
+    "/Info", "/ModelInfo", "/InputSizes", "/OutputSizes", "/Evaluate", "/Gradient", "/ApplyJacobian", "/ApplyHessian",
+    "/livez", "/readyz", "/healthz", "/metrics", "/", "/docs", "/openapi.json", "other",
 )  # fmt: skip
 METHODS = ("GET", "HEAD", "POST", "other")
 STATUSES = (200, 206, 304, 400, 401, 404, 405, 408, 413, 415, 416, 422, 499, 500, 503, 0)

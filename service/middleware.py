@@ -1,13 +1,14 @@
 """Pure ASGI middleware: request record, API key, body limit.
 
 Written against the protocol itself: ``BaseHTTPMiddleware`` would cost a task and a queue per request.
-Outermost first: RequestRecord, ApiKeyGate, BodyLimit.
+Outermost first: RequestRecord, ApiKeyGate, BodyLimit, Compression.
 """
 
 import logging
 import secrets
 import time
 
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -15,9 +16,11 @@ from service.errors import BodyTooLargeError, UnauthorizedError, problem_of
 from service.logs import AccessLog, accept_request_id, request_id
 from service.metrics import Metrics
 
-__all__ = ["BATCH_PATH", "HEALTH_PATHS", "ApiKeyGate", "BodyLimit", "RequestRecord"]
+__all__ = ["BATCH_PATH", "COMPRESS_FROM", "HEALTH_PATHS", "ApiKeyGate", "BodyLimit", "Compression", "RequestRecord"]
 
 BATCH_PATH = "/v1/mu-macro/batch"
+#: bytes of an answer that is worth packing
+COMPRESS_FROM = 16 * 1024
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 
 _errors = logging.getLogger("mumacro.error")
@@ -143,3 +146,18 @@ class BodyLimit:
         return BodyTooLargeError(
             f"the body may have up to {self.max_bytes} bytes", headers={"Connection": "close"}, max_bytes=self.max_bytes
         )
+
+
+class Compression:
+    """Packs large answers for callers who want it, but never the table's file: it is packed, and its tag is that of
+    its bytes.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._plain = app
+        self._packing = GZipMiddleware(app, minimum_size=COMPRESS_FROM, compresslevel=1)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Run one request."""
+        packing = scope["type"] == "http" and scope["path"] != "/v1/table.nc"
+        await (self._packing if packing else self._plain)(scope, receive, send)

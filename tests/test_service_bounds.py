@@ -213,6 +213,57 @@ def test_short_requests_are_answered_while_a_large_batch_is(server, case):
     assert (status, len(json.loads(answer)["mu_macro"])) == (200, 1_000_000)
 
 
+def peak(server):
+    with open(f"/proc/{server.process.pid}/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmHWM")) * 1024
+
+
+def test_many_large_batches_at_once_hold_little_more_than_their_bodies(serving, surrogate, case):
+    places, n = 6, 100_000
+    rows = json.dumps([{**case, "v0": 1e-7 * i} for i in range(1, n + 1)]).encode()
+    assert len(rows) > 8_000_000
+    with serving(surrogate.path, MUMACRO_MAX_BATCHES=str(places)) as server:
+        base = peak(server)
+        statuses = []
+
+        def ask():
+            statuses.append(server.ask("POST", BATCH, rows, {"Content-Type": "application/json"})[0])
+
+        askers = [threading.Thread(target=ask) for _ in range(places)]
+        for asker in askers:
+            asker.start()
+        for asker in askers:
+            asker.join()
+        assert statuses == [200] * places
+        # A case takes 90 bytes of text, 56 while it is evaluated, 33 until its answer is sent.
+        assert peak(server) - base < places * (len(rows) + 90 * n) + 20_000_000
+
+
+@pytest.mark.parametrize("step", [1000, 65_536, 300_000])
+def test_a_body_is_read_whole_in_pieces_of_any_size_and_after_leave_to_send_it(server, case, step):
+    n = 20_000
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, n + 1)]}).encode()
+    _, _, expected = server.ask("POST", BATCH, body, {"Content-Type": "application/json"})
+    with connect(server) as raw:
+        raw.sendall(head(BATCH, len(body), extra="Expect: 100-continue\r\n"))
+        assert raw.recv(65536).startswith(b"HTTP/1.1 100")
+        for start in range(0, len(body), step):
+            raw.sendall(body[start : start + step])
+        reply = http.client.HTTPResponse(raw, method="POST")
+        reply.begin()
+        assert (reply.status, reply.read()) == (200, expected)
+
+
+def test_a_caller_who_leaves_in_the_middle_of_a_body_frees_its_place(server, case):
+    for _ in range(3):  # one more than there are places
+        with connect(server) as raw:
+            raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * 300_000)
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 20_001)]})
+    deadline = time.monotonic() + PATIENCE_S
+    while server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] != 200:
+        assert time.monotonic() < deadline
+
+
 def test_a_third_batch_is_turned_away_unread(server, case):
     held = [connect(server) for _ in range(2)]
     for raw in held:

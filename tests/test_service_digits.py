@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from service.compiled.digits import HARD, NUMBER, OUT_OF_RANGE, TEXT_WIDTH, read_number, write_number
+from service.compiled.digits import HARD, NUMBER, OUT_OF_RANGE, PADDING, TEXT_WIDTH, read_number, write_number
 
 
 @njit
@@ -29,7 +29,7 @@ def write_all(out, values, ends):
 
 
 def read(text):
-    bits, end, kind = read_number(np.frombuffer(text.encode() + b"\0", dtype=np.uint8), 0)
+    bits, end, kind = read_number(np.frombuffer(text.encode() + bytes(PADDING), dtype=np.uint8), 0)
     return float(np.uint64(bits).view(np.float64)), end, kind
 
 
@@ -65,7 +65,7 @@ def test_a_double_is_written_as_short_as_python_writes_it_and_read_back(index):
     texts = written(values)
     assert texts == [plain(repr(value)) for value in values.tolist()]
     bits, kinds = np.zeros(values.size, dtype=np.uint64), np.zeros(values.size, dtype=np.int64)
-    read_all(np.frombuffer(",".join(texts).encode() + b"\0", dtype=np.uint8), values.size, bits, kinds)
+    read_all(np.frombuffer(",".join(texts).encode() + bytes(PADDING), dtype=np.uint8), values.size, bits, kinds)
     assert not kinds.any()
     assert np.array_equal(bits, values.view(np.uint64))
 
@@ -76,7 +76,7 @@ def test_a_text_of_any_length_is_read_to_the_nearest_double(form):
     values = rng.uniform(0, 10, 50_000) * 10.0 ** (rng.integers(-300, 300, 50_000) if "e" in form else 3)
     texts = [format(value, form) for value in values.tolist()]
     bits, kinds = np.zeros(values.size, dtype=np.uint64), np.zeros(values.size, dtype=np.int64)
-    read_all(np.frombuffer(",".join(texts).encode() + b"\0", dtype=np.uint8), values.size, bits, kinds)
+    read_all(np.frombuffer(",".join(texts).encode() + bytes(PADDING), dtype=np.uint8), values.size, bits, kinds)
     assert not kinds.any()
     assert bits.view(np.float64).tolist() == [float(text) for text in texts]
 

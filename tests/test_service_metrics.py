@@ -9,6 +9,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from starlette.testclient import TestClient
 
 from service.app import create_app
+from service.metrics import ROUTES
 from service.settings import Settings
 
 PATH = "/v1/mu-macro"
@@ -83,6 +84,10 @@ def test_the_longer_way_counts_the_same(fresh, case, surrogate):
     key = sorted((surrogate.id, answer.json()["source"], answer.json()["regime"]))
     assert found["mumacro_cases_total", *key] == 2  # what the caller had already was not computed again
     assert found["mumacro_requests_total", *sorted((PATH, "GET", "304"))] == 1
+
+
+def test_every_described_path_is_counted_by_its_name(fresh):
+    assert set(fresh.get("/openapi.json").json()["paths"]) < set(ROUTES)
 
 
 def test_counters_are_described_and_under_the_key(tables_dir, problem):

@@ -30,7 +30,7 @@ spaces = st.sampled_from([None, (",", ":"), (" , ", "\t:\n")])
 
 
 def scan(text):
-    return read_batch(*terminated(text if isinstance(text, bytes) else text.encode()), LIMIT)
+    return read_batch(terminated(text if isinstance(text, bytes) else text.encode()), LIMIT)
 
 
 def as_double(entry, nullable):
@@ -112,10 +112,10 @@ def test_the_last_of_a_repeated_name_holds():
 def test_many_long_numbers_are_read_exactly():
     texts = [f"0.{index}{'123456789' * 3}" for index in range(1, 3001)]
     body = f'{{"mu0":1,"Fz":1,"y0":1,"omega":1,"v0":[{",".join(texts)}]}}'
-    cases, _ = read_batch(*terminated(body.encode()), 5000)
+    cases, _ = read_batch(terminated(body.encode()), 5000)
     assert cases.columns[5].tolist() == [float(text) for text in texts]
     body = "[" + ",".join(f'{{"v0":{text},"mu0":{text}}}' for text in texts) + "]"
-    cases, _ = read_batch(*terminated(body.encode()), 5000)
+    cases, _ = read_batch(terminated(body.encode()), 5000)
     assert cases.columns[0].tolist() == cases.columns[5].tolist() == [float(text) for text in texts]
 
 
@@ -142,7 +142,7 @@ for text in (good, columns):
     for end in range(len(text) + 1):
         for body in (text[:end], text[:end] + random.choice('[]{}":,\\\\0eE.-tfn') + text[end + 1:]):
             try:
-                read_batch(*terminated(body.encode()), 10)
+                read_batch(terminated(body.encode()), 10)
             except RequestError:
                 pass
 print("done")

@@ -250,6 +250,13 @@ def test_json_is_read_whatever_the_case_of_its_type(client, case, content_type):
     assert client.post(PATH, content=json.dumps(case), headers={"Content-Type": content_type}).status_code == 200
 
 
+def test_a_body_without_a_type_is_json(client, case):
+    # Some clients send none; the framework by itself would refuse such a body.
+    request = client.build_request("POST", PATH, content=json.dumps(case))
+    assert "content-type" not in request.headers
+    assert client.send(request).json() == client.post(PATH, json=case).json()
+
+
 def test_a_compressed_body_is_refused(client, problem):
     problem(client.post(PATH, content=b"\x1f\x8b", headers={"Content-Encoding": "gzip"}), 415)
 

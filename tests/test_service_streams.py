@@ -199,6 +199,15 @@ def test_an_arrow_batch_over_the_limit_is_refused(tables_dir, case, problem):
         assert problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 413)["max_batch"] == 3
 
 
+def test_arrow_is_refused_where_it_is_not_installed(tables_dir, case, problem, monkeypatch):
+    monkeypatch.setattr("service.routes.batch.find_spec", lambda _name: None)
+    with TestClient(create_app(Settings(tables=(tables_dir,)))) as client:
+        body = stream_of(pa.record_batch({name: [value] for name, value in case.items()}))
+        response = client.post(PATH, content=body, headers={"Content-Type": ARROW})
+        assert ARROW not in problem(response, 415)["detail"].split("not ")[0]
+        assert client.post(PATH, json=[case]).status_code == 200
+
+
 # --- compression --------------------------------------------------------------------------------------
 
 
@@ -218,6 +227,20 @@ def test_a_large_answer_is_compressed_where_that_is_wanted(client, case, offer, 
         assert len(raw) < len(plain) / 1.5
 
 
+def test_other_large_answers_are_compressed_but_not_the_file(client, case):
+    known = {name: value for name, value in case.items() if name != "v0"}
+    law = {**known, "along": "v0", "start": 1e-4, "stop": 1.0, "points": 2001}
+    for method, path, options in (("POST", "/v1/law", {"json": law}), ("GET", "/openapi.json", {})):
+        plain = client.request(method, path, headers={"Accept-Encoding": "identity"}, **options)
+        packed = client.request(method, path, headers={"Accept-Encoding": "gzip"}, **options)
+        assert "content-encoding" not in plain.headers
+        assert packed.headers["content-encoding"] == "gzip"
+        assert "accept-encoding" in packed.headers["vary"].lower()
+        assert packed.content == plain.content
+    # Packed already, and its tag is the tag of its bytes.
+    assert "content-encoding" not in client.get("/v1/table.nc", headers={"Accept-Encoding": "gzip"}).headers
+
+
 def test_a_small_answer_is_not_compressed(client, case):
     response = client.post(PATH, json=[case], headers={"Accept-Encoding": "gzip"})
     assert "content-encoding" not in response.headers
@@ -229,3 +252,53 @@ def test_a_stream_is_compressed_line_by_line(client, case):
     assert lines_of(client.post(PATH, content=body, headers={**LINES, "Accept-Encoding": "gzip"})) == lines_of(
         client.post(PATH, content=body, headers={**LINES, "Accept-Encoding": "identity"})
     )
+
+
+def test_lines_of_one_case_each_are_answered_alike_alone_and_together(client, case):
+    rows = [{**case, "v0": 1e-3 * i} for i in range(1, 100)]
+    lines = [json.dumps(row) for row in rows]
+    together = lines_of(client.post(PATH, content="\n".join(lines), headers=LINES))
+    alone = [lines_of(client.post(PATH, content=line, headers=LINES))[0] for line in lines]
+    assert together == alone == [client.post("/v1/mu-macro", json=row).json() for row in rows]
+    query = {"include": "groups,power"}
+    extended = lines_of(client.post(PATH, params=query, content="\n".join(lines), headers=LINES))
+    assert [answer["mu_macro"] for answer in extended] == [answer["mu_macro"] for answer in alone]
+    assert all(answer.keys() >= {"groups", "power", "table", "api_version"} for answer in extended)
+
+
+@pytest.mark.parametrize(
+    "odd", ['{"mu0":1', '{"a":{}}', "{},{}", '{"v0":2}', "[]", "{} {}", '{"include":["groups"]}', ""]
+)
+def test_an_odd_line_among_plain_ones_spoils_only_itself(client, case, odd):
+    good = json.dumps(case)
+    (expected,) = lines_of(client.post(PATH, content=good, headers=LINES))
+    answers = lines_of(client.post(PATH, content="\n".join([good, odd, good, good]), headers=LINES))
+    kept = [answer for answer in answers if "status" not in answer and "results" not in answer]
+    assert kept == [expected] * 3
+    assert len(answers) == (4 if odd else 3)
+
+
+def test_halves_of_objects_are_not_joined_over_lines(client, case):
+    first, second = json.dumps(case)[:20].rstrip(", "), json.dumps(case)[20:].lstrip(", ")
+    answers = lines_of(client.post(PATH, content=f"{first}\n{second}\n{json.dumps(case)}", headers=LINES))
+    assert [answer.get("status") for answer in answers] == [400, 400, None]
+
+
+def test_bad_lines_among_many_plain_ones_are_told_by_their_number(client, case):
+    n, bad = 3000, range(3, 3000, 7)
+    lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(n)]
+    for index in bad:
+        lines[index] = {**case, "v0": -1.0} if index % 2 else {**case, "speed": 1.0}
+    lines[1000] = {**case, "v0": [0.1, 0.2]}  # a block of columns that looks plain
+    answers = lines_of(client.post(PATH, content="\n".join(map(json.dumps, lines)), headers=LINES))
+    v0 = [1e-4 * (i + 1) for i in range(n)]
+    expected = client.post(PATH, json={**case, "v0": v0}).json()["mu_macro"]
+    assert len(answers) == n
+    for index, answer in enumerate(answers):
+        if index == 1000:
+            assert len(answer["mu_macro"]) == 2
+        elif index in bad:
+            assert (answer["status"], answer["instance"]) == (422, f"{PATH}#line={index + 1}")
+            assert answer["errors"][0]["field"] == ("v0" if index % 2 else "speed")
+        else:
+            assert answer["mu_macro"] == expected[index]

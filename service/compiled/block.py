@@ -1,18 +1,17 @@
-"""The compiled middle of a batch: columns -> answers and faults, answers -> text; without the interpreter's lock."""
+"""The compiled middle of a batch: faults, answers -> text; without the interpreter's lock."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from friction.nondim import dimensional
 from service.compiled.digits import Bytes, write_number
+from service.compiled.machine import inlined, load_eight, loop, store_eight
 from service.compiled.scan import MISSING, NOT_A_NUMBER
 
 __all__ = [
     "BOUND_FLAW",
     "MISSING_FLAW",
     "NUMBER_FLAW",
-    "evaluate_cases",
+    "mark_flaws",
     "write_names",
     "write_numbers",
     "write_rows",
@@ -26,7 +25,7 @@ Flaws = NDArray[np.uint8]
 MISSING_FLAW, NUMBER_FLAW, BOUND_FLAW = 10, 20, 30
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -> int:
     """First fault of a case that has one: what is missing before what is no number before what is out of bounds."""
     values = (mu0, fz, k, y0, omega, v0)
@@ -43,61 +42,42 @@ def _flaw(mu0: float, fz: float, k: float, y0: float, omega: float, v0: float) -
     return 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def evaluate_cases(
+@loop
+def mark_flaws(
     mu0: Array, fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
-    coef: Array, meta: Array, bcoef: Array, bmeta: Array,
-    mu_macro: Array, mu_ratio: Array, bound: Array, source: Codes, v_tilde: Array, y_tilde: Array, flaws: Flaws,
+    mu_macro: Array, mu_ratio: Array, bound: Array, source: Codes, flaws: Flaws,
 ) -> int:  # fmt: skip
-    """Answer n cases; return how many are bad.
+    """Give every bad case its code, NaN in the answers and -1 in ``source``; return how many are bad.
 
-    Columns have the size n, or 1 where one value holds for all; k = inf is rigid contact.  A bad case gets its code in
-    ``flaws`` unless it has one already, NaN in the answers and -1 in ``source``.
+    Columns have the size n, or 1 where one value holds for all.  A case is bad that has a code already, or that the
+    evaluation left without a source.
     """
     s0, s1, s2 = min(mu0.size - 1, 1), min(fz.size - 1, 1), min(k.size - 1, 1)
     s3, s4, s5 = min(y0.size - 1, 1), min(omega.size - 1, 1), min(v0.size - 1, 1)
     bad = 0
-    inf = np.inf
     for i in range(flaws.size):
-        a, b, c, d, e, f = mu0[i * s0], fz[i * s1], k[i * s2], y0[i * s3], omega[i * s4], v0[i * s5]
-        if (
-            flaws[i] == 0
-            and 0.0 < a < inf
-            and 0.0 < b < inf
-            and c > 0.0
-            and 0.0 <= d < inf
-            and 0.0 <= e < inf
-            and 0.0 <= f < inf
-        ):
-            mu, eps, code, v, y = dimensional(a, b, c, d, e, f, coef, meta, bcoef, bmeta)
-            mu_macro[i] = a * mu
-            mu_ratio[i] = mu
-            bound[i] = a * eps
-            source[i] = code
-            v_tilde[i] = v
-            y_tilde[i] = y
-        else:
+        if flaws[i] != 0 or source[i] < 0:
             bad += 1
             if flaws[i] == 0:
-                flaws[i] = _flaw(a, b, c, d, e, f)
+                flaws[i] = _flaw(mu0[i * s0], fz[i * s1], k[i * s2], y0[i * s3], omega[i * s4], v0[i * s5])
             mu_macro[i] = np.nan
             mu_ratio[i] = np.nan
             bound[i] = np.nan
             source[i] = -1
-            v_tilde[i] = np.nan
-            y_tilde[i] = np.nan
     return bad
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _copy(out: Bytes, p: int, text: Bytes, start: int, stop: int) -> int:
-    for i in range(start, stop):
-        out[p] = text[i]
-        p += 1
-    return p
+    """Copy text[start:stop] eight bytes at a time: up to seven behind the end are read and written, too."""
+    i = start
+    while i < stop:
+        store_eight(out, p + i - start, load_eight(text, i))  # type: ignore[call-arg]
+        i += 8
+    return p + stop - start
 
 
-@njit(cache=True, nogil=True)
+@loop
 def write_numbers(out: Bytes, p: int, values: Array) -> int:
     """Write the values with a comma behind each; null for what is not finite."""
     for i in range(values.size):
@@ -107,7 +87,7 @@ def write_numbers(out: Bytes, p: int, values: Array) -> int:
     return p
 
 
-@njit(cache=True, nogil=True)
+@loop
 def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np.int64]) -> int:
     """Write ``names[ends[c]:ends[c + 1]]`` of each code with a comma behind it; null for a negative code."""
     for i in range(codes.size):
@@ -122,11 +102,12 @@ def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np
     return p
 
 
-@njit(cache=True, nogil=True)
+@loop
 def write_rows(
     out: Bytes,
     p: int,
     flaws: Flaws,
+    behind: int,
     pieces: Bytes,
     piece_ends: NDArray[np.int64],
     numbers: NDArray[np.float64],
@@ -136,7 +117,7 @@ def write_rows(
     sources: Bytes,
     source_ends: NDArray[np.int64],
 ) -> int:
-    """Write one object a case with a comma behind it, null for a bad case.
+    """Write one object a case with the byte ``behind`` behind it, null for a bad case.
 
     ``pieces`` is the constant text: before mu_macro, mu_ratio, regime, error_bound and source, before each further
     number, and at the end.  ``numbers`` (columns, n): mu_macro, mu_ratio, error_bound, further numbers.
@@ -162,6 +143,6 @@ def write_rows(
                 p = write_number(out, p, numbers[j, i])
             last = piece_ends.size - 2
             p = _copy(out, p, pieces, piece_ends[last], piece_ends[last + 1])
-        out[p] = 44
+        out[p] = behind
         p += 1
     return p

@@ -2,13 +2,22 @@
 
 Reading is the algorithm of Eisel and Lemire (D. Lemire, "Number parsing at a gigabyte per second", Software: Practice
 and Experience 51, 2021), writing is Schubfach (R. Giulietti, "The Schubfach way to render doubles", 2020): the
-shortest text that reads back as the same number.  Text is a uint8 array that ends in a 0 byte, which is part of no
-JSON token: every loop here stops there at the latest.
+shortest text that reads back as the same number.  Text is a uint8 array that ends in PADDING 0 bytes, which are part
+of no JSON token: every loop here stops at the first of them at the latest.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from service.compiled.machine import (
+    inlined,
+    leading_zeros,
+    load_eight,
+    loop,
+    multiply_high,
+    store_eight,
+    trailing_zeros,
+)
 
 __all__ = [
     "HARD",
@@ -16,10 +25,10 @@ __all__ = [
     "NO_NUMBER",
     "NUMBER",
     "OUT_OF_RANGE",
+    "PADDING",
     "TEXT_WIDTH",
     "Bytes",
     "read_number",
-    "write_digits",
     "write_number",
 ]
 
@@ -30,12 +39,18 @@ Bytes = NDArray[np.uint8]
 NUMBER, OUT_OF_RANGE, HARD, NO_NUMBER, MALFORMED = 0, 1, 2, 3, 4
 #: bytes that :func:`write_number` writes at most
 TEXT_WIDTH = 25
+#: bytes of 0 that must stand behind a text: as many as are read at a time
+PADDING = 8
 
 _U = np.uint64
 _U0, _U1, _U2, _U3, _U4, _U10, _U11 = _U(0), _U(1), _U(2), _U(3), _U(4), _U(10), _U(11)
 _S52, _S53, _S63, _S64 = _U(52), _U(53), _U(63), _U(64)
 _U40, _U100 = _U(40), _U(100)
-_LOW32, _S32 = _U(0xFFFFFFFF), _U(32)
+_S32, _U8, _U16 = _U(32), _U(8), _U(16)
+_HIGH_NIBBLES, _SIXES, _ALL_DIGITS = _U(0xF0F0F0F0F0F0F0F0), _U(0x0606060606060606), _U(0x3333333333333333)
+_ZEROS, _PAIRS_LOW = _U(0x3030303030303030), _U(0x000000FF000000FF)
+_PLACES = np.array([10**n for n in range(9)], dtype=np.uint64)
+_TIMES_LOW, _TIMES_HIGH = _U(0x000F424000000064), _U(0x0000271000000001)  # 10^6 and 100, 10^4 and 1
 _HIDDEN, _FRACTION, _EXPONENT = _U(1 << 52), _U((1 << 52) - 1), _U(0x7FF)
 _MASK9 = _U(0x1FF)
 
@@ -73,36 +88,49 @@ def _powers_of_ten() -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
 
 _FIVE_HIGH, _FIVE_LOW = _powers_of_five()
 _TEN_HIGH, _TEN_LOW = _powers_of_ten()
-_PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).copy()
+_MOST = 17  # digits that a double needs at most
+_TENS = np.array([10**n for n in range(20)], dtype=np.uint64)
+_TEN8, _TEN16, _U10000, _U48 = _U(10**8), _U(10**16), _U(10000), _U(48)
+# n * 10486 >> 20 is n // 100 for n < 10^4, and n * 103 >> 10 is n // 10 for n < 100
+_U10486, _U103, _S20 = _U(10486), _U(103), _U(20)
+_HUNDREDS, _TENTHS = _U(0x0000007F0000007F), _U(0x000F000F000F000F)
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _high(a: np.uint64, b: np.uint64) -> np.uint64:
     """Upper 64 bits of the product."""
-    a0, a1, b0, b1 = a & _LOW32, a >> _S32, b & _LOW32, b >> _S32
-    low, cross, other = a0 * b0, a1 * b0, a0 * b1
-    middle = (low >> _S32) + (cross & _LOW32) + (other & _LOW32)
-    return a1 * b1 + (cross >> _S32) + (other >> _S32) + (middle >> _S32)
+    upper: np.uint64 = multiply_high(a, b)  # type: ignore[call-arg]  # numba supplies the typing context
+    return upper
 
 
-@njit(cache=True, nogil=True)
-def _leading_zeros(w: np.uint64) -> int:
-    n = 0
-    for step in (32, 16, 8, 4, 2, 1):
-        if w >> _U(64 - step) == _U0:
-            n += step
-            w = w << _U(step)
-    return n
+@inlined
+def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
+    """(w followed by the digits at ``i`` as a number, index behind them); eight at a time, no branch for the rest."""
+    while True:
+        eight: np.uint64 = load_eight(text, i)  # type: ignore[call-arg]
+        others = ((eight & _HIGH_NIBBLES) | (((eight + _SIXES) & _HIGH_NIBBLES) >> _U4)) ^ _ALL_DIGITS
+        count: int = trailing_zeros(others) >> 3
+        eight = eight - _ZEROS
+        if count < 8:
+            if count == 0:
+                return w, i
+            eight = eight << _U(64 - 8 * count)  # as if zeros stood in front
+        eight = eight * _U10 + (eight >> _U8)  # pairs of digits, in every other byte
+        eight = ((eight & _PAIRS_LOW) * _TIMES_LOW + ((eight >> _U16) & _PAIRS_LOW) * _TIMES_HIGH) >> _S32
+        w = w * _PLACES[count] + eight
+        i += count
+        if count < 8:
+            return w, i
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _double(w: np.uint64, q: int) -> np.uint64:
     """Bits of w 10^q, w > 0, rounded to nearest even; those of infinity when it is beyond range."""
     if q < _SMALLEST:
         return _U0
     if q > _LARGEST:
         return _EXPONENT << _S52
-    shift = _leading_zeros(w)
+    shift: int = leading_zeros(w)  # type: ignore[call-arg]
     w = w << _U(shift)
     row = q - _SMALLEST
     low, high = w * _FIVE_HIGH[row], _high(w, _FIVE_HIGH[row])
@@ -131,7 +159,7 @@ def _double(w: np.uint64, q: int) -> np.uint64:
     return (mantissa & _FRACTION) | (_U(exponent) << _S52)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _significant(text: Bytes, i: int, end: int) -> int:
     """Digits of the number in text[i:end] from the first that is not 0, up to its exponent."""
     count = 0
@@ -145,7 +173,7 @@ def _significant(text: Bytes, i: int, end: int) -> int:
     return count
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _matches(text: Bytes, i: int, word: bytes) -> bool:
     # One byte after another: the text's last 0 differs from every word, so nothing behind it is looked at.
     for j in range(len(word)):  # noqa: SIM110  (compiled code has no generators)
@@ -154,7 +182,7 @@ def _matches(text: Bytes, i: int, word: bytes) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@loop
 def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     """(bits of the double, index behind it, what it was) of the JSON number that begins at ``i``.
 
@@ -171,9 +199,7 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
         if 48 <= text[i] <= 57:
             return _U0, i, MALFORMED
     elif 49 <= c <= 57:
-        while 48 <= text[i] <= 57:
-            w = w * _U10 + _U(text[i] - 48)
-            i += 1
+        w, i = _digits(text, i, w)
     elif c == 78 and not negative and _matches(text, i, b"NaN"):
         return _U0, i + 3, OUT_OF_RANGE
     elif c == 73 and _matches(text, i, b"Infinity"):
@@ -184,9 +210,7 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     if text[i] == 46:
         i += 1
         first = i
-        while 48 <= text[i] <= 57:
-            w = w * _U10 + _U(text[i] - 48)
-            i += 1
+        w, i = _digits(text, i, w)
         if i == first:
             return _U0, i, MALFORMED
         q = first - i
@@ -214,7 +238,7 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     return bits, i, NUMBER
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
     y0 = high * c + _high(low, c)
     y1 = _high(high, c)
@@ -223,7 +247,7 @@ def _round_to_odd(high: np.uint64, low: np.uint64, c: np.uint64) -> np.uint64:
     return y1 | (_U1 if y0 > _U1 else _U0)
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
     """(digits, k) with the shortest digits 10^k that round to the positive, finite double of these bits."""
     fraction, biased = bits & _FRACTION, int((bits >> _S52) & _EXPONENT)
@@ -255,21 +279,39 @@ def _shortest(bits: np.uint64) -> tuple[np.uint64, int]:
     return (s + _U1 if middle > half or (middle == half and s & _U1 == _U1) else s), k
 
 
-@njit(cache=True, nogil=True)
-def write_digits(out: Bytes, p: int, value: np.uint64, count: int) -> int:
-    """Write ``value`` with ``count`` digits; return the index behind them."""
-    i = p + count
-    while i > p + 1:
-        pair = int(value % _U100) * 2
-        value = value // _U100
-        i -= 2
-        out[i], out[i + 1] = _PAIRS[pair], _PAIRS[pair + 1]
-    if i > p:
-        out[p] = np.uint8(48 + value)
-    return p + count
+@inlined
+def _eight_digits(value: np.uint64) -> np.uint64:
+    """The digits of a number below 10^8 as text, the first one lowest; halves, quarters and eighths side by side."""
+    x = value // _U10000 | (value % _U10000) << _S32
+    y = ((x * _U10486) >> _S20) & _HUNDREDS
+    x = y | (x - _U100 * y) << _U16
+    y = ((x * _U103) >> _U10) & _TENTHS
+    return (y | (x - _U10 * y) << _U8) + _ZEROS
 
 
-@njit(cache=True, nogil=True)
+@inlined
+def _write_all(out: Bytes, p: int, digits: np.uint64) -> None:
+    """Write all 17 digits of a number below 10^17, leading zeros, too."""
+    first, rest = digits // _TEN16, digits % _TEN16
+    out[p] = np.uint8(_U48 + first)
+    store_eight(out, p + 1, _eight_digits(rest // _TEN8))  # type: ignore[call-arg]
+    store_eight(out, p + 9, _eight_digits(rest % _TEN8))
+
+
+@loop
+def _write_exponent(out: Bytes, p: int, value: int) -> int:
+    """Write a number of up to three digits; return the index behind them."""
+    if value >= 100:
+        out[p] = np.uint8(48 + value // 100)
+        p += 1
+    if value >= 10:
+        out[p] = np.uint8(48 + value // 10 % 10)
+        p += 1
+    out[p] = np.uint8(48 + value % 10)
+    return p + 1
+
+
+@loop
 def write_number(out: Bytes, p: int, x: float) -> int:
     """Write one number, or null for what is not finite; return the index behind it."""
     bits = np.float64(x).view(np.uint64)
@@ -287,21 +329,19 @@ def write_number(out: Bytes, p: int, x: float) -> int:
     while digits % _U10 == _U0:
         digits = digits // _U10
         k += 1
-    count, bound = 1, _U10
-    while count < 19 and digits >= bound:
+    width: int = leading_zeros(digits)  # type: ignore[call-arg]
+    count = ((64 - width) * 1233) >> 12  # 1233/4096 is log10(2) to the accuracy that 64 bits need
+    if digits >= _TENS[count]:
         count += 1
-        bound = bound * _U10
+    digits = digits * _TENS[_MOST - count]
     point = count + k  # digits before the decimal point
     if 0 < point <= 16:
         if k >= 0:
-            p = write_digits(out, p, digits, count)
-            for _ in range(k):
-                out[p] = 48
-                p += 1
-            out[p], out[p + 1] = 46, 48
-            return p + 2
+            _write_all(out, p, digits)
+            out[p + point], out[p + point + 1] = 46, 48
+            return p + point + 2
         # write one place to the right, then move what belongs before the point
-        write_digits(out, p + 1, digits, count)
+        _write_all(out, p + 1, digits)
         for i in range(point):
             out[p + i] = out[p + i + 1]
         out[p + point] = 46
@@ -312,15 +352,14 @@ def write_number(out: Bytes, p: int, x: float) -> int:
         for _ in range(-point):
             out[p] = 48
             p += 1
-        return write_digits(out, p, digits, count)
-    if count == 1:
-        out[p] = np.uint8(48 + digits)
-        p += 1
-    else:
-        write_digits(out, p + 1, digits, count)
-        out[p] = out[p + 1]
-        out[p + 1] = 46
-        p += count + 1
+        _write_all(out, p, digits)
+        return p + count
+    _write_all(out, p + 1, digits)
+    out[p] = out[p + 1]
+    p += 1
+    if count > 1:
+        out[p] = 46
+        p += count
     out[p] = 101
     p += 1
     exponent = point - 1
@@ -328,4 +367,4 @@ def write_number(out: Bytes, p: int, x: float) -> int:
         out[p] = 45
         p += 1
         exponent = -exponent
-    return write_digits(out, p, _U(exponent), 3 if exponent >= 100 else 2 if exponent >= 10 else 1)
+    return _write_exponent(out, p, exponent)

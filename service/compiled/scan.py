@@ -6,10 +6,10 @@ is infinity: rigid contact.  Text ends in a 0 byte, where every loop stops.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from service.compiled.digits import HARD, MALFORMED, NO_NUMBER, NUMBER, OUT_OF_RANGE, Bytes, read_number
+from service.compiled.machine import inlined, loop
 
 __all__ = [
     "BROKEN",
@@ -50,11 +50,12 @@ NO_OBJECT, UNKNOWN = 1, 2
 #: how many long numbers a scan leaves to its caller at a time
 HARD_ROOM = 1024
 
-_DEPTH = 128
+_DEPTH = 128  # bits of two words
+_ONE, _TOP = np.uint64(1), np.uint64(63)
 _K = 2  # the field that may be null
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def skip_space(text: Bytes, i: int) -> int:
     """Index of the next byte that is not white space."""
     c = text[i]
@@ -64,7 +65,7 @@ def skip_space(text: Bytes, i: int) -> int:
     return i
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _skip_string(text: Bytes, i: int) -> int:
     """Index behind the string that begins at ``i``, or minus one minus where it is no string."""
     i += 1
@@ -88,7 +89,7 @@ def _skip_string(text: Bytes, i: int) -> int:
         i += 1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _skip_word(text: Bytes, i: int) -> int:
     """Index behind true, false or null, or minus one minus where it is none of them."""
     c = text[i]
@@ -104,7 +105,7 @@ def _skip_word(text: Bytes, i: int) -> int:
     return -1 - i
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _skip_leaf(text: Bytes, i: int) -> int:
     """Index behind a string, a number or a word, or minus one minus where it is none."""
     c = text[i]
@@ -116,10 +117,11 @@ def _skip_leaf(text: Bytes, i: int) -> int:
     return _skip_word(text, i)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def skip_value(text: Bytes, i: int) -> tuple[int, int]:
     """(index behind the JSON value at ``i``, SOUND), or (where, BROKEN or DEEP)."""
-    closing = np.empty(_DEPTH, dtype=np.uint8)
+    # What is open, one bit each, the innermost lowest: set for an object.
+    outer = inner = np.uint64(0)
     depth = 0
     while True:
         # a value is due at i
@@ -128,13 +130,16 @@ def skip_value(text: Bytes, i: int) -> tuple[int, int]:
         if opened:
             if depth == _DEPTH:
                 return i, DEEP
-            closing[depth] = c + 2
+            outer = (outer << _ONE) | (inner >> _TOP)
+            inner = (inner << _ONE) | np.uint64(c == 123)
             depth += 1
             i = skip_space(text, i + 1)
-            if text[i] == closing[depth - 1]:
+            opened = text[i] != c + 2
+            if not opened:
                 depth -= 1
                 i += 1
-                opened = False
+                inner = (inner >> _ONE) | (outer << _TOP)
+                outer = outer >> _ONE
         else:
             i = _skip_leaf(text, i)
             if i < 0:
@@ -145,15 +150,17 @@ def skip_value(text: Bytes, i: int) -> tuple[int, int]:
                 if depth == 0:
                     return i, SOUND
                 i = skip_space(text, i)
-                if text[i] == closing[depth - 1]:
+                if text[i] == (125 if inner & _ONE else 93):
                     depth -= 1
                     i += 1
+                    inner = (inner >> _ONE) | (outer << _TOP)
+                    outer = outer >> _ONE
                 elif text[i] == 44:
                     i = skip_space(text, i + 1)
                     break
                 else:
                     return i, BROKEN
-        if closing[depth - 1] == 125:
+        if inner & _ONE:
             if text[i] != 34:
                 return i, BROKEN
             i = _skip_string(text, i)
@@ -165,7 +172,7 @@ def skip_value(text: Bytes, i: int) -> tuple[int, int]:
             i = skip_space(text, i + 1)
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _read_entry(text: Bytes, i: int, nullable: bool) -> tuple[np.uint64, int, int]:
     """(bits, index behind the value at ``i``, NUMBER or HARD), or (0, where, MALFORMED or minus DEEP)."""
     bits, end, kind = read_number(text, i)
@@ -188,7 +195,7 @@ def _read_entry(text: Bytes, i: int, nullable: bool) -> tuple[np.uint64, int, in
     return NOT_A_NUMBER, end, NUMBER
 
 
-@njit(cache=True, nogil=True)
+@loop
 def read_list(
     text: Bytes, i: int, column: Words, count: int, nullable: bool, hard: Places, waiting: int
 ) -> tuple[int, int, int, int]:
@@ -227,7 +234,7 @@ def read_list(
         i = skip_space(text, i + 1)
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _field(text: Bytes, i: int, length: int) -> int:
     """Index among FIELDS of the name text[i:i+length], or -1."""
     c = text[i]
@@ -251,7 +258,7 @@ def _field(text: Bytes, i: int, length: int) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _read_row(
     text: Bytes, i: int, cases: Words, flaws: NDArray[np.uint8], names: Places, case: int, hard: Places, waiting: int
 ) -> tuple[int, int, int]:
@@ -300,7 +307,7 @@ def _read_row(
         i = skip_space(text, i + 1)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def read_rows(
     text: Bytes,
     i: int,

@@ -5,11 +5,11 @@ question has come, and so that no more of either is held than is being worked on
 """
 
 import asyncio
-import zlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import partial
+from importlib.util import find_spec
 from typing import TypeVar
 
 import numpy as np
@@ -21,20 +21,21 @@ from starlette.types import Message, Receive, Scope, Send
 from friction.errors import MumacroError
 from friction.regions import SOURCES
 from service.answers import Answers, answer_cases, signature
-from service.codecs import columns_text, is_rows, read_batch, row_text, rows_text, terminated
+from service.codecs import columns_text, is_rows, lines_text, read_batch, room_for, row_text, rows_text, terminated
+from service.compiled.digits import PADDING, Bytes
+from service.connection import FILL
 from service.errors import (
     BodyTooLargeError,
     MalformedBodyError,
     OverloadedError,
     RequestError,
-    SlowClientError,
-    TookTooLongError,
     problem_of,
 )
 from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
 from service.metrics import Metrics
-from service.middleware import BATCH_PATH
+from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.openapi import batch_bodies, describe_batch, option_parameters
+from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
 
@@ -43,36 +44,11 @@ __all__ = ["BatchEndpoint", "router"]
 router = APIRouter(tags=["answers"])
 T = TypeVar("T")
 
-_CLOSE = {"Connection": "close"}
-
-_SMALL = 64 * 1024  # bytes of a batch that is answered at once: it takes less than a millisecond
-_STREAM_SMALL = 256 * 1024
-_PIECE = 256 * 1024  # bytes that are handed to the connection at a time
-_COMPRESS_FROM = 16 * 1024
-
-
-class Budget:
-    """Time that is left for one request, and for the caller's next move."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._total = settings.time_limit_s
-        self._end = self._loop.time() + self._total
-        self.client_s = settings.client_timeout_s
-
-    async def client(self, move: Awaitable[T], deadline: float | None = None) -> T:
-        """Wait for the caller's move, until ``deadline`` or for as long as a caller may take."""
-        try:
-            async with asyncio.timeout_at(min(self._end, deadline or self.deadline())):
-                return await move
-        except TimeoutError:
-            if self._loop.time() >= self._end:
-                raise TookTooLongError(f"a batch may take up to {self._total} s", headers=_CLOSE) from None
-            raise SlowClientError(f"a caller may take up to {self.client_s} s", headers=_CLOSE) from None
-
-    def deadline(self) -> float:
-        """Until when a move that begins now has to be made."""
-        return self._loop.time() + self.client_s
+_SMALL = 64 * 1024  # bytes of a batch that needs no place
+_AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
+_FEW_LINES = 16
+_COUNTED = 65536  # cases that are counted at a time
+_SHORT_LINE = 1024  # bytes of one case on a line of its own
 
 
 class BatchEndpoint:
@@ -83,6 +59,8 @@ class BatchEndpoint:
         self._settings = settings
         self._metrics = metrics
         self._threads: ThreadPoolExecutor | None = None
+        self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
+        self._arrow_known = False
         self.running = 0
 
     def start(self, threads: ThreadPoolExecutor) -> None:
@@ -100,7 +78,7 @@ class BatchEndpoint:
             await send(message)
 
         try:
-            kind = media_type(request, (JSON, NDJSON, ARROW))
+            kind = media_type(request, self._kinds)
             options = options_from_query(request)
             budget = Budget(self._settings)
             given = request.headers.get("content-length", "")
@@ -121,7 +99,7 @@ class BatchEndpoint:
             yield
             return
         if self.running >= self._settings.max_batches:
-            raise OverloadedError(f"{self.running} large batches are being answered already", headers=_CLOSE)
+            raise OverloadedError(f"{self.running} large batches are being answered already", headers=CLOSE)
         self.running += 1
         try:
             yield
@@ -130,7 +108,7 @@ class BatchEndpoint:
 
     async def _run(self, size: int, work: Callable[[], T]) -> T:
         """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
-        if size <= _SMALL or self._threads is None:
+        if size <= _AT_ONCE or self._threads is None:
             return work()
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
@@ -139,42 +117,81 @@ class BatchEndpoint:
     async def _whole(
         self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget, kind: str, length: int
     ) -> None:
-        body = await self._body(length, receive, budget)
-        if not body:
+        body = await self._body(request.scope, length, receive, budget)
+        size = body.size - PADDING
+        if size == 0:
             raise MalformedBodyError("the body is empty")
-        size = len(body)
         if kind == ARROW:
-            from service.arrow import answer_arrow
-
             query, place = merged_options(query, {})
             table = self._shelf.pick(query.tolerance, place)
-            pieces = answer_arrow(body, table, query, self._settings.max_batch, self._count)
+            if not self._arrow_known:
+                size += _AT_ONCE  # into a thread, where the first one loads pyarrow
+            pieces = self._arrow_pieces(body, table, query)
         else:
-            pieces = await self._run(size, lambda: self._answer(body, query))
-        await self._send(request, send, kind, size, _gather(pieces), budget)
+            pieces = self._pieces(body, query)
+        del body  # or it would be held until the last piece is sent
+        await self._send(request, send, kind, size, gather(pieces), budget)
 
-    async def _body(self, length: int, receive: Receive, budget: Budget) -> bytearray:
-        body = bytearray()
+    async def _body(self, scope: Scope, length: int, receive: Receive, budget: Budget) -> Bytes:
+        """The body, with 0 bytes behind it.  Memory is taken as it comes in, not as it is announced."""
         limit = self._settings.max_body_bytes
         if length > limit:
-            raise BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
+            raise _body_too_large(limit)
         deadline = budget.deadline()
-        more = True
+        message = await self._message(receive, budget, deadline)
+        piece, more = message.get("body", b""), message.get("more_body", False)
+        if length >= 0 and len(piece) <= length:
+            text = room_for(length)
+            room = text.data
+            room[: len(piece)] = piece
+            filled = len(piece)
+            fill = scope.get("extensions", {}).get(FILL)
+            if more and fill is not None:
+                # the server below puts the rest in its place, instead of sending a message for every few kilobytes
+                if not await budget.client(fill(room, filled), deadline):
+                    raise ClientDisconnect
+                return text
+            while more:
+                message = await self._message(receive, budget, deadline)
+                piece, more = message.get("body", b""), message.get("more_body", False)
+                room[filled : filled + len(piece)] = piece
+                filled += len(piece)
+            text[filled:] = 0
+            return text
+        body = bytearray(piece)
         while more:
-            message = await budget.client(receive(), deadline)
-            if message["type"] != "http.request":
-                raise ClientDisconnect
+            if len(body) > limit:
+                raise _body_too_large(limit)
+            message = await self._message(receive, budget, deadline)
             body += message.get("body", b"")
             more = message.get("more_body", False)
-            if len(body) > limit:
-                raise BodyTooLargeError(f"the body may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
-        return body
+        if len(body) > limit:
+            raise _body_too_large(limit)
+        return terminated(body)
 
-    def _answer(self, body: bytes | bytearray, query: Options, *, line: bool = False) -> Iterator[bytes]:
-        """Answer one JSON text; what is returned writes it, piece by piece."""
-        text, view = terminated(body)
+    @staticmethod
+    async def _message(receive: Receive, budget: Budget, deadline: float) -> Message:
+        message = await budget.client(receive(), deadline)
+        if message["type"] != "http.request":
+            raise ClientDisconnect
+        return message
+
+    def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
+        """Answer one JSON text when the first piece is asked for."""
+        answered = self._answer(text, query)
+        del text
+        yield from answered
+
+    def _arrow_pieces(self, body: Bytes, table: LoadedTable, query: Options) -> Iterator[bytes]:
+        from service.arrow import answer_arrow
+
+        self._arrow_known = True
+        yield from answer_arrow(body[: body.size - PADDING], table, query, self._settings.max_batch, self._count)
+
+    def _answer(self, text: Bytes, query: Options, *, line: bool = False) -> Iterator[bytes]:
+        """Answer one JSON text, which ends in 0 bytes; what is returned writes it, piece by piece."""
         rows = is_rows(text)
-        cases, given = read_batch(text, view, self._settings.max_batch)
+        cases, given = read_batch(text, self._settings.max_batch)
         options, place = merged_options(query, given)
         table = self._shelf.pick(options.tolerance, place)
         answers = answer_cases(table, cases, options.include, options.std)
@@ -183,32 +200,42 @@ class BatchEndpoint:
             return row_text(answers, signature(table))
         return (rows_text if rows else columns_text)(answers, signature(table))
 
-    def _count(self, table: LoadedTable, answers: Answers) -> None:
-        by_source = np.bincount(answers.source + 1, minlength=len(SOURCES) + 1)[1:].tolist()
-        self._metrics.count_cases(table.metrics_place, by_source, answers.n_bad)
+    def _count(self, table: LoadedTable, answers: Answers, n_bad: int | None = None) -> None:
+        by_source = np.zeros(len(SOURCES) + 1, dtype=np.int64)
+        for start in range(0, answers.size, _COUNTED):  # it holds the lock
+            by_source += np.bincount(answers.source[start : start + _COUNTED] + 1, minlength=by_source.size)
+        self._metrics.count_cases(
+            table.metrics_place, by_source[1:].tolist(), answers.n_bad if n_bad is None else n_bad
+        )
 
     async def _send(
         self, request: Request, send: Send, kind: str, size: int, pieces: Iterator[bytes], budget: Budget
     ) -> None:
         """Send the pieces, no faster than the caller takes them."""
-        piece = await self._run(size, lambda: next(pieces, b""))
-        following = await self._run(size, lambda: next(pieces, None))
-        headers = [(b"content-type", kind.encode("ascii"))]
-        packer = Packer() if len(piece) >= _COMPRESS_FROM and _wants_gzip(request) else None
-        if packer is not None:
-            headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
-        elif following is None:
-            headers.append((b"content-length", b"%d" % len(piece)))
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        while True:
-            last = following is None
+        packer: Packer | None = None
+        started = False
+        async for piece, last in self._each(size, pieces):
+            if not started:
+                started = True
+                headers = [(b"content-type", kind.encode("ascii"))]
+                if len(piece) >= COMPRESS_FROM and wants_gzip(request):
+                    packer = Packer()
+                    headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
+                elif last:
+                    headers.append((b"content-length", b"%d" % len(piece)))
+                await send({"type": "http.response.start", "status": 200, "headers": headers})
             if packer is not None:
                 piece = await self._run(len(piece), partial(packer.pack, piece, last=last))
             await budget.client(send({"type": "http.response.body", "body": piece, "more_body": not last}))
-            if following is None:
-                return
+
+    async def _each(self, size: int, pieces: Iterator[bytes]) -> AsyncIterator[tuple[bytes, bool]]:
+        """The pieces, each with whether it is the last; a thread is asked once for the first two."""
+        piece, following = await self._run(size, lambda: (next(pieces, None), next(pieces, None)))
+        while piece is not None:
+            yield piece, following is None
             piece = following
-            following = await self._run(size, lambda: next(pieces, None))
+            if piece is not None:
+                following = await self._run(size, lambda: next(pieces, None))
 
     # --- streams --------------------------------------------------------------------------------------
 
@@ -216,21 +243,25 @@ class BatchEndpoint:
         """Answer line by line, each as soon as it is there: what is held does not grow with the stream."""
         self._shelf.pick(query.tolerance, "parameter")  # refused before the first byte, if at all
         headers = [(b"content-type", NDJSON.encode("ascii"))]
-        packer = Packer() if _wants_gzip(request) else None
+        packer = Packer() if wants_gzip(request) else None
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         number = 0
         async for lines in self._lines(receive, budget):
-            work = partial(self._answer_lines, lines, number, query, packer)
-            answer = await self._run(0 if len(lines) <= _STREAM_SMALL else len(lines), work)
-            number += lines.count(b"\n")
-            await budget.client(send({"type": "http.response.body", "body": answer, "more_body": True}))
+            # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
+            size = sum(map(len, lines)) if len(lines) <= _FEW_LINES else _AT_ONCE + 1
+            pieces = gather(self._line_pieces(lines, number, query))
+            number += len(lines)
+            async for piece, _ in self._each(size, pieces):
+                if packer is not None:
+                    piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
+                await budget.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
 
-    async def _lines(self, receive: Receive, budget: Budget) -> AsyncIterator[bytes]:
-        """Yield whole lines, one or several at a time."""
+    async def _lines(self, receive: Receive, budget: Budget) -> AsyncIterator[list[bytearray]]:
+        """Yield whole lines, as many as there are."""
         limit = self._settings.max_body_bytes
         rest = bytearray()
         deadline = budget.deadline()
@@ -241,67 +272,74 @@ class BatchEndpoint:
                 raise ClientDisconnect
             more = message.get("more_body", False)
             piece = message.get("body", b"")
-            end = piece.rfind(b"\n") + 1
-            if not end:
-                rest += piece
-                if len(rest) > limit:
-                    raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=_CLOSE, max_bytes=limit)
-                continue
-            rest += piece[:end]
-            yield bytes(rest)
-            rest = bytearray(piece[end:])
-            deadline = budget.deadline()
-        if rest.strip():
-            rest += b"\n"
-            yield bytes(rest)
+            seen = memoryview(piece)
+            lines, start = [], 0
+            while (end := piece.find(b"\n", start)) >= 0:
+                rest += seen[start:end]
+                lines.append(rest)
+                rest, start = bytearray(), end + 1
+            rest += seen[start:]
+            if len(rest) > limit:
+                raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
+            if lines:
+                yield lines
+                deadline = budget.deadline()
+        if rest:
+            yield [rest]
 
-    def _answer_lines(self, lines: bytes, number: int, query: Options, packer: "Packer | None") -> bytes:
-        answers = bytearray()
-        for line in lines.split(b"\n"):
-            number += 1
-            if line.isspace() or not line:
-                continue
-            try:
-                for piece in self._answer(line, query, line=True):
-                    answers += piece
-            except RequestError as error:
-                answers += bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body)
-            answers += b"\n"
-        return bytes(answers) if packer is None else packer.pack(bytes(answers), flush=True)
+    def _line_pieces(self, lines: list[bytearray], number: int, query: Options) -> Iterator[bytes]:
+        """Answer lines; ``number`` is how many came before."""
+        plain = self._plain_lines(lines, number, query) if len(lines) > 1 else None
+        if plain is not None:
+            yield from plain
+            return
+        for index, line in enumerate(lines, number + 1):
+            yield from self._line(line, index, query)
+
+    def _line(self, line: bytearray, number: int, query: Options) -> Iterator[bytes]:
+        if not line or line.isspace():
+            return
+        try:
+            answered = self._answer(terminated(line), query, line=True)
+        except RequestError as error:
+            yield bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body)
+        else:
+            yield from answered
+        yield b"\n"
+
+    def _plain_lines(self, lines: list[bytearray], number: int, query: Options) -> Iterator[bytes] | None:
+        """Answer lines of one object each all at once; None where they are anything else."""
+        for line in lines:
+            if len(line) > _SHORT_LINE or line[:1] != b"{" or line.rstrip()[-1:] != b"}" or line.count(b"{") != 1:
+                return None
+        text = terminated(bytearray(b"[%b]" % b",".join(lines)))
+        try:
+            options, place = merged_options(query, {})
+            cases, _ = read_batch(text, len(lines))
+            table = self._shelf.pick(options.tolerance, place)
+        except RequestError:
+            return None
+        answers = answer_cases(table, cases, options.include, options.std)
+        if answers.size != len(lines):
+            return None
+        self._count(table, answers, 0)  # whether a case is bad, and why, is found out line by line
+        return self._mended(lines_text(answers, signature(table)), answers, lines, number, query)
+
+    def _mended(
+        self, texts: Iterator[tuple[int, bytes]], answers: Answers, lines: list[bytearray], number: int, query: Options
+    ) -> Iterator[bytes]:
+        """The texts, with what a line by itself is answered in place of every null."""
+        for start, text in texts:
+            pieces = text.splitlines(keepends=True)
+            odd = np.flatnonzero(answers.flaws[start : start + len(pieces)]).tolist()
+            for index in odd:
+                line = start + index
+                pieces[index] = b"".join(self._line(lines[line], number + line + 1, query))
+            yield b"".join(pieces) if odd else text
 
 
-class Packer:
-    """gzip, at the level that costs least."""
-
-    def __init__(self) -> None:
-        self._packer = zlib.compressobj(1, zlib.DEFLATED, 31)
-
-    def pack(self, piece: bytes, *, last: bool = False, flush: bool = False) -> bytes:
-        """Return what can be sent after this piece."""
-        packed = self._packer.compress(piece)
-        if last or flush:
-            packed += self._packer.flush(zlib.Z_FINISH if last else zlib.Z_SYNC_FLUSH)
-        return packed
-
-
-def _wants_gzip(request: Request) -> bool:
-    for offer in request.headers.get("accept-encoding", "").lower().split(","):
-        name, _, parameters = offer.partition(";")
-        if name.strip() in ("gzip", "*"):
-            return parameters.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
-    return False
-
-
-def _gather(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes in pieces of a size that is worth a message."""
-    gathered = bytearray()
-    for piece in pieces:
-        gathered += piece
-        if len(gathered) >= _PIECE:
-            yield bytes(gathered)
-            gathered.clear()
-    if gathered:
-        yield bytes(gathered)
+def _body_too_large(limit: int) -> BodyTooLargeError:
+    return BodyTooLargeError(f"the body may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
 
 
 class Direct(Response):

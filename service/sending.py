@@ -1,0 +1,81 @@
+"""How an answer is sent: in pieces worth a message, packed if that is wanted, within the time that there is."""
+
+import asyncio
+import zlib
+from collections.abc import Awaitable, Iterator
+from typing import TypeVar
+
+from starlette.requests import Request
+
+from service.errors import SlowClientError, TookTooLongError
+from service.settings import Settings
+
+__all__ = ["CLOSE", "Budget", "Packer", "gather", "wants_gzip"]
+
+T = TypeVar("T")
+
+#: what an answer says when the rest of its question is not read
+CLOSE = {"Connection": "close"}
+
+_PIECE = 256 * 1024  # bytes that are handed to the connection at a time
+
+
+class Budget:
+    """Time that is left for one request, and for the caller's next move."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._total = settings.time_limit_s
+        self._end = self._loop.time() + self._total
+        self.client_s = settings.client_timeout_s
+
+    async def client(self, move: Awaitable[T], deadline: float | None = None) -> T:
+        """Wait for the caller's move, until ``deadline`` or for as long as a caller may take."""
+        try:
+            async with asyncio.timeout_at(min(self._end, deadline or self.deadline())):
+                return await move
+        except TimeoutError:
+            if self._loop.time() >= self._end:
+                raise TookTooLongError(f"a batch may take up to {self._total} s", headers=CLOSE) from None
+            raise SlowClientError(f"a caller may take up to {self.client_s} s", headers=CLOSE) from None
+
+    def deadline(self) -> float:
+        """Until when a move that begins now has to be made."""
+        return self._loop.time() + self.client_s
+
+
+class Packer:
+    """gzip, at the level that costs least."""
+
+    def __init__(self) -> None:
+        self._packer = zlib.compressobj(1, zlib.DEFLATED, 31)
+
+    def pack(self, piece: bytes, *, last: bool = False, flush: bool = False) -> bytes:
+        """Return what can be sent after this piece."""
+        packed = self._packer.compress(piece)
+        if last or flush:
+            packed += self._packer.flush(zlib.Z_FINISH if last else zlib.Z_SYNC_FLUSH)
+        return packed
+
+
+def wants_gzip(request: Request) -> bool:
+    for offer in request.headers.get("accept-encoding", "").lower().split(","):
+        name, _, parameters = offer.partition(";")
+        if name.strip() in ("gzip", "*"):
+            return parameters.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
+    return False
+
+
+def gather(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    """The same bytes in pieces of a size that is worth a message."""
+    gathered = bytearray()
+    for piece in pieces:
+        if len(piece) >= _PIECE and not gathered:
+            yield piece
+            continue
+        gathered += piece
+        if len(gathered) >= _PIECE:
+            yield bytes(gathered)
+            gathered.clear()
+    if gathered:
+        yield bytes(gathered)
