@@ -42,7 +42,7 @@ from service.codecs import columns_text, read_batch, rows_text, terminated
 from service.shelf import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
-DECISION = ROOT / "docs" / "decisions" / "0008-wire.md"
+DECISION = ROOT / "docs" / "decisions" / "0011-wire.md"
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SERVER_CORE, CLIENT_CORE = 0, 1
