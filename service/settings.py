@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-__all__ = ["PREFIX", "Settings", "SettingsError", "cache_control", "load_settings", "unknown_variables"]
+__all__ = ["PREFIX", "Settings", "SettingsError", "cache_fields", "load_settings", "unknown_variables"]
 
 PREFIX = "MUMACRO_"
 _MAX_AGE_S = 3600
@@ -81,9 +81,11 @@ class Settings(BaseSettings):
         return key
 
 
-def cache_control(settings: Settings) -> str:
+def cache_fields(settings: Settings) -> dict[str, str]:
     """How long an answer may be kept, and by whom.  With an API key in force it is for its caller alone."""
-    return f"{'public' if settings.api_key is None else 'private'}, max-age={_MAX_AGE_S}"
+    if settings.api_key is None:
+        return {"cache-control": f"public, max-age={_MAX_AGE_S}"}
+    return {"cache-control": f"private, max-age={_MAX_AGE_S}", "vary": "x-api-key, authorization"}
 
 
 def load_settings(**chosen: Any) -> Settings:

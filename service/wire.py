@@ -22,7 +22,7 @@ from service.logs import AccessLog, accept_request_id, new_request_id
 from service.metrics import Metrics
 from service.middleware import BATCH_PATH
 from service.schemas import CaseRequest
-from service.settings import Settings, cache_control
+from service.settings import Settings, cache_fields
 from service.shelf import LoadedTable, Shelf
 
 __all__ = ["CASE_PATH", "Application", "ShortWay"]
@@ -73,7 +73,8 @@ class ShortWay:
         self._shelf = shelf
         self._max_bytes = settings.max_body_bytes
         self._key = None if settings.api_key is None else settings.api_key.get_secret_value().encode("ascii")
-        self._cache_control = cache_control(settings).encode("ascii")
+        self._kept = [(name.encode("ascii"), value.encode("ascii")) for name, value in cache_fields(settings).items()]
+        self._kept_head = b"".join(b"%b: %b\r\n" % field for field in self._kept)
         self._metrics = metrics
         self._log = log
         self._durations = {m: metrics.pending(metrics.place(CASE_PATH, m, 200)) for m in ("GET", "POST")}
@@ -106,7 +107,7 @@ class ShortWay:
             (b"x-content-type-options", b"nosniff"),
         ]
         if etag is not None:
-            fields += [(b"etag", etag.encode("ascii")), (b"cache-control", self._cache_control)]
+            fields += [(b"etag", etag.encode("ascii")), *self._kept]
         await send({"type": "http.response.start", "status": 200, "headers": fields})
         await send({"type": "http.response.body", "body": content})
         self.finish(scope, identity, time.perf_counter() - started)
@@ -143,7 +144,7 @@ class ShortWay:
 
     def head(self, identity: str, etag: str | None, length: int) -> bytes:
         """The fields of a reply as they stand on the wire."""
-        cached = b"" if etag is None else b"etag: %b\r\ncache-control: %b\r\n" % (etag.encode(), self._cache_control)
+        cached = b"" if etag is None else b"etag: %b\r\n%b" % (etag.encode(), self._kept_head)
         return _HEAD % (cached, length, identity.encode())
 
     def finish(self, scope: Scope, identity: str, seconds: float) -> None:

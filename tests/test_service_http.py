@@ -131,6 +131,11 @@ def test_the_key_opens(closed, case, headers):
     response = closed.get("/v1/mu-macro", params=case, headers=headers)
     assert response.status_code == 200
     assert response.headers["cache-control"] == "private, max-age=3600"
+    assert response.headers["vary"] == "x-api-key, authorization"
+    tag = {"If-None-Match": response.headers["etag"]}
+    again = closed.get("/v1/mu-macro", params=case, headers={**headers, **tag})
+    assert again.status_code == 304
+    assert again.headers["vary"] == "x-api-key, authorization"
 
 
 @pytest.mark.parametrize("path", sorted(HEALTH_PATHS))

@@ -10,7 +10,7 @@ from service.intake import canonical, case_from_body, case_from_query, read_body
 from service.metrics import Metrics
 from service.openapi import case_parameters, describe_json
 from service.schemas import CaseRequest
-from service.settings import cache_control
+from service.settings import cache_fields
 from service.shelf import LoadedTable, shelf_of
 
 __all__ = ["etag_matches", "router"]
@@ -48,7 +48,7 @@ async def get_mu_macro(request: Request) -> Response:
     table = shelf_of(request).pick(case.tolerance, "parameter")
     include = canonical(case.include)
     etag = case_etag(table, case, include)
-    headers = {"ETag": etag, "Cache-Control": cache_control(request.app.state.settings)}
+    headers = {"ETag": etag, **cache_fields(request.app.state.settings)}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
     return Response(_answer(request, table, case), headers=headers, media_type="application/json")
