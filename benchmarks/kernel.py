@@ -1,6 +1,6 @@
 """What it takes to evaluate one polynomial patch: vector code, scalar rows, one plain Horner chain after another.
 
-    python benchmarks/kernel.py [--points 1000000] [--rounds 9] [--write]
+    python benchmarks/kernel.py [--rounds 9] [--quick] [--write]
 
 One thread, processor time, random patches of a set as large as that of a fine table.  Prints times and their ratios;
 ``--write`` puts them into docs/decisions/0003-vector-patch.md.
@@ -11,31 +11,34 @@ from __future__ import annotations
 import measuring  # isort: split
 
 import argparse
-from typing import Any
+import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from measuring import best_of, markdown, quantity
 from numba import njit
 from numpy.typing import NDArray
 
-from friction.kernels import FUSE, WIDTH
+from friction.kernels import WIDTH
+from friction.outer import FUSE
 from friction.patch_simd import patch_value
+from friction.patches import aligned
+from friction.table import read_table
 
 Array = NDArray[np.float64]
 PAGE = measuring.ROOT / "docs" / "decisions" / "0003-vector-patch.md"
-BEGIN, END = "<!-- begin kernel -->\n", "<!-- end kernel -->"
-PATCHES = {"as many as mumacro-1e-10 has": 1004, "as many as mumacro-1e-12 has": 3150}
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": FUSE}
+TABLES = ("mumacro-1e-10", "mumacro-1e-12")
 
 
-@njit(**OPTIONS)
+@njit(error_model="numpy", nogil=True, fastmath=FUSE)
 def vector(coef: Array, p: NDArray[np.int64], u: Array, w: Array, out: Array) -> None:
     """Eight lanes, written out."""
     for i in range(p.size):
         out[i] = patch_value(coef, p[i], u[i], w[i])
 
 
-@njit(**OPTIONS)
+@njit(error_model="numpy", nogil=True, fastmath=FUSE)
 def rows(coef: Array, p: NDArray[np.int64], u: Array, w: Array, out: Array) -> None:
     """Eight sums in w side by side, as scalars that the compiler could make one vector of."""
     for i in range(p.size):
@@ -48,7 +51,7 @@ def rows(coef: Array, p: NDArray[np.int64], u: Array, w: Array, out: Array) -> N
         out[i] = ((((((a0 * t + a1) * t + a2) * t + a3) * t + a4) * t + a5) * t + a6) * t + a7
 
 
-@njit(**OPTIONS)
+@njit(error_model="numpy", nogil=True, fastmath=FUSE)
 def plain(coef: Array, p: NDArray[np.int64], u: Array, w: Array, out: Array) -> None:
     """Horner in u over Horner in w, as in a textbook."""
     for i in range(p.size):
@@ -61,32 +64,38 @@ def plain(coef: Array, p: NDArray[np.int64], u: Array, w: Array, out: Array) -> 
         out[i] = total
 
 
+LOOPS: dict[str, Callable[..., None]] = {"vector": vector, "rows": rows, "plain": plain}
+
+
 def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--points", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--quick", action="store_true", help="few points, one round")
     parser.add_argument("--write", action="store_true", help="put the table into the decision")
     given = parser.parse_args()
-    if given.points < 1 or given.rounds < 1:
-        parser.error("--points and --rounds must be at least 1")
+    if given.quick and given.write:
+        parser.error("--quick measures nothing worth writing down")
+    if given.rounds < 1:
+        parser.error("--rounds must be at least 1")
+    points, rounds = (10_000, 1) if given.quick else (1_000_000, given.rounds)
     rng = np.random.default_rng(1)
-    u, w = rng.uniform(-1.0, 1.0, given.points), rng.uniform(-1.0, 1.0, given.points)
+    u, w = rng.uniform(-1.0, 1.0, points), rng.uniform(-1.0, 1.0, points)
     lines = []
-    for name, patches in PATCHES.items():
-        coef = rng.standard_normal((patches, WIDTH, WIDTH))
-        p = rng.integers(0, patches, given.points)
-        answers = {f.__name__: np.empty(given.points) for f in (vector, rows, plain)}
-        work = {
-            f.__name__: (lambda f=f: f(coef, p, u, w, answers[f.__name__]))  # noqa: B023 (called inside this round)
-            for f in (vector, rows, plain)
-        }
-        timed = best_of(given.rounds, work, "processor")
+    for name in TABLES:
+        blocks = read_table(measuring.ROOT / "tables" / f"{name}.nc").blocks
+        patches = sum(math.prod(block.cells) for block in blocks)
+        coef = aligned(patches, WIDTH, WIDTH)
+        coef[...] = rng.standard_normal(coef.shape)
+        p = rng.integers(0, patches, points)
+        answers = {key: np.empty(points) for key in LOOPS}
+        work = {key: partial(loop, coef, p, u, w, answers[key]) for key, loop in LOOPS.items()}
+        timed = best_of(rounds, work, "processor")
         apart = max(float(np.abs(a - answers["plain"]).max()) for a in answers.values())
-        ns = {key: 1e9 * seconds / given.points for key, seconds in timed.best.items()}
-        cells = [quantity(ns[key]) for key in ("vector", "rows", "plain")]
+        ns = {key: 1e9 * seconds / points for key, seconds in timed.best.items()}
+        cells = [quantity(ns[key]) for key in LOOPS]
         cells += [quantity(ns["rows"] / ns["vector"]), quantity(ns["plain"] / ns["vector"]), quantity(apart)]
-        lines.append([f"{patches:,}, {name}", *cells])
+        lines.append([f"{patches:,}, as many as {name} has", *cells])
     header = (
         "patches",
         "vector, ns",
@@ -99,11 +108,7 @@ def main() -> None:
     text = measuring.machine("llvmlite") + "\n\n" + markdown(header, lines)
     print(text)
     if given.write:
-        page = PAGE.read_text(encoding="utf-8")
-        if page.count(BEGIN) != 1 or page.count(END) != 1:
-            parser.error(f"{PAGE} must hold {BEGIN.strip()!r} and {END!r} once each")
-        before, _, rest = page.partition(BEGIN)
-        PAGE.write_text(f"{before}{BEGIN}\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+        measuring.write_section("kernel", text, PAGE)
 
 
 if __name__ == "__main__":
