@@ -5,7 +5,7 @@
 For every committed table: cells, bytes and time for degree 5 to 11; Chebyshev polynomials and gathered coefficients in
 place of powers in rows; exponent and mantissa, or the library's logarithm, in place of arithmetic; one point after
 another in place of passes.  Log-uniform random points over v~, y~ in [1e-3, 1e3], one thread, processor time.
-``--write`` puts the tables into docs/decisions/0010-degree-and-coordinates.md.
+``--write`` puts the tables into docs/decisions/0012-degree-and-coordinates.md.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from friction.outer import FUSE
 from friction.regions import BLOCKS, BORDER_PIECES
 
 Array = NDArray[np.float64]
-PAGE = measuring.ROOT / "docs" / "decisions" / "0010-degree-and-coordinates.md"
+PAGE = measuring.ROOT / "docs" / "decisions" / "0012-degree-and-coordinates.md"
 #: degrees along a and b; the columns of a patch are powers of a, and stand side by side in a vector
 DEGREES = ((5, 5), (7, 5), (7, 7), (7, 9), (7, 11), (9, 9), (11, 11))
 OWN = (WIDTH - 1, WIDTH - 1)

@@ -4,7 +4,7 @@
 
 Builds tables with other values of ``SHARE`` and ``CELL_SHARE`` (builder/blocks.py), each verified as every build is;
 oscillation power and stick fraction, which a table holds at the same nodes, are compared with 5,000 fresh solves.
-``--write`` puts the table into docs/decisions/0010-degree-and-coordinates.md.
+``--write`` puts the table into docs/decisions/0012-degree-and-coordinates.md.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from builder import blocks
 from builder.assemble import BuildError, build_table
 from builder.sweep import Sweep
 
-PAGE = measuring.ROOT / "docs" / "decisions" / "0010-degree-and-coordinates.md"
+PAGE = measuring.ROOT / "docs" / "decisions" / "0012-degree-and-coordinates.md"
 TOLERANCES = (1e-4, 1e-7, 1e-10)
 NODES = (0.05, 0.1, 0.3, 0.6)
 CELLS = (0.2, 0.4, 0.6, 0.8)

@@ -19,8 +19,8 @@ PAGES = {
     "speed_against_error": PAGE,
     "build_cost": PAGE,
     "kernel": DECISIONS / "0003-vector-patch.md",
-    "degrees": DECISIONS / "0010-degree-and-coordinates.md",
-    "shares": DECISIONS / "0010-degree-and-coordinates.md",
+    "degrees": DECISIONS / "0012-degree-and-coordinates.md",
+    "shares": DECISIONS / "0012-degree-and-coordinates.md",
 }
 Row = dict[str, str]
 
