@@ -216,6 +216,7 @@ def six_columns(surrogates: list[Surrogate], points: int, rounds: int, clock: st
     for s in surrogates:
         six, two = f"**{s.id}** `s.evaluate`, six columns", f"**{s.id}** `s.evaluate`, two columns, four scalars"
         calls[six] = partial(s.evaluate, mu0, Fz, k, y0, omega, v0)
+        calls[f"{six}, with v~, y~ and l0"] = partial(s.evaluate, mu0, Fz, k, y0, omega, v0, groups=True)
         calls[two] = partial(s.evaluate, 0.3, 10.0, 1e6, y0_fixed, 1.3e5, v0_fixed)
     one = best_of(rounds, calls, clock).best
     many = best_of(rounds, {name: threads(CORES, call) for name, call in calls.items()}).best

@@ -115,7 +115,7 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     """
     known = checked_case(case, along)
     full: dict[str, Any] = {"k": None, **known, along: values}
-    answer = surrogate.evaluate(**full)
+    answer = surrogate.evaluate(**full, groups=True)
     mu0 = np.broadcast_to(np.asarray(full["mu0"], dtype=np.float64), values.shape)
     at_rest = (np.asarray(full["y0"]) == 0.0) | (np.asarray(full["omega"]) == 0.0)
     static = np.where(at_rest, mu0, mu0 * tails.static_limit(answer.y_tilde))

@@ -35,6 +35,7 @@ __all__ = [
     "gradient",
     "gradient_array",
     "groups",
+    "groups_array",
 ]
 
 FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
@@ -146,25 +147,34 @@ def amplitude_ratio(y0: float, omega: float, v0: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def case_groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float]:
+    """(v~, y~) [-] of a legal case, zero and rigid ones included: v~ is infinite where nothing oscillates."""
+    if y0 == 0.0 or omega == 0.0 or v0 == 0.0:
+        y = 0.0 if y0 == 0.0 else (math.inf if k == math.inf else _scaled(y0, k, mu0, Fz, 1.0))
+        return math.inf if v0 > 0.0 else 0.0, y
+    if k == math.inf:
+        return math.inf, math.inf
+    return groups(mu0, Fz, k, y0, omega, v0)
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def _unusual(
     mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float,
     coef: Array, meta: Array, bcoef: Array, bmeta: Array,
 ) -> tuple[float, float, int, float, float]:  # fmt: skip
     """:func:`dimensional` where an input is zero, the contact rigid, or a group beyond double precision."""
+    v, y = case_groups(mu0, Fz, k, y0, omega, v0)
     if y0 == 0.0 or omega == 0.0:
-        y = 0.0 if y0 == 0.0 else (math.inf if k == math.inf else _scaled(y0, k, mu0, Fz, 1.0))
-        return 1.0, 0.0, NO_OSCILLATION, math.inf if v0 > 0.0 else 0.0, y
+        return 1.0, 0.0, NO_OSCILLATION, v, y
     if v0 == 0.0:
         if k == math.inf:
-            return 0.0, 0.0, STATIC_LIMIT, 0.0, math.inf
-        y = _scaled(y0, k, mu0, Fz, 1.0)
+            return 0.0, 0.0, STATIC_LIMIT, v, y
         mu, bound, source = ratio(0.0, y, coef, meta, bcoef, bmeta)
-        return mu, bound, source, 0.0, y
+        return mu, bound, source, v, y
     r = amplitude_ratio(y0, omega, v0)
     mu, _, _, _, _ = outer_expansion(r)
     if k == math.inf:
-        return mu, ROUNDING * mu, RIGID, math.inf, math.inf
-    v, y = groups(mu0, Fz, k, y0, omega, v0)
+        return mu, ROUNDING * mu, RIGID, v, y
     if y == 0.0 or r == 0.0:
         return 1.0, ROUNDING, NO_OSCILLATION if y == 0.0 else RIGID, v, y
     if v == 0.0:
@@ -274,36 +284,46 @@ def _legal(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float, 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def _evaluate_chunk(
-    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, low: int, n: int,
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
     coef: Array, meta: Array, bcoef: Array, bmeta: Array, table: Array, floats: Array, ints: NDArray[np.int64],
-    rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8], v: Array, y: Array,
+    rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8],
 ) -> int:  # fmt: skip
-    odd = np.empty(CHUNK + 1, np.int64)
-    found = _groups(mu0, Fz, k, y0, omega, v0, low, n, v, y, odd)
-    evaluate_chunk(v, y, low, n, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
+    n = mu.size
+    v, y, odd = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK + 1, np.int64)
+    found = _groups(mu0, Fz, k, y0, omega, v0, 0, n, v, y, odd)
+    evaluate_chunk(v, y, 0, n, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
     illegal = 0
     for j in range(found):
         i = odd[j]
         if _legal(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], rigid):
-            mu[i], bound[i], source[i], v[i], y[i] = dimensional(
+            mu[i], bound[i], source[i], _, _ = dimensional(
                 mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i], coef, meta, bcoef, bmeta
             )
         else:
             illegal += 1
-            mu[i], bound[i], source[i], v[i], y[i] = math.nan, math.nan, -1, math.nan, math.nan
-    for i in range(low, low + n):
+            mu[i], bound[i], source[i] = math.nan, math.nan, -1
+    for i in range(n):
         macro[i] = mu[i] * mu0[i]
         bound[i] *= mu0[i]
     return illegal
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _part(given: Array, n: int, low: int, high: int, row: Array) -> Array:
+    """What a column of n values, or of one that holds for all, says of the cases from ``low`` to ``high``."""
+    if given.size == n:
+        return given[low:high]
+    row[:] = given[0]
+    return row[: high - low]
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE, parallel=True)
 def evaluate_array(
     mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
     coef: Array, meta: Array, bcoef: Array, bmeta: Array,
-    rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8], v: Array, y: Array,
+    rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8],
 ) -> int:  # fmt: skip
-    """Fill mu_macro, mu~, the bound of mu_macro, source, v~, y~ (n,) from six columns (n,); count illegal cases.
+    """Fill mu_macro, mu~, the bound of mu_macro and the source (n,) from six columns (n,) or (1,); count illegal cases.
 
     What stands at an illegal case is NaN, and -1 for the source.  With ``rigid`` an infinite k is legal.
     """
@@ -312,10 +332,14 @@ def evaluate_array(
     illegal = 0
     for c in prange((n + CHUNK - 1) // CHUNK):
         floats, ints = scratch()
-        low = c * CHUNK
+        rows = np.empty((6, CHUNK))
+        a = c * CHUNK
+        b = min(a + CHUNK, n)
         illegal += _evaluate_chunk(
-            mu0, Fz, k, y0, omega, v0, low, min(CHUNK, n - low),
-            coef, meta, bcoef, bmeta, table, floats, ints, rigid, macro, mu, bound, source, v, y,
+            _part(mu0, n, a, b, rows[0]), _part(Fz, n, a, b, rows[1]), _part(k, n, a, b, rows[2]),
+            _part(y0, n, a, b, rows[3]), _part(omega, n, a, b, rows[4]), _part(v0, n, a, b, rows[5]),
+            coef, meta, bcoef, bmeta, table, floats, ints,
+            rigid, macro[a:b], mu[a:b], bound[a:b], source[a:b],
         )  # fmt: skip
     return illegal
 
@@ -328,13 +352,12 @@ def evaluate_block(
 ) -> int:  # fmt: skip
     """:func:`evaluate_array` on the calling thread, for columns of n values or of one that holds for all cases.
 
-    An infinite k is rigid contact.  v~ and y~ are not kept.
+    An infinite k is rigid contact.
     """
     n = mu.size
     table = plan(meta)
     floats, ints = scratch()
     columns = np.empty((6, CHUNK))
-    v, y = np.empty(CHUNK), np.empty(CHUNK)
     illegal = 0
     for low in range(0, n, CHUNK):
         m = min(CHUNK, n - low)
@@ -344,8 +367,17 @@ def evaluate_block(
             elif low == 0:
                 columns[j, :] = given[0]
         illegal += _evaluate_chunk(
-            columns[0], columns[1], columns[2], columns[3], columns[4], columns[5], 0, m,
+            columns[0], columns[1], columns[2], columns[3], columns[4], columns[5],
             coef, meta, bcoef, bmeta, table, floats, ints, True,
-            macro[low : low + m], mu[low : low + m], bound[low : low + m], source[low : low + m], v, y,
+            macro[low : low + m], mu[low : low + m], bound[low : low + m], source[low : low + m],
         )  # fmt: skip
     return illegal
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
+def groups_array(
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, v: Array, y: Array
+) -> None:  # fmt: skip
+    """Fill v~ and y~ (n,) of legal cases, as :func:`dimensional` has them."""
+    for i in range(v.size):
+        v[i], y[i] = case_groups(mu0[i], Fz[i], k[i], y0[i], omega[i], v0[i])

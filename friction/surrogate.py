@@ -69,15 +69,15 @@ class Answer:
     source_code : int or ndarray of int8
         Block or tail that answered, index into :data:`friction.regions.SOURCES`.
     v_tilde, y_tilde : float or ndarray
-        Dimensionless speed and amplitude [-].
+        Dimensionless speed and amplitude [-]; of arrays only where groups or gradient were asked for.
     length_scale : float or ndarray
-        l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact.
+        l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde.
     gradient : dict of str to float or ndarray, or None
         d mu_macro / d input by field name, where it was asked for; infinite for v0 at v0 = 0 on y~ = 1.
     """
 
     __slots__ = (
-        "_stretch", "error_bound", "gradient", "mu_macro", "mu_ratio", "source_code", "v_tilde", "y_tilde",
+        "_length_scale", "_v_tilde", "_y_tilde", "error_bound", "gradient", "mu_macro", "mu_ratio", "source_code",
     )  # fmt: skip
 
     def __init__(
@@ -88,25 +88,37 @@ class Answer:
         source_code: Any,
         v_tilde: Any,
         y_tilde: Any,
-        stretch: tuple[Any, Any, Any],
+        length_scale: Any,
         gradient: dict[str, Any] | None = None,
     ) -> None:
         self.mu_macro = mu_macro
         self.mu_ratio = mu_ratio
         self.error_bound = error_bound
         self.source_code = source_code
-        self.v_tilde = v_tilde
-        self.y_tilde = y_tilde
-        self._stretch = stretch
+        self._v_tilde = v_tilde
+        self._y_tilde = y_tilde
+        self._length_scale = length_scale
         self.gradient = gradient
+
+    def _group(self, value: Any, name: str) -> Any:
+        if value is None:
+            raise AttributeError(f"{name} was not asked for: evaluate(..., groups=True)")
+        return value
+
+    @property
+    def v_tilde(self) -> Any:
+        """Dimensionless speed v0 k/(mu0 Fz omega) [-]."""
+        return self._group(self._v_tilde, "v_tilde")
+
+    @property
+    def y_tilde(self) -> Any:
+        """Dimensionless amplitude y0 k/(mu0 Fz) [-]."""
+        return self._group(self._y_tilde, "y_tilde")
 
     @property
     def length_scale(self) -> Any:
-        """l0 = mu0 Fz / k [m], made when asked for."""
-        mu0, force, stiffness = self._stretch
-        with np.errstate(over="ignore", under="ignore"):
-            length = mu0 * (force / stiffness)
-        return np.broadcast_to(length, np.shape(self.mu_ratio)) if np.ndim(self.mu_ratio) else length
+        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact."""
+        return self._group(self._length_scale, "length_scale")
 
     @property
     def regime(self) -> Any:
@@ -127,12 +139,10 @@ class Answer:
             "error_bound",
             "regime",
             "source",
-            "v_tilde",
-            "y_tilde",
-            "length_scale",
             "gradient",
         )
-        return f"Answer({', '.join(f'{name}={getattr(self, name)!r}' for name in shown)})"
+        groups = ("v_tilde", "y_tilde", "length_scale") if self._v_tilde is not None else ()
+        return f"Answer({', '.join(f'{name}={getattr(self, name)!r}' for name in (*shown, *groups))})"
 
 
 class Surrogate:
@@ -324,6 +334,7 @@ class Surrogate:
         v0: ArrayLike,
         *,
         gradient: bool = False,
+        groups: bool = False,
     ) -> Answer:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
@@ -343,6 +354,8 @@ class Surrogate:
             Sliding speed [m/s], >= 0.
         gradient : bool
             Also differentiate with respect to every input that was given.
+        groups : bool
+            Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and gradients have them.
 
         Raises
         ------
@@ -370,27 +383,34 @@ class Surrogate:
             nondim.check_inputs(named)
             m, n_force, stiffness, amplitude, frequency, speed = (float(c) for c in ordered)
             return self._scalar(m, n_force, stiffness, amplitude, frequency, speed, gradient)
-        flat, _ = _columns(*ordered)
-        n = flat[0].size
-        macro, mu, bound, v, y = (np.empty(n) for _ in range(5))
+        n = math.prod(shape)
+        # a value that holds for all cases stays one value, unless slopes or groups are asked for
+        every = gradient or groups
+        flat = [_flat(c, shape if every or c.size > 1 else (1,)) for c in ordered]
+        macro, mu, bound = (np.empty(n) for _ in range(3))
         source = np.empty(n, dtype=np.int8)
         with _loop(n, self.threads):
             a, b, c, d, e, f = flat
-            illegal = nondim.evaluate_array(a, b, c, d, e, f, *self._data, k is None, macro, mu, bound, source, v, y)
+            illegal = nondim.evaluate_array(a, b, c, d, e, f, *self._data, k is None, macro, mu, bound, source)
             if illegal:
                 nondim.check_inputs(named)
-            slopes = np.empty((n, 6)) if gradient else None
-            if slopes is not None:
+            v, y = np.empty(n if every else 0), np.empty(n if every else 0)
+            slopes = np.empty((n if gradient else 0, 6))
+            if every:
+                nondim.groups_array(a, b, c, d, e, f, v, y)
+            if gradient:
                 nondim.gradient_array(a, b, c, d, e, f, mu, source, v, y, *self._data, slopes)
+        with np.errstate(over="ignore", under="ignore"):
+            length = np.broadcast_to(ordered[0] * (ordered[1] / ordered[2]), shape) if every else None
         return Answer(
             mu_macro=macro.reshape(shape),
             mu_ratio=mu.reshape(shape),
             error_bound=bound.reshape(shape),
             source_code=source.reshape(shape),
-            v_tilde=v.reshape(shape),
-            y_tilde=y.reshape(shape),
-            stretch=(ordered[0], ordered[1], ordered[2]),
-            gradient=None if slopes is None else self._named(slopes.T.reshape(6, *shape), k is None),
+            v_tilde=v.reshape(shape) if every else None,
+            y_tilde=y.reshape(shape) if every else None,
+            length_scale=length,
+            gradient=None if not gradient else self._named(slopes.T.reshape(6, *shape), k is None),
         )
 
     @staticmethod
@@ -411,7 +431,7 @@ class Surrogate:
             source_code=source,
             v_tilde=v,
             y_tilde=y,
-            stretch=(mu0, Fz, k),
+            length_scale=mu0 * (Fz / k),
             gradient=named,
         )
 
@@ -440,15 +460,16 @@ def _columns(*values: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     """The values broadcast together, flat, contiguous and writable (one numba signature), and their shape."""
     arrays = [np.asarray(value, dtype=np.float64) for value in values]
     shape = np.broadcast_shapes(*(a.shape for a in arrays))
-    out = []
-    for a in arrays:
-        if a.shape == shape and a.flags.c_contiguous and a.flags.writeable:
-            out.append(a.reshape(-1))
-        else:
-            full = np.empty(shape)
-            full[...] = a
-            out.append(full.reshape(-1))
-    return out, shape
+    return [_flat(a, shape) for a in arrays], shape
+
+
+def _flat(a: Array, shape: tuple[int, ...]) -> Array:
+    """``a`` broadcast to ``shape``, flat, contiguous and writable."""
+    if a.shape == shape and a.flags.c_contiguous and a.flags.writeable:
+        return a.reshape(-1)
+    full = np.empty(shape)
+    full[...] = a if len(shape) >= a.ndim else a.reshape(shape)
+    return full.reshape(-1)
 
 
 def _reopen(path: str, checksum: str, threads: int | None = None) -> Surrogate:

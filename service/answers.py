@@ -170,7 +170,7 @@ def _extras(
 ) -> dict[str, Any]:
     """What is included, as dicts of values or values; k is missing in what is asked of rigid contact."""
     slopes = "gradient" in include or "std" in include
-    answer = surrogate.evaluate(**case, gradient=slopes)
+    answer = surrogate.evaluate(**case, gradient=slopes, groups=True)
     gradient = answer.gradient or {}
     values: dict[str, Any] = {}
     for name in include:

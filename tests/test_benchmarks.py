@@ -103,7 +103,7 @@ def test_comparison_times_every_row(speed: list[list[Row]]) -> None:
     assert all(number(row["ns/point"]) > 0.0 for row in comparison + batch)
     assert all(number(row["microseconds"]) > 0.0 for row in single)
     assert len(single) == 4
-    assert len(batch) == 8  # two tables, two kinds of columns, one thread and all cores
+    assert len(batch) == 12  # two tables, three kinds of columns, one thread and all cores
 
 
 def test_a_peer_that_is_not_there_is_named(printed: str, speed: list[list[Row]]) -> None:

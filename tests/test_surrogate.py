@@ -359,3 +359,30 @@ def test_the_number_of_threads_changes_nothing_but_the_time(tables_dir: Path) ->
 def test_threads_out_of_bounds_are_refused(tables_dir: Path, threads: Any) -> None:
     with pytest.raises(InputError, match="threads"):
         Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=threads)
+
+
+def test_groups_of_arrays_are_there_where_they_are_asked_for(tables_dir: Path) -> None:
+    table = Surrogate.open(tables_dir / "mumacro-1e-7.nc")
+    columns = {**CASE, "v0": np.array([0.0, 1e-3, 0.01])}
+    plain = table.evaluate(**columns)
+    for name in ("v_tilde", "y_tilde", "length_scale"):
+        with pytest.raises(AttributeError, match=f"{name} was not asked for"):
+            getattr(plain, name)
+    assert "v_tilde" not in repr(plain)
+    for asked in (table.evaluate(**columns, groups=True), table.evaluate(**columns, gradient=True)):
+        np.testing.assert_array_equal(asked.mu_macro, plain.mu_macro)
+        for i, v0 in enumerate(columns["v0"]):
+            one = table.evaluate(**{**CASE, "v0": float(v0)})
+            assert (asked.v_tilde[i], asked.y_tilde[i], asked.length_scale[i]) == (
+                one.v_tilde, one.y_tilde, one.length_scale,
+            )  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [1, 2, 300])
+def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(tables_dir: Path, n: int) -> None:
+    table = Surrogate.open(tables_dir / "mumacro-1e-7.nc")
+    v0 = np.linspace(0.0, 0.02, n)
+    expected = table.evaluate(**{**{k: np.full(n, x) for k, x in CASE.items()}, "v0": v0}).mu_macro
+    for shaped in (float, lambda x: np.array([x]), lambda x: np.array(x), lambda x: np.array([[x]])):
+        found = table.evaluate(**{**{k: shaped(x) for k, x in CASE.items()}, "v0": v0}).mu_macro
+        np.testing.assert_array_equal(found.ravel(), expected)
