@@ -386,13 +386,13 @@ class Surrogate:
         n = math.prod(shape)
         # a value that holds for all cases stays one value, unless slopes or groups are asked for
         every = gradient or groups
-        flat = [_flat(c, shape if every or c.size > 1 else (1,)) for c in ordered]
+        flat = [_flat(c, shape) if every or c.size != 1 else _flat(c.reshape(-1), (1,)) for c in ordered]
         macro, mu, bound = (np.empty(n) for _ in range(3))
         source = np.empty(n, dtype=np.int8)
         with _loop(n, self.threads):
             a, b, c, d, e, f = flat
             illegal = nondim.evaluate_array(a, b, c, d, e, f, *self._data, k is None, macro, mu, bound, source)
-            if illegal:
+            if illegal or n == 0:  # no case counts the faults of a value that would hold for all
                 nondim.check_inputs(named)
             v, y = np.empty(n if every else 0), np.empty(n if every else 0)
             slopes = np.empty((n if gradient else 0, 6))
@@ -468,7 +468,7 @@ def _flat(a: Array, shape: tuple[int, ...]) -> Array:
     if a.shape == shape and a.flags.c_contiguous and a.flags.writeable:
         return a.reshape(-1)
     full = np.empty(shape)
-    full[...] = a if len(shape) >= a.ndim else a.reshape(shape)
+    full[...] = a
     return full.reshape(-1)
 
 

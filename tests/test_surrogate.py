@@ -386,3 +386,16 @@ def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(tables
     for shaped in (float, lambda x: np.array([x]), lambda x: np.array(x), lambda x: np.array([[x]])):
         found = table.evaluate(**{**{k: shaped(x) for k, x in CASE.items()}, "v0": v0}).mu_macro
         np.testing.assert_array_equal(found.ravel(), expected)
+
+
+@pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}])
+@pytest.mark.parametrize("shape", [(0,), (0, 3)])
+def test_no_cases_have_no_answers_and_no_excuse(
+    tables_dir: Path, shape: tuple[int, ...], asked: dict[str, bool]
+) -> None:
+    table = Surrogate.open(tables_dir / "mumacro-1e-7.nc")
+    found = table.evaluate(**{**CASE, "v0": np.empty(shape)}, **asked)
+    assert found.mu_macro.shape == found.error_bound.shape == found.source.shape == shape
+    assert table.mu_ratio(np.empty(shape), 0.5).shape == shape
+    with pytest.raises(InputError, match="mu0"):
+        table.evaluate(**{**CASE, "mu0": -0.3, "v0": np.empty(shape)}, **asked)
