@@ -60,8 +60,8 @@ def passes(**replaced: Any) -> Callable[..., None]:
         floats, ints = scratch()
         bound, source = np.empty(0), np.empty(0, np.int8)
         for low in range(0, v.size, chunk):
-            n = min(chunk, v.size - low)
-            evaluate(v, y, low, n, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
+            here = slice(low, low + chunk)
+            evaluate(v[here], y[here], coef, meta, bcoef, bmeta, table, floats, ints, mu[here], bound, source)
 
     return run
 

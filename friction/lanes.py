@@ -43,7 +43,7 @@ from friction.kernels import (
 from friction.outer import FUSE
 from friction.patch_simd import patch_value
 
-__all__ = ["CHUNK", "evaluate_chunk", "ratio_array", "scratch", "value_array"]
+__all__ = ["CHUNK", "evaluate_chunk", "plan", "ratio_array", "scratch", "value_array"]
 
 CHUNK = 256  # points that go through the passes together: their scratch stays in the fastest cache
 Ints = NDArray[np.int64]
@@ -72,12 +72,12 @@ def plan(meta: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
-def _amplitudes(y: Array, low: int, n: int, bmeta: Array, cell: Ints, local: Array, scale: Array, level: Array) -> None:
+def _amplitudes(y: Array, bmeta: Array, cell: Ints, local: Array, scale: Array, level: Array) -> None:
     """The border's cell, coordinate in it and scale, and the logarithm of y~ (anything legal where y~ is rare)."""
     offset0, pace0, offset1, pace1 = bmeta[0, 2], bmeta[0, 3], bmeta[1, 2], bmeta[1, 3]
     above = np.int64(bmeta[1, 0])
-    for i in range(n):
-        given = y[low + i]
+    for i in range(y.size):
+        given = y[i]
         a = given if (given > _TINY) & (given <= Y_TAIL) else 1.0
         y2 = a * a
         ln = log(a)
@@ -103,12 +103,12 @@ def _borders(n: int, cell: Ints, local: Array, bcoef: Array, crit: Array) -> Non
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def _places(
-    v: Array, y: Array, low: int, n: int, crit: Array, level: Array,
+    v: Array, y: Array, crit: Array, level: Array,
     kind: Ints, a: Array, b: Array, base: Array, factor: Array,
 ) -> None:  # fmt: skip
     """The kind of block and the coordinates in it, with mu~ = base + factor q(a, b)."""
-    for i in range(n):
-        speed, amplitude = v[low + i], y[low + i]
+    for i in range(v.size):
+        speed, amplitude = v[i], y[i]
         rho = speed / crit[i]
         y2 = amplitude * amplitude
         sliding = rho >= 1.0
@@ -160,23 +160,19 @@ def _cells(n: int, kind: Ints, table: Array, a: Array, b: Array, patch: Ints, ra
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
-def _values(
-    low: int, n: int, coef: Array, patch: Ints, u: Array, w: Array, base: Array, factor: Array, mu: Array
-) -> None:  # fmt: skip
-    for i in range(n):
+def _values(coef: Array, patch: Ints, u: Array, w: Array, base: Array, factor: Array, mu: Array) -> None:
+    for i in range(mu.size):
         x = base[i] + factor[i] * patch_value(coef, patch[i], u[i], w[i])
         x = x if x > 0.0 else 0.0
-        mu[low + i] = x if x < 1.0 else 1.0
+        mu[i] = x if x < 1.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
-def _bounds(
-    low: int, n: int, kind: Ints, table: Array, factor: Array, bound: Array, source: NDArray[np.int8]
-) -> None:  # fmt: skip
-    for i in range(n):
+def _bounds(kind: Ints, table: Array, factor: Array, bound: Array, source: NDArray[np.int8]) -> None:
+    for i in range(bound.size):
         k = kind[i]
-        bound[low + i] = abs(factor[i]) * table[k, 6] + table[k, 7]
-        source[low + i] = _BLOCK[k]
+        bound[i] = abs(factor[i]) * table[k, 6] + table[k, 7]
+        source[i] = _BLOCK[k]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -187,25 +183,27 @@ def scratch() -> tuple[Array, Ints]:
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def evaluate_chunk(
-    v: Array, y: Array, low: int, n: int, coef: Array, meta: Array, bcoef: Array, bmeta: Array,
+    v: Array, y: Array, coef: Array, meta: Array, bcoef: Array, bmeta: Array,
     table: Array, floats: Array, ints: Ints, mu: Array, bound: Array, source: NDArray[np.int8],
 ) -> None:  # fmt: skip
-    """Fill ``n`` <= CHUNK points from ``low`` on; ``bound`` and ``source`` only where they are not empty.
+    """Answer up to CHUNK points; ``bound`` and ``source`` are filled only where they are not empty.
 
     Points must be legal (v~ >= 0, 0 <= y~ < infinity) to be answered; others give NaN and the source -1.
     """
+    n = v.size
     crit, level, a, b, base, factor = floats[0], floats[1], floats[2], floats[3], floats[4], floats[5]
     kind, patch, rare = ints[0], ints[1], ints[2]
-    _amplitudes(y, low, n, bmeta, patch, a, crit, level)
+    _amplitudes(y, bmeta, patch, a, crit, level)
     _borders(n, patch, a, bcoef, crit)
-    _places(v, y, low, n, crit, level, kind, a, b, base, factor)
+    _places(v, y, crit, level, kind, a, b, base, factor)
     found = _cells(n, kind, table, a, b, patch, rare)
-    _values(low, n, coef, patch, a, b, base, factor, mu)
+    _values(coef, patch, a, b, base, factor, mu)
     told = bound.size > 0
     if told:
-        _bounds(low, n, kind, table, factor, bound, source)
+        _bounds(kind, table, factor, bound, source)
     for j in range(found):
-        i = low + rare[j]
+        i = rare[j]
+        # between these amplitudes nothing but a large speed is rare
         if Y_CONT < y[i] <= Y_TAIL and _SPEED_TINY < v[i] < _HUGE:
             s, _, _, m, _, e = fast(v[i], y[i])
         elif v[i] >= 0.0 and 0.0 <= y[i] < math.inf:
@@ -228,9 +226,10 @@ def ratio_array(
     table = plan(meta)
     for c in prange((n + CHUNK - 1) // CHUNK):
         floats, ints = scratch()
-        low = c * CHUNK
+        a = c * CHUNK
+        b = min(a + CHUNK, n)
         evaluate_chunk(
-            v, y, low, min(CHUNK, n - low), coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source
+            v[a:b], y[a:b], coef, meta, bcoef, bmeta, table, floats, ints, mu[a:b], bound[a:b], source[a:b]
         )  # fmt: skip
 
 

@@ -249,11 +249,11 @@ def gradient_array(
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def _groups(
-    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, low: int, n: int,
+    mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array,
     v: Array, y: Array, odd: NDArray[np.int64],
 ) -> int:  # fmt: skip
     """v~ and y~ of ordinary cases; list the others: zero, rigid, near the ends of the double range, or illegal."""
-    for i in range(low, low + n):
+    for i in range(v.size):
         force, stretch, speed = mu0[i] * Fz[i], y0[i] * k[i], v0[i] * k[i]
         pace = force * omega[i]
         smallest = min(min(force, stretch), min(pace, speed))
@@ -267,7 +267,7 @@ def _groups(
         v[i] = fast if ordinary else -1.0
         y[i] = wide if ordinary else -1.0
     found = 0
-    for i in range(low, low + n):
+    for i in range(v.size):
         odd[found] = i
         found += int(v[i] < 0.0)
     return found
@@ -289,9 +289,9 @@ def _evaluate_chunk(
     rigid: bool, macro: Array, mu: Array, bound: Array, source: NDArray[np.int8],
 ) -> int:  # fmt: skip
     n = mu.size
-    v, y, odd = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK + 1, np.int64)
-    found = _groups(mu0, Fz, k, y0, omega, v0, 0, n, v, y, odd)
-    evaluate_chunk(v, y, 0, n, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
+    v, y, odd = np.empty(n), np.empty(n), np.empty(n + 1, np.int64)
+    found = _groups(mu0, Fz, k, y0, omega, v0, v, y, odd)
+    evaluate_chunk(v, y, coef, meta, bcoef, bmeta, table, floats, ints, mu, bound, source)
     illegal = 0
     for j in range(found):
         i = odd[j]
