@@ -476,12 +476,7 @@ def main() -> None:
             text = case()
             print(f"## {name}\n\n{text}\n", flush=True)
             if given.write:
-                page = PAGE.read_text(encoding="utf-8")
-                begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
-                if page.count(begin) != 1 or page.count(end) != 1:
-                    parser.error(f"{PAGE} must hold {begin.strip()!r} and {end!r} once each")
-                before, _, rest = page.partition(begin)
-                PAGE.write_text(f"{before}{begin}\n{text}\n\n{end}{rest.partition(end)[2]}", encoding="utf-8")
+                measuring.write_section(name, text, PAGE)
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ __all__ = [
     "markdown",
     "progress",
     "quantity",
+    "read_section",
     "write_section",
 ]
 
@@ -135,18 +136,29 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns:
     return "\n".join([line(header), line(rule), *map(line, rows)])
 
 
-def write_section(name: str, text: str, path: Path = PAGE) -> None:
-    """Replace what stands between the markers of ``name`` on a page, docs/benchmarks.md unless told.
+def _parts(name: str, path: Path) -> tuple[str, str, str]:
+    """What stands before, between and behind the markers of ``name``, the markers outside."""
+    page = path.read_text(encoding="utf-8")
+    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+    if page.count(begin) != 1 or page.count(end) != 1:
+        raise ValueError(f"{path} must hold {begin!r} and {end!r} once each")
+    before, _, rest = page.partition(begin)
+    between, _, after = rest.partition(end)
+    return before + begin, between, end + after
+
+
+def read_section(name: str, path: Path = PAGE) -> str:
+    """What stands between the markers of ``name`` on a page, docs/benchmarks.md unless told.
 
     Raises
     ------
     ValueError
         When the page lacks one of the markers.
     """
-    page = path.read_text(encoding="utf-8")
-    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
-    if page.count(begin) != 1 or page.count(end) != 1:
-        raise ValueError(f"{path} must hold {begin!r} and {end!r} once each")
-    before, _, rest = page.partition(begin)
-    _, _, after = rest.partition(end)
-    path.write_text(before + begin + "\n" + text.strip() + "\n\n" + end + after, encoding="utf-8")
+    return _parts(name, path)[1]
+
+
+def write_section(name: str, text: str, path: Path = PAGE) -> None:
+    """Replace what :func:`read_section` reads; raises the same."""
+    before, _, after = _parts(name, path)
+    path.write_text(f"{before}\n{text.strip()}\n\n{after}", encoding="utf-8")

@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 import orjson
-from measuring import IMAGES, ROOT, machine, markdown, progress, quantity
+from measuring import IMAGES, ROOT, machine, markdown, progress, quantity, write_section
 
 from friction.nondim import FIELDS
 from service.answers import answer_cases
@@ -695,11 +695,7 @@ def main() -> None:
         print(text, end="\n\n")
     if options.write:
         for name, text in sections.items():
-            path = DECISION if name == "readers" else PAGE
-            page = path.read_text(encoding="utf-8")
-            begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
-            before, _, rest = page.partition(begin)
-            path.write_text(before + begin + "\n" + text + "\n\n" + end + rest.partition(end)[2], encoding="utf-8")
+            write_section(name, text, DECISION if name == "readers" else PAGE)
         plot(rates, alone, IMAGES / "service.png")
 
 

@@ -28,7 +28,6 @@ from measuring import ROOT, markdown, progress, quantity
 from friction import Surrogate
 
 PAGE = ROOT / "tables" / "README.md"
-BEGIN, END = "<!-- begin tables -->\n", "<!-- end tables -->"
 HEADER = ("table", "tolerance", "solves", "bytes", "memory of the cells, bytes", "max abs error", "max rel error")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
@@ -76,11 +75,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="threads that solve")
     parser.add_argument("--write", action="store_true", help="put the table into tables/README.md")
     given = parser.parse_args()
-    page = PAGE.read_text(encoding="utf-8")
-    if page.count(BEGIN) != 1 or page.count(END) != 1:
-        parser.error(f"{PAGE} must hold {BEGIN.strip()!r} and {END!r} once each")
-    head, _, rest = page.partition(BEGIN)
-    old, _, tail = rest.partition(END)
+    old = measuring.read_section("tables", PAGE)
     opened = sorted((Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")), key=lambda s: -s.tolerance)
     rows, builds = [], []
     for s in opened:
@@ -104,7 +99,7 @@ def main() -> None:
     text = "\n\n".join([commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)])
     print(text)
     if given.write:
-        PAGE.write_text(f"{head}{BEGIN}\n{text}\n\n{END}{tail}", encoding="utf-8")
+        measuring.write_section("tables", text, PAGE)
 
 
 if __name__ == "__main__":

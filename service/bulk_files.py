@@ -169,6 +169,22 @@ class _Lines(Source):
     def start(self, place: Any) -> None:
         """Learn the columns, then go to ``place``."""
 
+    @abstractmethod
+    def rows(self) -> Iterator[Row]:
+        """The rows from here on, one by one."""
+
+    def __iter__(self) -> Iterator[list[Row]]:
+        rows: list[Row] = []
+        for row in self.rows():
+            rows.append(row)
+            if len(rows) >= self.chunk:
+                self.mark()
+                yield rows
+                rows = []
+        self.mark()
+        if rows:
+            yield rows
+
     def go_to(self, offset: int) -> None:
         self.stream.seek(offset)
         self.offset = offset
@@ -200,29 +216,20 @@ class _CsvSource(_Lines):
         self.names = _columns_of(self.path, header)
         self.go_to(int(place) if place else self.offset)
 
-    def __iter__(self) -> Iterator[list[Row]]:
+    def rows(self) -> Iterator[Row]:
         lines = self.lines()
         reader = csv.reader(lines)
-        rows: list[Row] = []
         while True:
             try:
                 cells = next(reader)
             except StopIteration:
-                break
+                return
             except csv.Error as error:  # a cell without end, most often: a quote that is never closed
-                rows.append(Row({}, fault=(None, f"is no CSV: {error}"), raw=""))
+                yield Row({}, fault=(None, f"is no CSV: {error}"), raw="")
                 reader = csv.reader(lines)
                 continue
-            if not cells:
-                continue  # an empty line, often the last
-            rows.append(self.row(cells))
-            if len(rows) >= self.chunk:
-                self.mark()
-                yield rows
-                rows = []
-        self.mark()
-        if rows:
-            yield rows
+            if cells:  # else an empty line, often the last
+                yield self.row(cells)
 
     def row(self, cells: list[str]) -> Row:
         row = Row(dict(zip(self.columns, cells, strict=False)), raw=",".join(cells))
@@ -247,19 +254,10 @@ class _NdjsonSource(_Lines):
         self.columns = columns
         self.go_to(int(place or 0))
 
-    def __iter__(self) -> Iterator[list[Row]]:
-        rows: list[Row] = []
+    def rows(self) -> Iterator[Row]:
         for line in self.lines():
-            if not line.strip():
-                continue
-            rows.append(self.row(line))
-            if len(rows) >= self.chunk:
-                self.mark()
-                yield rows
-                rows = []
-        self.mark()
-        if rows:
-            yield rows
+            if line.strip():
+                yield self.row(line)
 
     def row(self, line: str) -> Row:
         text = line.strip()

@@ -21,6 +21,7 @@ __all__ = [
     "describe_umbridge",
     "form_parameters",
     "install",
+    "json_body",
     "option_parameters",
     "table_parameters",
     "umbridge_body",
@@ -73,6 +74,12 @@ def describe_json(answer: str | Sequence[str], *statuses: int) -> dict[int | str
         200: {"description": "The answer", "content": {"application/json": {"schema": schema}}},
         **describe_problems(*statuses),
     }
+
+
+def json_body(model: str) -> dict[str, Any]:
+    """Describe a body of JSON of one model."""
+    schema = {"$ref": _REF.format(model=model)}
+    return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}
 
 
 def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:

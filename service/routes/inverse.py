@@ -13,7 +13,7 @@ from service.answers import signature
 from service.codecs import encode
 from service.forms import SolveForRequest, read_form
 from service.intake import read_body, refuse_query
-from service.openapi import describe_json
+from service.openapi import describe_json, json_body
 from service.shelf import LoadedTable, shelf_of
 
 __all__ = ["router"]
@@ -26,12 +26,7 @@ router = APIRouter(tags=["answers"])
     operation_id="post_solve_for",
     summary="The value of one input that gives a wanted mu_macro",
     response_class=Response,
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": {"$ref": "#/components/schemas/SolveForRequest"}}},
-        }
-    },
+    openapi_extra=json_body("SolveForRequest"),
     responses=describe_json("SolveForAnswer", 400, 401, 413, 415, 422, 503),
 )
 async def post_solve_for(request: Request) -> Response:

@@ -18,7 +18,7 @@ from service.codecs import encode
 from service.errors import FieldFault, InvalidFieldsError
 from service.forms import LawRequest, from_text, read_form
 from service.intake import query_pairs, read_body, refuse_query
-from service.openapi import describe_json, form_parameters
+from service.openapi import describe_json, form_parameters, json_body
 from service.shelf import LoadedTable, shelf_of
 
 __all__ = ["router"]
@@ -31,12 +31,7 @@ router = APIRouter(tags=["answers"])
     operation_id="post_law",
     summary="mu_macro over a range of one input",
     response_class=Response,
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": {"$ref": "#/components/schemas/LawRequest"}}},
-        }
-    },
+    openapi_extra=json_body("LawRequest"),
     responses=describe_json("LawAnswer", 400, 401, 413, 415, 422, 503),
 )
 async def post_law(request: Request) -> Response:

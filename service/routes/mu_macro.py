@@ -8,7 +8,7 @@ from service.answers import answer_case, case_etag
 from service.codecs import encode
 from service.intake import canonical, case_from_body, case_from_query, read_body, refuse_query
 from service.metrics import Metrics
-from service.openapi import case_parameters, describe_json
+from service.openapi import case_parameters, describe_json, json_body
 from service.schemas import CaseRequest
 from service.settings import cache_fields
 from service.shelf import LoadedTable, shelf_of
@@ -59,12 +59,7 @@ async def get_mu_macro(request: Request) -> Response:
     operation_id="post_mu_macro",
     summary="Macroscopic friction of one case, as JSON",
     response_class=Response,
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": {"$ref": "#/components/schemas/CaseRequest"}}},
-        }
-    },
+    openapi_extra=json_body("CaseRequest"),
     responses=describe_json("CaseAnswer", 400, 401, 413, 415, 422, 503),
 )
 async def post_mu_macro(request: Request) -> Response:
