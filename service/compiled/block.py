@@ -12,6 +12,7 @@ __all__ = [
     "MISSING_FLAW",
     "NUMBER_FLAW",
     "mark_flaws",
+    "write_block",
     "write_names",
     "write_numbers",
     "write_rows",
@@ -100,6 +101,35 @@ def write_names(out: Bytes, p: int, codes: Codes, names: Bytes, ends: NDArray[np
         out[p] = 44
         p += 1
     return p
+
+
+@loop
+def write_block(
+    out: Bytes,
+    p: int,
+    mu_macro: Array,
+    mu_ratio: Array,
+    bound: Array,
+    codes: Codes,
+    pieces: Bytes,
+    piece_ends: NDArray[np.int64],
+    regimes: Bytes,
+    regime_ends: NDArray[np.int64],
+    sources: Bytes,
+    source_ends: NDArray[np.int64],
+) -> int:
+    """Write good cases as one object of lists.  ``pieces`` is the text before each list and at the end."""
+    p = _copy(out, p, pieces, piece_ends[0], piece_ends[1])
+    p = write_numbers(out, p, mu_macro) - 1  # what comes next overwrites the last comma
+    p = _copy(out, p, pieces, piece_ends[1], piece_ends[2])
+    p = write_numbers(out, p, mu_ratio) - 1
+    p = _copy(out, p, pieces, piece_ends[2], piece_ends[3])
+    p = write_names(out, p, codes, regimes, regime_ends) - 1
+    p = _copy(out, p, pieces, piece_ends[3], piece_ends[4])
+    p = write_numbers(out, p, bound) - 1
+    p = _copy(out, p, pieces, piece_ends[4], piece_ends[5])
+    p = write_names(out, p, codes, sources, source_ends) - 1
+    return _copy(out, p, pieces, piece_ends[5], piece_ends[6])
 
 
 @loop

@@ -25,6 +25,7 @@ __all__ = [
     "RIGID",
     "SOUND",
     "UNKNOWN",
+    "read_block",
     "read_list",
     "read_rows",
     "skip_space",
@@ -51,7 +52,7 @@ NO_OBJECT, UNKNOWN = 1, 2
 HARD_ROOM = 1024
 
 _DEPTH = 128  # bits of two words
-_ONE, _TOP = np.uint64(1), np.uint64(63)
+_ZERO, _ONE, _TOP = np.uint64(0), np.uint64(1), np.uint64(63)
 _K = 2  # the field that may be null
 
 
@@ -256,6 +257,69 @@ def _field(text: Bytes, i: int, length: int) -> int:
         if c == 111 and text[i + 1] == 109 and text[i + 2] == 101 and text[i + 3] == 103 and text[i + 4] == 97:
             return 4
     return -1
+
+
+@loop
+def read_block(text: Bytes, i: int, stop: int, words: Words, first: int, hard: Places) -> int:
+    """Read text[i:stop], one object of lists and plain numbers under the names of the inputs, from case ``first`` on.
+
+    A quick look at what most lines of a stream are, where lines lie behind one another in ``text``.  Returns how many
+    cases it is; -1 where ``words`` (6, capacity) has no room for them; 0 for anything out of the ordinary.
+    """
+    size = -1
+    seen = listed = 0
+    i = skip_space(text, i)
+    if text[i] != 123:
+        return 0
+    while True:
+        i = skip_space(text, i + 1)
+        if text[i] != 34:
+            return 0
+        start = i + 1
+        i = start
+        while text[i] > 34:
+            i += 1
+        if text[i] != 34:
+            return 0
+        field = _field(text, start, i - start)
+        if field < 0 or seen >> field & 1:
+            return 0
+        seen |= 1 << field
+        i = skip_space(text, i + 1)
+        if text[i] != 58:
+            return 0
+        i = skip_space(text, i + 1)
+        if text[i] == 91:
+            i, count, waiting, state = read_list(text, i + 1, words[field, first:], 0, field == _K, hard, 0)
+            if state == FULL:
+                return -1
+            if state != SOUND or waiting > 0 or count == 0 or (listed and count != size):
+                return 0
+            size = count
+            listed |= 1 << field
+        else:
+            bits, i, kind = _read_entry(text, i, field == _K)
+            if kind != NUMBER or bits > RIGID or (bits == RIGID and field != _K) or (bits == _ZERO and field < 3):
+                return 0
+            if first == words.shape[1]:
+                return -1
+            words[field, first] = bits
+        i = skip_space(text, i)
+        if text[i] == 125:
+            break
+        if text[i] != 44:
+            return 0
+    i += 1
+    while i < stop and (text[i] == 32 or text[i] == 13 or text[i] == 9):
+        i += 1
+    if i != stop or listed == 0 or seen | 1 << _K != 63:
+        return 0
+    for field in range(6):
+        if not listed >> field & 1:
+            bits = words[field, first] if seen >> field & 1 else RIGID
+            for j in range(first, first + size):
+                words[field, j] = bits
+    return size
 
 
 @loop

@@ -21,14 +21,13 @@ from starlette.types import Message, Receive, Scope, Send
 from friction.errors import MumacroError
 from friction.regions import SOURCES
 from service.answers import Answers, answer_cases, signature
-from service.codecs import columns_text, is_rows, lines_text, read_batch, room_for, row_text, rows_text, terminated
+from service.codecs import columns_text, is_rows, read_batch, room_for, row_text, rows_text, terminated
 from service.compiled.digits import PADDING, Bytes
 from service.connection import FILL
 from service.errors import (
     BodyTooLargeError,
     MalformedBodyError,
     OverloadedError,
-    RequestError,
     problem_of,
 )
 from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
@@ -38,6 +37,7 @@ from service.openapi import batch_bodies, describe_batch, option_parameters
 from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
+from service.streams import LineAnswers, Lines, Spans
 
 __all__ = ["BatchEndpoint", "router"]
 
@@ -48,7 +48,6 @@ _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _FEW_LINES = 16
 _COUNTED = 65536  # cases that are counted at a time
-_SHORT_LINE = 1024  # bytes of one case on a line of its own
 
 
 class BatchEndpoint:
@@ -241,101 +240,41 @@ class BatchEndpoint:
 
     async def _stream(self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget) -> None:
         """Answer line by line, each as soon as it is there: what is held does not grow with the stream."""
-        self._shelf.pick(query.tolerance, "parameter")  # refused before the first byte, if at all
+        answer = partial(self._answer, query=query, line=True)
+        answers = LineAnswers(self._shelf, query, self._settings.max_batch, answer, self._count)  # or an error, by now
         headers = [(b"content-type", NDJSON.encode("ascii"))]
         packer = Packer() if wants_gzip(request) else None
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
-        number = 0
-        async for lines in self._lines(receive, budget):
+        async for lines, spans, number in self._lines(receive, budget):
             # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
-            size = sum(map(len, lines)) if len(lines) <= _FEW_LINES else _AT_ONCE + 1
-            pieces = gather(self._line_pieces(lines, number, query))
-            number += len(lines)
-            async for piece, _ in self._each(size, pieces):
+            size = spans[-1][1] - spans[0][0] if len(spans) <= _FEW_LINES else _AT_ONCE + 1
+            async for piece, _ in self._each(size, gather(answers.pieces(lines, spans, number))):
                 if packer is not None:
                     piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
                 await budget.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
 
-    async def _lines(self, receive: Receive, budget: Budget) -> AsyncIterator[list[bytearray]]:
-        """Yield whole lines, as many as there are."""
+    async def _lines(self, receive: Receive, budget: Budget) -> AsyncIterator[tuple[Lines, Spans, int]]:
+        """Whole lines, some at a time, and how many came before."""
         limit = self._settings.max_body_bytes
-        rest = bytearray()
+        lines = Lines()
+        number = 0
         deadline = budget.deadline()
         more = True
         while more:
-            message = await budget.client(receive(), deadline)
-            if message["type"] != "http.request":
-                raise ClientDisconnect
+            message = await self._message(receive, budget, deadline)
             more = message.get("more_body", False)
-            piece = message.get("body", b"")
-            seen = memoryview(piece)
-            lines, start = [], 0
-            while (end := piece.find(b"\n", start)) >= 0:
-                rest += seen[start:end]
-                lines.append(rest)
-                rest, start = bytearray(), end + 1
-            rest += seen[start:]
-            if len(rest) > limit:
-                raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
-            if lines:
-                yield lines
+            lines.put(message.get("body", b""))
+            while spans := lines.take(_AT_ONCE // 2, last=not more):
+                yield lines, spans, number
+                number += len(spans)
                 deadline = budget.deadline()
-        if rest:
-            yield [rest]
-
-    def _line_pieces(self, lines: list[bytearray], number: int, query: Options) -> Iterator[bytes]:
-        """Answer lines; ``number`` is how many came before."""
-        plain = self._plain_lines(lines, number, query) if len(lines) > 1 else None
-        if plain is not None:
-            yield from plain
-            return
-        for index, line in enumerate(lines, number + 1):
-            yield from self._line(line, index, query)
-
-    def _line(self, line: bytearray, number: int, query: Options) -> Iterator[bytes]:
-        if not line or line.isspace():
-            return
-        try:
-            answered = self._answer(terminated(line), query, line=True)
-        except RequestError as error:
-            yield bytes(problem_of(error, f"{BATCH_PATH}#line={number}").body)
-        else:
-            yield from answered
-        yield b"\n"
-
-    def _plain_lines(self, lines: list[bytearray], number: int, query: Options) -> Iterator[bytes] | None:
-        """Answer lines of one object each all at once; None where they are anything else."""
-        for line in lines:
-            if len(line) > _SHORT_LINE or line[:1] != b"{" or line.rstrip()[-1:] != b"}" or line.count(b"{") != 1:
-                return None
-        text = terminated(bytearray(b"[%b]" % b",".join(lines)))
-        try:
-            options, place = merged_options(query, {})
-            cases, _ = read_batch(text, len(lines))
-            table = self._shelf.pick(options.tolerance, place)
-        except RequestError:
-            return None
-        answers = answer_cases(table, cases, options.include, options.std)
-        if answers.size != len(lines):
-            return None
-        self._count(table, answers, 0)  # whether a case is bad, and why, is found out line by line
-        return self._mended(lines_text(answers, signature(table)), answers, lines, number, query)
-
-    def _mended(
-        self, texts: Iterator[tuple[int, bytes]], answers: Answers, lines: list[bytearray], number: int, query: Options
-    ) -> Iterator[bytes]:
-        """The texts, with what a line by itself is answered in place of every null."""
-        for start, text in texts:
-            pieces = text.splitlines(keepends=True)
-            odd = np.flatnonzero(answers.flaws[start : start + len(pieces)]).tolist()
-            for index in odd:
-                line = start + index
-                pieces[index] = b"".join(self._line(lines[line], number + line + 1, query))
-            yield b"".join(pieces) if odd else text
+                await asyncio.sleep(0)  # others' turn
+            if lines.rest > limit:
+                raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
 
 
 def _body_too_large(limit: int) -> BodyTooLargeError:
