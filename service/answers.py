@@ -25,9 +25,11 @@ __all__ = [
     "Cases",
     "answer_case",
     "answer_cases",
+    "answer_columns",
     "case_etag",
     "default_answer",
     "included",
+    "read_only",
     "signature",
 ]
 
@@ -38,6 +40,7 @@ _NAMES = [(REGIMES[regime], source) for regime, source in zip(REGIME_OF_SOURCE, 
 _INFINITE = float("inf")
 _EXTRA_SLICE = 16384  # cases that included values are computed for at a time
 _SIX = Struct("<6d")
+_NO_FLAWS = np.zeros(0, dtype=np.uint8)
 
 
 @dataclass
@@ -130,7 +133,8 @@ def case_etag(table: LoadedTable, case: CaseRequest, include: Sequence[str]) -> 
     return f'"{blake2b(table.tag_key + numbers + tail, digest_size=16).hexdigest()}"'
 
 
-def _read_only(column: Array) -> Array:
+def read_only(column: Array) -> Array:
+    """A view of the column that is not written to."""
     # Compiled code is kept by type, and arrays that may be written to are of another one than those that lie in an
     # Arrow stream.
     seen = column.view()
@@ -138,17 +142,28 @@ def _read_only(column: Array) -> Array:
     return seen
 
 
-def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: InputStd | None = None) -> Answers:
-    """Answer every good case; a bad one gets NaN and its code in ``flaws``.  Runs without the interpreter's lock."""
-    n = cases.size
+def answer_columns(table: LoadedTable, n: int, columns: Sequence[Array]) -> Answers:
+    """Answer n cases in read-only columns.  Bad ones are counted; which those are, and why, is left to the caller.
+
+    Runs without the interpreter's lock.
+    """
     mu_macro, mu_ratio, bound = (np.empty(n) for _ in range(3))
     source = np.empty(n, dtype=np.int8)
-    mu0, fz, k, y0, omega, v0 = map(_read_only, cases.columns)
+    mu0, fz, k, y0, omega, v0 = columns
     a, b, c, d = table.arrays
     n_bad = evaluate_block(mu0, fz, k, y0, omega, v0, a, b, c, d, mu_macro, mu_ratio, bound, source)
-    if n_bad or cases.flaws.any():
-        n_bad = mark_flaws(mu0, fz, k, y0, omega, v0, mu_macro, mu_ratio, bound, source, cases.flaws)
-    answers = Answers(cases, n, mu_macro, mu_ratio, bound, source, cases.flaws, n_bad)
+    return Answers(None, n, mu_macro, mu_ratio, bound, source, _NO_FLAWS, n_bad)
+
+
+def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: InputStd | None = None) -> Answers:
+    """Answer every good case; a bad one gets NaN and its code in ``flaws``."""
+    columns = [read_only(column) for column in cases.columns]
+    answers = answer_columns(table, cases.size, columns)
+    answers.cases, answers.flaws = cases, cases.flaws
+    if answers.n_bad or cases.flaws.any():
+        mu0, fz, k, y0, omega, v0 = columns
+        values = answers.mu_macro, answers.mu_ratio, answers.error_bound
+        answers.n_bad = mark_flaws(mu0, fz, k, y0, omega, v0, *values, answers.source, cases.flaws)
     if include:
         answers.extras = _batch_extras(table.surrogate, cases, include, std)
     return answers

@@ -16,11 +16,14 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from service.middleware import BATCH_PATH
 from service.wire import CASE_PATH, Application, ShortWay
 
-__all__ = ["FILL", "Connection", "sweep"]
+__all__ = ["FILL", "PIECES", "Connection", "sweep"]
 
 #: extension of the protocol: puts the rest of a body where the application wants it, see Connection.fill
 FILL = "mumacro.fill"
+#: extension of the protocol: hands on the pieces of a body as they came, see Connection.pieces
+PIECES = "mumacro.pieces"
 
+_AHEAD = 256 * 1024  # bytes that are read while the application is busy with what came before
 _EVERY_S = 1.0
 _open: "WeakSet[Connection]" = WeakSet()
 
@@ -37,6 +40,7 @@ class Connection(HttpToolsProtocol):
     owed: object = None
     _short: ShortWay | None = None
     _filling: "_Filling | None" = None
+    _stream: "_Stream | None" = None
     _held: tuple[Any, Any] | None = None
     _date: tuple[Any, bytes] = (None, b"")
 
@@ -52,7 +56,7 @@ class Connection(HttpToolsProtocol):
         """Start the application, unless the rest of a short request is worth waiting for."""
         scope = cycle.scope
         if scope["path"] == BATCH_PATH:
-            scope["extensions"] = {FILL: partial(self.fill, cycle)}
+            scope["extensions"] = {FILL: partial(self.fill, cycle), PIECES: partial(self.pieces, cycle)}
         if self._short is not None and scope["path"] == CASE_PATH and cycle is self.cycle and app is self.app:
             headers = dict(scope["headers"])
             if (
@@ -86,13 +90,35 @@ class Connection(HttpToolsProtocol):
         finally:
             self._filling = None
 
+    async def pieces(self, cycle: Any) -> tuple[list[bytes], bool] | None:
+        """The pieces of the body that have come since the last call, and whether there may be more.
+
+        None if the caller has left.
+        """
+        stream = self._stream
+        if stream is None or stream.cycle is not cycle:
+            stream = self._stream = _Stream(cycle, [bytes(cycle.body)] if cycle.body else [])
+            cycle.body = bytearray()
+        while not stream.pieces and cycle.more_body and not cycle.disconnected:
+            cycle.message_event.clear()
+            self.flow.resume_reading()
+            await cycle.message_event.wait()
+        pieces, stream.pieces, stream.size = stream.pieces, [], 0
+        return None if cycle.disconnected else (pieces, cycle.more_body)
+
     def on_body(self, body: bytes) -> None:
         """Put a piece where it belongs."""
-        filling = self._filling
-        if filling is None or filling.cycle is not self.cycle:
-            super().on_body(body)
-        else:
+        filling, stream = self._filling, self._stream
+        if filling is not None and filling.cycle is self.cycle:
             filling.put(body)
+        elif stream is not None and stream.cycle is self.cycle and not stream.cycle.response_complete:
+            stream.pieces.append(body)
+            stream.size += len(body)
+            if stream.size > _AHEAD:
+                self.flow.pause_reading()
+            stream.cycle.message_event.set()
+        else:
+            super().on_body(body)
 
     def on_message_complete(self) -> None:
         """Answer what was held back, or start the application after all."""
@@ -185,6 +211,15 @@ class _Filling:
     def end(self, whole: bool) -> None:
         if not self.done.done():
             self.done.set_result(whole)
+
+
+@dataclass
+class _Stream:
+    """A body whose pieces are handed on as they came."""
+
+    cycle: Any
+    pieces: list[bytes]
+    size: int = 0
 
 
 def _nothing() -> None:

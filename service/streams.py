@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from service.answers import Answers, Cases, answer_cases, signature
+from service.answers import Answers, answer_cases, answer_columns, read_only, signature
 from service.codecs import BlockWriter, lines_text, read_batch, terminated
 from service.compiled.digits import PADDING, Bytes
 from service.compiled.scan import HARD_ROOM, read_block
@@ -96,7 +96,7 @@ class LineAnswers:
         self._count = count
         self._words = np.empty((6, min(_CASES, max_batch)), dtype=np.uint64)
         self._hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
-        self._flaws = np.zeros(self._words.shape[1], dtype=np.uint8)
+        self._columns = [read_only(row.view(np.float64)) for row in self._words]
         self._table = shelf.pick(self._options.tolerance, self._place)
         self._writer = BlockWriter(signature(self._table))
 
@@ -134,10 +134,8 @@ class LineAnswers:
         if size == 0:
             return
         table = self._shelf.pick(self._options.tolerance, self._place)
-        columns = [row[:size].view(np.float64) for row in self._words]
-        answers = answer_cases(table, Cases(size, columns, self._flaws[:size]), ())
+        answers = answer_columns(table, size, [column[:size] for column in self._columns])
         if answers.n_bad:
-            self._flaws[:] = 0
             for index in range(stop - len(blocks) + 1, stop):
                 yield from self._line(lines.line(spans[index]), number + index + 1)
             return

@@ -10,10 +10,16 @@ import threading
 from dataclasses import replace
 from pathlib import Path
 
-from service.answers import answer_cases
+import numpy as np
+
+from friction.regions import SOURCES
+from service.answers import Answers, answer_cases
 from service.codecs import columns_text, read_batch, rows_text, terminated
+from service.compiled.block import count_codes
 from service.errors import RequestError
+from service.intake import Options
 from service.shelf import Shelf
+from service.streams import LineAnswers, Lines
 
 __all__ = ["prepare", "settle_memory"]
 
@@ -40,6 +46,14 @@ def prepare(shelf: Shelf) -> None:
         answers = answer_cases(table, cases, _INCLUDE)
         for write in (columns_text, rows_text):
             b"".join(write(replace(answers), {}))  # a writer lets go of the cases
+    lines = Lines()
+    lines.put(json.dumps(_TEXTS[1] | {"v0": [0.01], "k": [1e6]}).encode())
+    stream = LineAnswers(shelf, Options(), 1, lambda _text: iter(()), lambda _table, answers, _bad: _count(answers))
+    b"".join(stream.pieces(lines, lines.take(1, last=True), 0))
+
+
+def _count(answers: Answers) -> None:
+    count_codes(answers.source, np.zeros(len(SOURCES) + 1, dtype=np.int64))
 
 
 def settle_memory() -> None:

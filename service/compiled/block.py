@@ -11,6 +11,7 @@ __all__ = [
     "BOUND_FLAW",
     "MISSING_FLAW",
     "NUMBER_FLAW",
+    "count_codes",
     "mark_flaws",
     "write_block",
     "write_names",
@@ -66,6 +67,13 @@ def mark_flaws(
             bound[i] = np.nan
             source[i] = -1
     return bad
+
+
+@loop
+def count_codes(codes: Codes, counts: NDArray[np.int64]) -> None:
+    """Add how many there are of each code to ``counts``; the last place is that of -1."""
+    for i in range(codes.size):
+        counts[codes[i]] += 1
 
 
 @inlined

@@ -22,8 +22,9 @@ from friction.errors import MumacroError
 from friction.regions import SOURCES
 from service.answers import Answers, answer_cases, signature
 from service.codecs import columns_text, is_rows, read_batch, room_for, row_text, rows_text, terminated
+from service.compiled.block import count_codes
 from service.compiled.digits import PADDING, Bytes
-from service.connection import FILL
+from service.connection import FILL, PIECES
 from service.errors import (
     BodyTooLargeError,
     MalformedBodyError,
@@ -47,7 +48,6 @@ T = TypeVar("T")
 _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _FEW_LINES = 16
-_COUNTED = 65536  # cases that are counted at a time
 
 
 class BatchEndpoint:
@@ -201,10 +201,9 @@ class BatchEndpoint:
 
     def _count(self, table: LoadedTable, answers: Answers, n_bad: int | None = None) -> None:
         by_source = np.zeros(len(SOURCES) + 1, dtype=np.int64)
-        for start in range(0, answers.size, _COUNTED):  # it holds the lock
-            by_source += np.bincount(answers.source[start : start + _COUNTED] + 1, minlength=by_source.size)
+        count_codes(answers.source, by_source)
         self._metrics.count_cases(
-            table.metrics_place, by_source[1:].tolist(), answers.n_bad if n_bad is None else n_bad
+            table.metrics_place, by_source[:-1].tolist(), answers.n_bad if n_bad is None else n_bad
         )
 
     async def _send(
@@ -247,7 +246,7 @@ class BatchEndpoint:
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
-        async for lines, spans, number in self._lines(receive, budget):
+        async for lines, spans, number in self._lines(request.scope, receive, budget):
             # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
             size = spans[-1][1] - spans[0][0] if len(spans) <= _FEW_LINES else _AT_ONCE + 1
             async for piece, _ in self._each(size, gather(answers.pieces(lines, spans, number))):
@@ -257,24 +256,35 @@ class BatchEndpoint:
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
 
-    async def _lines(self, receive: Receive, budget: Budget) -> AsyncIterator[tuple[Lines, Spans, int]]:
+    async def _lines(self, scope: Scope, receive: Receive, budget: Budget) -> AsyncIterator[tuple[Lines, Spans, int]]:
         """Whole lines, some at a time, and how many came before."""
         limit = self._settings.max_body_bytes
+        take = scope.get("extensions", {}).get(PIECES)
         lines = Lines()
         number = 0
         deadline = budget.deadline()
-        more = True
-        while more:
-            message = await self._message(receive, budget, deadline)
-            more = message.get("more_body", False)
-            lines.put(message.get("body", b""))
-            while spans := lines.take(_AT_ONCE // 2, last=not more):
+        message = await self._message(receive, budget, deadline)
+        pieces, more = [message.get("body", b"")], message.get("more_body", False)
+        while True:
+            for piece in pieces:
+                lines.put(piece)
+            while spans := lines.take(_AT_ONCE, last=not more):
                 yield lines, spans, number
                 number += len(spans)
                 deadline = budget.deadline()
                 await asyncio.sleep(0)  # others' turn
             if lines.rest > limit:
                 raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
+            if not more:
+                return
+            if take is None:
+                message = await self._message(receive, budget, deadline)
+                pieces, more = [message.get("body", b"")], message.get("more_body", False)
+            else:
+                taken = await budget.client(take(), deadline)
+                if taken is None:
+                    raise ClientDisconnect
+                pieces, more = taken
 
 
 def _body_too_large(limit: int) -> BodyTooLargeError:
