@@ -31,9 +31,9 @@ _SHORT_LINE = 1024  # bytes of one case on a line of its own
 class Lines:
     """What has come of a stream and is not answered yet: lines behind one another, 0 bytes behind the last."""
 
-    def __init__(self) -> None:
+    def __init__(self, room: int = _ROOM) -> None:
         self._begin = self._filled = 0
-        self._memory, self.text = self._made(_ROOM)
+        self._memory, self.text = self._made(room)
 
     @staticmethod
     def _made(room: int) -> tuple[bytearray, Bytes]:

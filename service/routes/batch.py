@@ -248,7 +248,7 @@ class BatchEndpoint:
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         async for lines, spans, number in self._lines(request.scope, receive, budget):
             # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
-            size = spans[-1][1] - spans[0][0] if len(spans) <= _FEW_LINES else _AT_ONCE + 1
+            size = max(end - start for start, end in spans) if len(spans) <= _FEW_LINES else _AT_ONCE + 1
             async for piece, _ in self._each(size, gather(answers.pieces(lines, spans, number))):
                 if packer is not None:
                     piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
