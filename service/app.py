@@ -58,7 +58,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         state.access_log.start()
         state.batches.start(threads)
         settle_memory()
-        tasks = [asyncio.create_task(sweep(settings.client_timeout_s)), asyncio.create_task(state.metrics.share())]
+        always = sweep(settings.client_timeout_s), state.metrics.share(), state.batches.rooms.keep_tidy()
+        tasks = [asyncio.create_task(work) for work in always]
         with draining(state.shelf, settings.drain_s):
             yield
         for task in tasks:

@@ -5,9 +5,7 @@ different lengths, a bad plain number that would hold for every case.  A bad ent
 Cases go from text to arrays and back in compiled loops; Python objects are made for names, options and faults only.
 """
 
-import mmap
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
@@ -63,7 +61,6 @@ __all__ = [
     "is_rows",
     "lines_text",
     "read_batch",
-    "room_for",
     "row_text",
     "rows_text",
     "terminated",
@@ -73,8 +70,6 @@ MAX_ERRORS = 1000
 _REQUIRED = tuple(name for name in FIELDS if name != "k")
 _NOT_A_NUMBER = "must be a number"
 _SLICE = 8192  # cases that are written at a time: about half a millisecond
-_MAPPED_FROM = 1024 * 1024
-_PRIVATE: dict[str, Any] = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
 _MAX_OPTION = 64 * 1024  # bytes of a value that is neither a column nor a number
 _NAME = re.compile(rb'"(?:[^"\\\x00-\x1f]|\\.)*"')
 
@@ -85,19 +80,6 @@ def encode(values: Mapping[str, Any]) -> bytes:
 
 
 # --- reading ------------------------------------------------------------------------------------------
-
-
-def room_for(length: int) -> Bytes:
-    """Room for a text of so many bytes, with the 0 bytes behind it that stop every scan.
-
-    Large ones are mapped: numpy would ask for huge pages, and while the system gathers one of those, which can take
-    many milliseconds, the thread that fills the room answers nobody.
-    """
-    if length >= _MAPPED_FROM:
-        return np.frombuffer(mmap.mmap(-1, length + PADDING, **_PRIVATE), dtype=np.uint8)
-    text = np.empty(length + PADDING, dtype=np.uint8)
-    text[length:] = 0
-    return text
 
 
 def terminated(body: bytes | bytearray) -> Bytes:

@@ -21,7 +21,7 @@ from starlette.types import Message, Receive, Scope, Send
 from friction.errors import MumacroError
 from friction.regions import SOURCES
 from service.answers import Answers, answer_cases, signature
-from service.codecs import columns_text, is_rows, read_batch, room_for, row_text, rows_text, terminated
+from service.codecs import columns_text, is_rows, read_batch, row_text, rows_text, terminated
 from service.compiled.block import count_codes
 from service.compiled.digits import PADDING, Bytes
 from service.connection import FILL, PIECES
@@ -35,6 +35,7 @@ from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_opti
 from service.metrics import Metrics
 from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.openapi import batch_bodies, describe_batch, option_parameters
+from service.rooms import Rooms
 from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
@@ -61,6 +62,7 @@ class BatchEndpoint:
         self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
         self._arrow_known = False
         self.running = 0
+        self.rooms = Rooms(settings.max_body_bytes)
 
     def start(self, threads: ThreadPoolExecutor) -> None:
         """Take over the threads that large batches run in."""
@@ -140,7 +142,7 @@ class BatchEndpoint:
         message = await self._message(receive, budget, deadline)
         piece, more = message.get("body", b""), message.get("more_body", False)
         if length >= 0 and len(piece) <= length:
-            text = room_for(length)
+            text = self.rooms.take(length)
             room = text.data
             room[: len(piece)] = piece
             filled = len(piece)
