@@ -9,7 +9,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from service.compiled.digits import HARD, NUMBER, OUT_OF_RANGE, PADDING, TEXT_WIDTH, read_number, write_number
+from service.compiled.digits import (
+    HARD,
+    MALFORMED,
+    NUMBER,
+    OUT_OF_RANGE,
+    PADDING,
+    TEXT_WIDTH,
+    read_number,
+    write_number,
+)
 
 
 @njit
@@ -104,6 +113,40 @@ def test_more_than_nineteen_digits_are_left_to_the_caller(text):
 @pytest.mark.parametrize("text", ["0.00000000000000000000012", "-0.000000000000000000000000001e10", "0." + "0" * 40])
 def test_leading_zeros_are_no_digits(text):
     assert read(text) == (float(text), len(text), NUMBER)
+
+
+def lengths():
+    """Numbers of every length before the point and behind it, around all groups that digits are read in."""
+    digits = "91827364509182736450918273645"
+    for exponent in ("", "e5", "E-07", "e+123", "e-300", "e00000012", "e-000000012"):
+        for count in range(26):
+            for before in range(1, 26):
+                yield digits[:before] + ("." + digits[:count] if count else "") + exponent
+            for zeros in range(12):
+                yield "0." + "0" * zeros + digits[:count] + ("0" if count == 0 else "") + exponent
+            if count:
+                yield "0" * count + "1" + exponent
+
+
+def test_digits_of_any_number_are_read_wherever_they_end():
+    for text in lengths():
+        number = text.lower().partition("e")[0].replace(".", "")
+        if text[0] == "0" and text[1] != ".":
+            assert read(text)[1:] == (1, MALFORMED), text
+            continue
+        kind = HARD if len(number.lstrip("0")) > 19 else OUT_OF_RANGE if math.isinf(float(text)) else NUMBER
+        for sign in ("", "-"):
+            # at the very end, and before text that must not count
+            for behind in ("", ",9182.736e5", "]", " 918273645091827364509182736450"):
+                value, end, found = read(sign + text + behind)
+                assert (end, found) == (len(sign + text), kind), text
+                assert kind != NUMBER or value == float(sign + text), text
+
+
+def test_a_number_that_breaks_off_is_malformed():
+    for text in ("1.", "1.e5", "123456789.", "1e", "1e+", "1.5e-", "1.5e-x", "-", "-.5", "-01", "00", "01.5"):
+        for behind in ("", ",1", " 1.5e5,"):
+            assert read(text + behind)[2] == MALFORMED, text
 
 
 @settings(max_examples=1000, deadline=None)

@@ -4,6 +4,10 @@ Reading is the algorithm of Eisel and Lemire (D. Lemire, "Number parsing at a gi
 and Experience 51, 2021), writing is Schubfach (R. Giulietti, "The Schubfach way to render doubles", 2020): the
 shortest text that reads back as the same number.  Text is a uint8 array that ends in PADDING 0 bytes, which are part
 of no JSON token: every loop here stops at the first of them at the latest.
+
+What takes the time is not arithmetic but guesses: a branch that goes either way costs as much as ten multiplications.
+So both ways are computed where numbers of all digits toss a coin, and branches are left to what columns have in
+common.  Indices that cannot be negative are given as uint64, for numba looks at the sign of others.
 """
 
 import numpy as np
@@ -15,6 +19,7 @@ from service.compiled.machine import (
     load_eight,
     loop,
     multiply_high,
+    other_than_digits,
     store_eight,
     trailing_zeros,
 )
@@ -40,14 +45,12 @@ NUMBER, OUT_OF_RANGE, HARD, NO_NUMBER, MALFORMED = 0, 1, 2, 3, 4
 #: bytes that :func:`write_number` writes at most
 TEXT_WIDTH = 25
 #: bytes of 0 that must stand behind a text: as many as are read at a time
-PADDING = 8
+PADDING = 32
 
 _U = np.uint64
-_U0, _U1, _U2, _U3, _U4, _U10, _U11 = _U(0), _U(1), _U(2), _U(3), _U(4), _U(10), _U(11)
-_S52, _S53, _S63, _S64 = _U(52), _U(53), _U(63), _U(64)
+_U0, _U1, _U2, _U3, _U4, _U10 = _U(0), _U(1), _U(2), _U(3), _U(4), _U(10)
+_U8, _U16, _S32, _S52, _S63 = _U(8), _U(16), _U(32), _U(52), _U(63)
 _U40, _U100 = _U(40), _U(100)
-_S32, _U8, _U16 = _U(32), _U(8), _U(16)
-_HIGH_NIBBLES, _SIXES, _ALL_DIGITS = _U(0xF0F0F0F0F0F0F0F0), _U(0x0606060606060606), _U(0x3333333333333333)
 _ZEROS, _PAIRS_LOW = _U(0x3030303030303030), _U(0x000000FF000000FF)
 _PLACES = np.array([10**n for n in range(9)], dtype=np.uint64)
 _TIMES_LOW, _TIMES_HIGH = _U(0x000F424000000064), _U(0x0000271000000001)  # 10^6 and 100, 10^4 and 1
@@ -104,23 +107,21 @@ def _high(a: np.uint64, b: np.uint64) -> np.uint64:
 
 
 @inlined
-def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
-    """(w followed by the digits at ``i`` as a number, index behind them); eight at a time, no branch for the rest."""
-    while True:
-        eight: np.uint64 = load_eight(text, i)  # type: ignore[call-arg]
-        others = ((eight & _HIGH_NIBBLES) | (((eight + _SIXES) & _HIGH_NIBBLES) >> _U4)) ^ _ALL_DIGITS
-        count: int = trailing_zeros(others) >> 3
-        eight = eight - _ZEROS
-        if count < 8:
-            if count == 0:
-                return w, i
-            eight = eight << _U(64 - 8 * count)  # as if zeros stood in front
-        eight = eight * _U10 + (eight >> _U8)  # pairs of digits, in every other byte
-        eight = ((eight & _PAIRS_LOW) * _TIMES_LOW + ((eight >> _U16) & _PAIRS_LOW) * _TIMES_HIGH) >> _S32
-        w = w * _PLACES[count] + eight
-        i += count
-        if count < 8:
-            return w, i
+def _below(count: int) -> np.uint64:
+    """Ones in the lowest ``count`` <= 8 bytes.  All shifts by up to 64 take two steps: one of 64 is not defined."""
+    half = _U(4 * count)
+    return (_U1 << half << half) - _U1
+
+
+@inlined
+def _append(w: np.uint64, eight: np.uint64, count: int) -> np.uint64:
+    """w followed by the first ``count`` of eight bytes, which are digits; the others may be anything."""
+    half = _U(32 - 4 * count)
+    eight = (eight - _ZEROS) << half << half  # as if zeros stood in front
+    eight = eight * _U10 + (eight >> _U8)  # pairs of digits, in every other byte
+    eight = ((eight & _PAIRS_LOW) * _TIMES_LOW + ((eight >> _U16) & _PAIRS_LOW) * _TIMES_HIGH) >> _S32
+    place: np.uint64 = _PLACES[_U(count)]
+    return w * place + eight
 
 
 @inlined
@@ -132,7 +133,7 @@ def _double(w: np.uint64, q: int) -> np.uint64:
         return _EXPONENT << _S52
     shift: int = leading_zeros(w)  # type: ignore[call-arg]
     w = w << _U(shift)
-    row = q - _SMALLEST
+    row = _U(q - _SMALLEST)
     low, high = w * _FIVE_HIGH[row], _high(w, _FIVE_HIGH[row])
     if high & _MASK9 == _MASK9:  # only then can the lower half of the power matter
         more = _high(w, _FIVE_LOW[row])
@@ -182,12 +183,29 @@ def _matches(text: Bytes, i: int, word: bytes) -> bool:
     return True
 
 
-@loop
-def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
-    """(bits of the double, index behind it, what it was) of the JSON number that begins at ``i``.
+@inlined
+def _rounded(w: np.uint64, q: int, negative: bool, end: int) -> tuple[np.uint64, int, int]:
+    """What :func:`read_number` returns for w 10^q with its sign."""
+    bits = _U0 if w == _U0 else _double(w, q)
+    if bits >> _S52 == _EXPONENT:
+        return _U0, end, OUT_OF_RANGE
+    if negative:
+        bits = bits | (_U1 << _S63)
+    return bits, end, NUMBER
 
-    NaN, Infinity and -Infinity count as numbers out of range.  Bits are meaningful for NUMBER only.
-    """
+
+@inlined
+def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
+    """(w followed by the digits at ``i``, index behind them)."""
+    while 48 <= text[i] <= 57:
+        w = w * _U10 + _U(text[i] - 48)
+        i += 1
+    return w, i
+
+
+@loop
+def _read_slowly(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
+    """What :func:`read_number` returns, for anything: signs, more than eight digits before the point, no number."""
     start = i
     negative = text[i] == 45
     if negative:
@@ -230,12 +248,63 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
         q += -exponent if minus else exponent
     if many and _significant(text, start, i) > 19:
         return _U0, i, HARD
-    bits = _U0 if w == _U0 else _double(w, q)
-    if bits >> _S52 == _EXPONENT:
-        return _U0, i, OUT_OF_RANGE
-    if negative:
-        bits = bits | (_U1 << _S63)
-    return bits, i, NUMBER
+    return _rounded(w, q, negative, i)
+
+
+@inlined
+def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
+    """(bits of the double, index behind it, what it was) of the JSON number that begins at ``i``.
+
+    NaN, Infinity and -Infinity count as numbers out of range.  Bits are meaningful for NUMBER only.
+    """
+    # Where the parts end is seen in one mask of 32 bytes, before any digit is looked at: so the processor gets to the
+    # next number while it computes this one.
+    others: np.uint64 = other_than_digits(text, i)  # type: ignore[call-arg]
+    before: int = trailing_zeros(others)
+    point = text[_U(i + before)] == 46
+    if before == 0 or (point and before > 8):
+        return _read_slowly(text, i)
+    # The first eight digits, then where the others are; the point goes.
+    first: np.uint64 = load_eight(text, i)
+    wrong = (before > 1) & (text[_U(i)] == 48)
+    end, count, behind = before, before, i + 8
+    if point:
+        others = others & (others - _U1)
+        end = trailing_zeros(others)
+        count = end - 1
+        wrong |= count == before
+        behind += 1
+        low = _below(before)
+        moved: np.uint64 = load_eight(text, i + 1)
+        first = (first & low) | (moved & ~low)
+    zeros: int = trailing_zeros(first - _ZEROS) >> 3
+    wrong |= (count > 24) | (count - zeros > 19)
+    q = before - count
+    last = text[_U(i + end)]
+    if last == 101 or last == 69:
+        at = end + 1
+        sign = text[_U(i + at)]
+        others = others & (others - _U1)
+        end = trailing_zeros(others)
+        if end == at:
+            wrong |= (sign != 45) & (sign != 43)
+            at += 1
+            others = others & (others - _U1)
+            end = trailing_zeros(others)
+        word: np.uint64 = load_eight(text, i + at)
+        exponent = int(_append(_U0, word, min(end - at, 8)))
+        q += -exponent if sign == 45 else exponent
+        wrong |= (end == at) | (end - at > 8)
+    if wrong | (end >= 32):
+        return _read_slowly(text, i)
+    if count <= 8:
+        w = _append(_U0, first, count)
+    else:
+        more = min(count - 8, 8)
+        w = _append(_U0, first, 8)
+        w = _append(w, load_eight(text, behind), more)
+        w = _append(w, load_eight(text, behind + 8), count - 8 - more)
+    return _rounded(w, q, False, i + end)
 
 
 @inlined
