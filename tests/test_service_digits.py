@@ -9,7 +9,17 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from service.compiled.digits import HARD, NUMBER, OUT_OF_RANGE, PADDING, TEXT_WIDTH, read_number, write_number
+from service.compiled.block import write_names, write_numbers
+from service.compiled.digits import (
+    HARD,
+    MALFORMED,
+    NUMBER,
+    OUT_OF_RANGE,
+    PADDING,
+    TEXT_WIDTH,
+    read_number,
+    write_number,
+)
 
 
 @njit
@@ -104,6 +114,74 @@ def test_more_than_nineteen_digits_are_left_to_the_caller(text):
 @pytest.mark.parametrize("text", ["0.00000000000000000000012", "-0.000000000000000000000000001e10", "0." + "0" * 40])
 def test_leading_zeros_are_no_digits(text):
     assert read(text) == (float(text), len(text), NUMBER)
+
+
+def lengths():
+    """Numbers of every length before the point and behind it, around all groups that digits are read in."""
+    digits = "91827364509182736450918273645"
+    for exponent in ("", "e5", "E-07", "e+123", "e-300", "e00000012", "e-000000012"):
+        for count in range(26):
+            for before in range(1, 26):
+                yield digits[:before] + ("." + digits[:count] if count else "") + exponent
+            for zeros in range(12):
+                yield "0." + "0" * zeros + digits[:count] + ("0" if count == 0 else "") + exponent
+            if count:
+                yield "0" * count + "1" + exponent
+
+
+def test_digits_of_any_number_are_read_wherever_they_end():
+    for text in lengths():
+        number = text.lower().partition("e")[0].replace(".", "")
+        if text[0] == "0" and text[1] != ".":
+            assert read(text)[1:] == (1, MALFORMED), text
+            continue
+        kind = HARD if len(number.lstrip("0")) > 19 else OUT_OF_RANGE if math.isinf(float(text)) else NUMBER
+        for sign in ("", "-"):
+            # at the very end, and before text that must not count
+            for behind in ("", ",9182.736e5", "]", " 918273645091827364509182736450"):
+                value, end, found = read(sign + text + behind)
+                assert (end, found) == (len(sign + text), kind), text
+                assert kind != NUMBER or value == float(sign + text), text
+
+
+def test_a_number_that_breaks_off_is_malformed():
+    for text in ("1.", "1.e5", "123456789.", "1e", "1e+", "1.5e-", "1.5e-x", "-", "-.5", "-01", "00", "01.5"):
+        for behind in ("", ",1", " 1.5e5,"):
+            assert read(text + behind)[2] == MALFORMED, text
+
+
+def test_any_number_of_digits_is_written_wherever_the_point_is():
+    digits = "91827364509182736"
+    texts = [f"{digits[:count]}e{exponent}" for count in range(1, 18) for exponent in range(-40, 40)]
+    values = np.array([float(text) for text in texts])
+    values = np.concatenate([values, -values])
+    assert written(values) == [plain(repr(value)) for value in values.tolist()]
+
+
+def test_no_number_takes_more_room_than_is_said():
+    for values in samples():
+        for value in [*values[:200].tolist(), math.nan, -math.inf]:
+            out = np.full(TEXT_WIDTH + 8, 255, dtype=np.uint8)
+            write_number(out, 0, value)
+            assert (out[TEXT_WIDTH:] == 255).all()
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 9])
+def test_a_list_is_written_as_its_numbers_are(size):
+    values = np.array([0.1, math.nan, -0.0, 0.0, math.inf, -2.5e-300, 5e-324, 12345.678, 1e22])[:size]
+    out = np.zeros(size * (TEXT_WIDTH + 1) + PADDING, dtype=np.uint8)
+    end = write_numbers(out, 0, values)
+    assert out[:end].tobytes().decode() == "".join(text + "," for text in written(values)) if size else end == 0
+
+
+def test_names_of_any_length_are_written():
+    names = ["x" * length for length in range(70)]
+    ends = np.cumsum([0, *map(len, names)]).astype(np.int64)
+    text = np.frombuffer("".join(names).encode() + bytes(PADDING), dtype=np.uint8)
+    codes = np.array([*range(70), -1, 3], dtype=np.int8)
+    expected = ",".join([*names, "null", "xxx", ""]).encode()
+    out = np.zeros(len(expected) + PADDING, dtype=np.uint8)
+    assert out[: write_names(out, 0, codes, text, ends)].tobytes() == expected
 
 
 @settings(max_examples=1000, deadline=None)

@@ -10,7 +10,16 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-__all__ = ["inlined", "leading_zeros", "load_eight", "loop", "multiply_high", "store_eight", "trailing_zeros"]
+__all__ = [
+    "inlined",
+    "leading_zeros",
+    "load_eight",
+    "loop",
+    "multiply_high",
+    "other_than_digits",
+    "store_eight",
+    "trailing_zeros",
+]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -37,6 +46,7 @@ def _compiled(function: Function, inline: bool) -> Function:
 
 
 _I64, _I128 = ir.IntType(64), ir.IntType(128)
+_BYTES = ir.VectorType(ir.IntType(8), 32)
 
 
 @intrinsic
@@ -73,9 +83,9 @@ def trailing_zeros(_typing: Any, _w: Any) -> Any:
     return signature, codegen
 
 
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any, pointed: Any = _I64) -> Any:
     data = context.make_array(array_type)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), _I64.as_pointer())
+    return builder.bitcast(builder.gep(data, [index]), pointed.as_pointer())
 
 
 @intrinsic
@@ -85,6 +95,22 @@ def load_eight(_typing: Any, text: Any, _index: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.load(_pointer(context, builder, sig.args[0], args[0], args[1]), align=1)
+
+    return signature, codegen
+
+
+@intrinsic
+def other_than_digits(_typing: Any, text: Any, _index: Any) -> Any:
+    """Bit j set where byte j from an index on is no digit, for 32 bytes that must all be there; all bits above, too."""
+    signature = types.uint64(text, types.int64)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        data = builder.load(_pointer(context, builder, sig.args[0], args[0], args[1], _BYTES), align=1)
+        others = builder.icmp_unsigned(
+            ">", builder.sub(data, ir.Constant(_BYTES, [48] * 32)), ir.Constant(_BYTES, [9] * 32)
+        )
+        mask = builder.zext(builder.bitcast(others, ir.IntType(32)), _I64)
+        return builder.or_(mask, ir.Constant(_I64, 0xFFFFFFFF << 32))
 
     return signature, codegen
 

@@ -52,7 +52,8 @@ NO_OBJECT, UNKNOWN = 1, 2
 HARD_ROOM = 1024
 
 _DEPTH = 128  # bits of two words
-_ZERO, _ONE, _TOP = np.uint64(0), np.uint64(1), np.uint64(63)
+_U = np.uint64
+_ZERO, _ONE, _TOP = _U(0), _U(1), _U(63)
 _K = 2  # the field that may be null
 
 
@@ -221,10 +222,10 @@ def read_list(
                 return end, count, waiting, BROKEN if kind == MALFORMED else DEEP
             hard[waiting, 0], hard[waiting, 1], hard[waiting, 2], hard[waiting, 3] = count, 0, i, end
             waiting += 1
-        column[count] = bits
+        column[_U(count)] = bits
         count += 1
         i = end
-        if text[i] == 44 and text[i + 1] > 32:  # the common case, without looking for white space
+        if text[_U(i)] == 44 and text[_U(i + 1)] > 32:  # the common case, without looking for white space
             i += 1
             continue
         i = skip_space(text, i)
