@@ -14,6 +14,7 @@ from pydantic_core import from_json
 
 from friction.nondim import FIELDS
 from service.codecs import read_batch, terminated
+from service.compiled.scan import UNKNOWN
 from service.errors import BatchTooLargeError, InvalidFieldsError, MalformedBodyError
 
 LIMIT = 1000
@@ -107,6 +108,26 @@ def test_the_last_of_a_repeated_name_holds():
     assert cases.columns[5].tolist() == [2.0] * 4
     cases, _ = scan('{"mu0":1,"Fz":1,"y0":1,"omega":1,"v0":["x",1],"v0":[3,4]}')
     assert cases.columns[5].tolist() == [3.0, 4.0]
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_name_is_known_to_the_letter(name):
+    assert scan(f'[{{"{name}" : 1}}]')[0].columns[FIELDS.index(name)].tolist() == [1.0]
+    for other in (
+        name[:-1],
+        name + "0",
+        name.swapcase(),
+        " " + name,
+        name + " ",
+        name + '\\"',
+        "\\u00" + name,
+        name * 3,
+    ):
+        try:
+            json.loads(f'"{other}"')
+        except ValueError:
+            continue
+        assert scan(f'[{{"{other}":1}}]')[0].flaws.tolist() == [UNKNOWN], other
 
 
 def test_many_long_numbers_are_read_exactly():

@@ -214,7 +214,7 @@ def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
 
 @loop
 def _read_slowly(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
-    """What :func:`read_number` returns, for anything: signs, more than eight digits before the point, no number."""
+    """What :func:`read_number` returns, for anything: signs, more than 16 digits before the point, no number."""
     start = i
     negative = text[i] == 45
     if negative:
@@ -271,21 +271,27 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     others: np.uint64 = other_than_digits(text, i)  # type: ignore[call-arg]
     before: int = trailing_zeros(others)
     point = text[_U(i + before)] == 46
-    if before == 0 or (point and before > 8):
+    if before == 0 or (point and before > 16):
         return _read_slowly(text, i)
-    # The first eight digits, then where the others are; the point goes.
+    # Eight digits and eight more; the point goes.
     first: np.uint64 = load_eight(text, i)
+    second: np.uint64 = load_eight(text, i + 8)
     wrong = (before > 1) & (text[_U(i)] == 48)
-    end, count, behind = before, before, i + 8
+    end, count, third = before, before, i + 16
     if point:
         others = others & (others - _U1)
         end = trailing_zeros(others)
         count = end - 1
         wrong |= count == before
-        behind += 1
-        low = _below(before)
-        moved: np.uint64 = load_eight(text, i + 1)
-        first = (first & low) | (moved & ~low)
+        third += 1
+        moved: np.uint64 = load_eight(text, i + 9)
+        if before > 8:
+            low = _below(before - 8)
+            second = (second & low) | (moved & ~low)
+        else:
+            low = _below(before)
+            first = (first & low) | (load_eight(text, i + 1) & ~low)
+            second = moved
     zeros: int = trailing_zeros(first - _ZEROS) >> 3
     wrong |= (count > 24) | (count - zeros > 19)
     q = before - count
@@ -311,8 +317,8 @@ def read_number(text: Bytes, i: int) -> tuple[np.uint64, int, int]:
     else:
         more = min(count - 8, 8)
         w = _append(_U0, first, 8)
-        w = _append(w, load_eight(text, behind), more)
-        w = _append(w, load_eight(text, behind + 8), count - 8 - more)
+        w = _append(w, second, more)
+        w = _append(w, load_eight(text, third), count - 8 - more)
     return _rounded(w, q, False, i + end)
 
 

@@ -8,8 +8,9 @@ is infinity: rigid contact.  Text ends in a 0 byte, where every loop stops.
 import numpy as np
 from numpy.typing import NDArray
 
+from friction.nondim import FIELDS
 from service.compiled.digits import HARD, MALFORMED, NO_NUMBER, NUMBER, OUT_OF_RANGE, Bytes, read_number
-from service.compiled.machine import inlined, loop
+from service.compiled.machine import inlined, load_eight, loop
 
 __all__ = [
     "BROKEN",
@@ -54,7 +55,12 @@ HARD_ROOM = 1024
 _DEPTH = 128  # bits of two words
 _U = np.uint64
 _ZERO, _ONE, _TOP = _U(0), _U(1), _U(63)
-_K = 2  # the field that may be null
+_K = FIELDS.index("k")  # the field that may be null
+# the names with their quotes, as words of eight bytes
+_NAMES = [f'"{name}"'.encode() for name in FIELDS]
+_NAME_WORDS = np.array([int.from_bytes(name, "little") for name in _NAMES], dtype=np.uint64)
+_NAME_MASKS = np.array([(1 << 8 * len(name)) - 1 for name in _NAMES], dtype=np.uint64)
+_NAME_LENGTHS = np.array([len(name) for name in _NAMES])
 
 
 @inlined
@@ -237,27 +243,13 @@ def read_list(
 
 
 @inlined
-def _field(text: Bytes, i: int, length: int) -> int:
-    """Index among FIELDS of the name text[i:i+length], or -1."""
-    c = text[i]
-    if length == 2:
-        d = text[i + 1]
-        if c == 121 and d == 48:
-            return 3
-        if c == 118 and d == 48:
-            return 5
-        if c == 70 and d == 122:
-            return 1
-    elif length == 3:
-        if c == 109 and text[i + 1] == 117 and text[i + 2] == 48:
-            return 0
-    elif length == 1:
-        if c == 107:
-            return 2
-    elif length == 5:  # noqa: SIM102  (in the form of the others)
-        if c == 111 and text[i + 1] == 109 and text[i + 2] == 101 and text[i + 3] == 103 and text[i + 4] == 97:
-            return 4
-    return -1
+def _field(text: Bytes, i: int) -> tuple[int, int]:
+    """(index among FIELDS of the name that begins at ``i`` with its quote, index behind it), or (-1, i)."""
+    word: np.uint64 = load_eight(text, i)  # type: ignore[call-arg]
+    for field in range(6):
+        if word & _NAME_MASKS[field] == _NAME_WORDS[field]:
+            return field, i + _NAME_LENGTHS[field]
+    return -1, i
 
 
 @loop
@@ -274,19 +266,11 @@ def read_block(text: Bytes, i: int, stop: int, words: Words, first: int, hard: P
         return 0
     while True:
         i = skip_space(text, i + 1)
-        if text[i] != 34:
-            return 0
-        start = i + 1
-        i = start
-        while text[i] > 34:
-            i += 1
-        if text[i] != 34:
-            return 0
-        field = _field(text, start, i - start)
+        field, i = _field(text, i)
         if field < 0 or seen >> field & 1:
             return 0
         seen |= 1 << field
-        i = skip_space(text, i + 1)
+        i = skip_space(text, i)
         if text[i] != 58:
             return 0
         i = skip_space(text, i + 1)
@@ -337,11 +321,12 @@ def _read_row(
     while True:
         if text[i] != 34:
             return i, waiting, BROKEN
-        start = i + 1
-        i = _skip_string(text, i)
-        if i < 0:
-            return -1 - i, waiting, BROKEN
-        field = _field(text, start, i - 1 - start)
+        start = i
+        field, i = _field(text, i)
+        if field < 0:
+            i = _skip_string(text, i)
+            if i < 0:
+                return -1 - i, waiting, BROKEN
         stop = i
         i = skip_space(text, i)
         if text[i] != 58:
@@ -350,7 +335,7 @@ def _read_row(
         if field < 0:
             if flaws[case] == 0:
                 flaws[case] = UNKNOWN
-                names[case] = start - 1
+                names[case] = start
             end, state = skip_value(text, i)
             if state != SOUND:
                 return end, waiting, state
