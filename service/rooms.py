@@ -19,7 +19,7 @@ from service.compiled.digits import PADDING, Bytes
 __all__ = ["Rooms"]
 
 _MAPPED_FROM = 1024 * 1024
-_KEPT_S = 2.0
+_KEPT_S = 1.0
 _PRIVATE: dict[str, Any] = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
 
 

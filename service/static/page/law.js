@@ -129,9 +129,13 @@ export class LawPlot {
     }
     // only those that are meant to hold somewhere here
     const shown = Object.entries(APPROXIMATIONS).filter(([name]) => approximations[name].some((value) => value !== null));
+    const x = this.x.to - 150;
+    context.globalAlpha = 0.85; // curves pass below it, and stay to be seen
+    context.fillStyle = colour("card");
+    context.fillRect(x - 38, this.y.from - 25 - 17 * shown.length, 188, 17 * shown.length + 7);
+    context.globalAlpha = 1;
     shown.forEach(([, [label, shade]], i) => {
       const y = this.y.from - 22 - 17 * (shown.length - 1 - i);
-      const x = this.x.to - 150;
       context.strokeStyle = colour(shade);
       context.lineWidth = 1.8;
       context.setLineDash([7, 4]);
