@@ -12,7 +12,9 @@ from pathlib import Path
 
 from service.answers import answer_cases
 from service.codecs import columns_text, read_batch, rows_text, terminated
+from service.deferred import defer_registries
 from service.errors import RequestError
+from service.memory import give_back
 from service.shelf import Shelf
 
 __all__ = ["prepare", "settle_memory"]
@@ -28,6 +30,7 @@ _INCLUDE = ("groups", "limits", "gradient", "stick_fraction", "power")
 
 def prepare(shelf: Shelf) -> None:
     """Load the tables, then answer a batch of every form once."""
+    defer_registries()
     shelf.load()
     if not shelf.tables:
         return
@@ -43,13 +46,14 @@ def prepare(shelf: Shelf) -> None:
 
 
 def settle_memory() -> None:
-    """Tell the collector that what is there now stays.
+    """Give back what only the start needed, and tell the collector that the rest stays.
 
     It would walk through a hundred thousand objects of libraries again and again, for some fifty milliseconds, and
     nobody is answered meanwhile.  Only where the process is the service and nothing else.
     """
     if threading.current_thread() is threading.main_thread():
         gc.collect()
+        give_back()
         gc.freeze()
         gc.enable()
 

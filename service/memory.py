@@ -1,0 +1,50 @@
+"""What only a start needs is given back to the system when the start is over.
+
+Linux; elsewhere, and wherever anything looks unusual, nothing happens.
+"""
+
+import ctypes
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+__all__ = ["clean_mappings", "give_back"]
+
+# Libraries that load compiled code and read tables, but take no part in answering; mapped, and not to be written to.
+_ONLY_TO_START = re.compile(
+    r"^([0-9a-f]+)-([0-9a-f]+) r-[-x]p [^/\n]*/[^\n]*"
+    r"/(?:llvmlite|netCDF4|netcdf4\.libs)/[^\n]*\.so[^\n/ ]*$",
+    re.MULTILINE,
+)
+_NONE_OF = ("Shared_Dirty", "Private_Dirty", "Anonymous", "Swap", "Locked")
+_MADV_DONTNEED = 4
+
+
+def give_back() -> None:
+    """Leave the pages of libraries that are not needed any more, and hand free memory back.
+
+    LLVM's code is mapped from its file.  Its pages count as this process's memory as long as it maps them, though they
+    are the file's, in the system's cache.  Leaving those that nobody wrote to loses nothing: what is asked for again,
+    say to compile after all, is mapped again.
+    """
+    if sys.platform != "linux":
+        return
+    try:
+        system = ctypes.CDLL(None)
+        for start, size in clean_mappings(Path("/proc/self/smaps").read_text()):
+            system.madvise(ctypes.c_void_p(start), ctypes.c_size_t(size), _MADV_DONTNEED)
+        if hasattr(system, "malloc_trim"):  # of glibc
+            system.malloc_trim(ctypes.c_size_t(0))
+    except (OSError, ValueError, AttributeError):
+        return  # memory is all that it was about
+
+
+def clean_mappings(smaps: str) -> Iterator[tuple[int, int]]:
+    """Yield address and size of what is mapped from those libraries and was never written to."""
+    # Nobody can write to such a page between this look and what follows, so nothing can be lost.
+    for head in _ONLY_TO_START.finditer(smaps):
+        counted = smaps[head.end() : smaps.index("VmFlags:", head.end())]
+        if all(re.search(rf"^{name}: +0 kB$", counted, re.MULTILINE) for name in _NONE_OF):
+            start, end = (int(address, 16) for address in head.groups())
+            yield start, end - start
