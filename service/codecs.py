@@ -52,6 +52,7 @@ from service.errors import (
     safe_value,
 )
 from service.intake import KNOWN_FIELDS
+from service.memory import Room
 
 __all__ = [
     "MAX_ERRORS",
@@ -91,7 +92,7 @@ def room_for(length: int) -> Bytes:
     many milliseconds, the thread that fills the room answers nobody.
     """
     if length >= _MAPPED_FROM:
-        return np.frombuffer(mmap.mmap(-1, length + PADDING, **_PRIVATE), dtype=np.uint8)
+        return np.frombuffer(Room(-1, length + PADDING, **_PRIVATE), dtype=np.uint8)
     text = np.empty(length + PADDING, dtype=np.uint8)
     text[length:] = 0
     return text

@@ -22,6 +22,7 @@ __all__ = ["FILL", "Connection", "sweep"]
 FILL = "mumacro.fill"
 
 _EVERY_S = 1.0
+_TURN = 512 * 1024  # bytes of a body that are taken before others get their turn
 _open: "WeakSet[Connection]" = WeakSet()
 
 
@@ -37,6 +38,7 @@ class Connection(HttpToolsProtocol):
     owed: object = None
     _short: ShortWay | None = None
     _filling: "_Filling | None" = None
+    _taken = 0
     _held: tuple[Any, Any] | None = None
     _date: tuple[Any, bytes] = (None, b"")
 
@@ -93,6 +95,16 @@ class Connection(HttpToolsProtocol):
             super().on_body(body)
         else:
             filling.put(body)
+            self._taken += len(body)
+            if self._taken >= _TURN:
+                # The loop would read on while there is more: megabytes, for which all others would wait.
+                self._taken = 0
+                self.transport.pause_reading()
+                self.loop.call_soon(self._read_on)
+
+    def _read_on(self) -> None:
+        if not (self.flow.read_paused or self.transport.is_closing()):
+            self.transport.resume_reading()
 
     def on_message_complete(self) -> None:
         """Answer what was held back, or start the application after all."""

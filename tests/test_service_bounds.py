@@ -6,6 +6,7 @@ import signal
 import socket
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -254,10 +255,33 @@ def test_a_body_is_read_whole_in_pieces_of_any_size_and_after_leave_to_send_it(s
         assert (reply.status, reply.read()) == (200, expected)
 
 
-def test_a_caller_who_leaves_in_the_middle_of_a_body_frees_its_place(server, case):
+def test_a_request_right_behind_a_large_body_is_answered(server, case):
+    body = json.dumps([case]).encode() + b" " * 3_000_000
+    with connect(server) as raw:
+        for _ in range(2):
+            raw.sendall(head(BATCH, len(body)) + body)
+        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        received = read_to_end(raw)
+    assert received.count(b"HTTP/1.1 200 OK\r\n") == 3
+    assert received.count(b'"n_errors":0') == 2
+    assert b'"alive"' in received
+
+
+def test_who_answers_batches_stands_back(server, case):
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})
+    assert server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] == 200
+    found = {}
+    for task in Path(f"/proc/{server.process.pid}/task").iterdir():
+        found[int(task.name)] = int((task / "stat").read_text().rpartition(")")[2].split()[16])
+    loop = found.pop(server.process.pid)
+    assert loop < max(found.values())
+
+
+@pytest.mark.parametrize("sent", [300_000, 3_000_000])
+def test_a_caller_who_leaves_in_the_middle_of_a_body_frees_its_place(server, case, sent):
     for _ in range(3):  # one more than there are places
         with connect(server) as raw:
-            raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * 300_000)
+            raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 20_001)]})
     deadline = time.monotonic() + PATIENCE_S
     while server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] != 200:

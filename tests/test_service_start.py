@@ -1,4 +1,4 @@
-"""What a start leaves out and gives back: nothing that is missed afterwards."""
+"""What is left out at a start, and given back after it: nothing that is missed."""
 
 import os
 import re
@@ -6,9 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from service.memory import clean_mappings
+from service.memory import Room, clean_mappings
 
 _DEFERRED = """
 import os, sys
@@ -111,3 +112,17 @@ def test_a_service_does_not_hold_what_loaded_its_code(serving, surrogate):
         assert sizes
         assert all(resident < size / 4 for size, resident in sizes)
         assert server.ask("GET", "/readyz")[0] == 200
+
+
+def test_a_room_is_given_back_with_the_last_who_looks_into_it():
+    room = np.frombuffer(Room(-1, 3_000_001), dtype=np.uint8)
+    room[:] = 7
+    start, end = room[:1], room[-1:]
+    assert isinstance(room.base.obj, Room)
+    del room
+    assert (start[0], end[0]) == (7, 7)
+    del start, end
+    left = Room(-1, 100)
+    left[:3] = b"abc"
+    left.close()
+    del left
