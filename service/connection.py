@@ -6,6 +6,7 @@ callers are that server's business.
 
 import asyncio
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -68,15 +69,17 @@ class Connection(HttpToolsProtocol):
                 return
         super()._start_asgi_task(cycle, app)
 
-    async def fill(self, cycle: Any, room: memoryview, start: int) -> bool:
+    async def fill(self, cycle: Any, room: memoryview, start: int, note: Callable[[int], None]) -> bool:
         """Put the rest of the body into ``room``, from ``start`` on; False if the caller leaves before all is there.
+
+        ``note`` is told of the bytes as they come.
 
         Raises
         ------
         ValueError
             There is more than room.
         """
-        filling = _Filling(cycle, room, start, asyncio.get_running_loop().create_future())
+        filling = _Filling(cycle, room, start, note, asyncio.get_running_loop().create_future())
         filling.put(cycle.body)
         cycle.body = bytearray()
         if cycle.disconnected or not cycle.more_body:
@@ -187,12 +190,14 @@ class _Filling:
     cycle: Any
     room: memoryview
     end_of_text: int
+    note: Callable[[int], None]
     done: "asyncio.Future[bool]"
 
     def put(self, piece: bytes | bytearray) -> None:
         end = self.end_of_text + len(piece)
         self.room[self.end_of_text : end] = piece
         self.end_of_text = end
+        self.note(len(piece))
 
     def end(self, whole: bool) -> None:
         if not self.done.done():

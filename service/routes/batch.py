@@ -61,7 +61,7 @@ class BatchEndpoint:
         self._threads: ThreadPoolExecutor | None = None
         self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
         self._arrow_known = False
-        self.running = 0
+        self.holders: set[Budget] = set()
 
     def start(self, threads: ThreadPoolExecutor) -> None:
         """Take over the threads that large batches run in."""
@@ -83,7 +83,7 @@ class BatchEndpoint:
             budget = Budget(self._settings)
             given = request.headers.get("content-length", "")
             length = int(given) if given.isdigit() else -1
-            async with self._place(length):
+            async with self._place(length, budget):
                 if kind == NDJSON:
                     await self._stream(request, receive, send_noted, options, budget)
                 else:
@@ -94,17 +94,23 @@ class BatchEndpoint:
             await problem_of(error, scope["path"])(scope, receive, send)
 
     @asynccontextmanager
-    async def _place(self, length: int) -> AsyncIterator[None]:
+    async def _place(self, length: int, budget: Budget) -> AsyncIterator[None]:
         if 0 <= length <= _SMALL:
             yield
             return
-        if self.running >= self._settings.max_batches:
-            raise OverloadedError(f"{self.running} large batches are being answered already", headers=CLOSE)
-        self.running += 1
+        holders = self.holders
+        if len(holders) >= self._settings.max_batches:
+            slowest = min(holders, key=lambda held: held.rate())
+            if not slowest.is_slow:
+                raise OverloadedError(f"{len(holders)} large batches are being answered already", headers=CLOSE)
+            # Places are for who uses them: a few who send a byte a second would keep all others out.
+            holders.discard(slowest)
+            slowest.give_way()
+        holders.add(budget)
         try:
             yield
         finally:
-            self.running -= 1
+            holders.discard(budget)
 
     async def _run(self, size: int, work: Callable[[], T]) -> T:
         """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
@@ -148,7 +154,7 @@ class BatchEndpoint:
             fill = scope.get("extensions", {}).get(FILL)
             if more and fill is not None:
                 # the server below puts the rest in its place, instead of sending a message for every few kilobytes
-                if not await budget.client(fill(room, filled), deadline):
+                if not await budget.client(fill(room, filled, budget.note), deadline):
                     raise ClientDisconnect
                 return text
             while more:
@@ -174,6 +180,7 @@ class BatchEndpoint:
         message = await budget.client(receive(), deadline)
         if message["type"] != "http.request":
             raise ClientDisconnect
+        budget.note(len(message.get("body", b"")))
         return message
 
     def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
@@ -226,6 +233,7 @@ class BatchEndpoint:
                 await send({"type": "http.response.start", "status": 200, "headers": headers})
             if packer is not None:
                 piece = await self._run(len(piece), partial(packer.pack, piece, last=last))
+            budget.note(len(piece))
             await budget.client(send({"type": "http.response.body", "body": piece, "more_body": not last}))
 
     async def _each(self, size: int, pieces: Iterator[bytes]) -> AsyncIterator[tuple[bytes, bool]]:
@@ -256,6 +264,7 @@ class BatchEndpoint:
             async for piece, _ in self._each(size, pieces):
                 if packer is not None:
                     piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
+                budget.note(len(piece))
                 await budget.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
@@ -272,6 +281,7 @@ class BatchEndpoint:
                 raise ClientDisconnect
             more = message.get("more_body", False)
             piece = message.get("body", b"")
+            budget.note(len(piece))
             seen = memoryview(piece)
             lines, start = [], 0
             while (end := piece.find(b"\n", start)) >= 0:
