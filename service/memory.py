@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-__all__ = ["Room", "clean_mappings", "give_back"]
+__all__ = ["Room", "clean_mappings", "give_back", "trim"]
 
 # Libraries that load compiled code and read tables, but take no part in answering; mapped, and not to be written to.
 _ONLY_TO_START = re.compile(
@@ -55,10 +55,15 @@ def give_back() -> None:
         system = _system()
         for start, size in clean_mappings(Path("/proc/self/smaps").read_text()):
             system.madvise(ctypes.c_void_p(start), ctypes.c_size_t(size), _MADV_DONTNEED)
-        if hasattr(system, "malloc_trim"):  # of glibc
-            system.malloc_trim(ctypes.c_size_t(0))
     except (OSError, ValueError, AttributeError):
-        return  # memory is all that it was about
+        pass  # memory is all that it was about
+    trim()
+
+
+def trim() -> None:
+    """Hand free memory back: every thread's heap keeps what its largest batch took."""
+    if sys.platform == "linux" and hasattr(_system(), "malloc_trim"):  # of glibc
+        _system().malloc_trim(ctypes.c_size_t(0))
 
 
 def clean_mappings(smaps: str) -> Iterator[tuple[int, int]]:

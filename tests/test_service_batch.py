@@ -3,6 +3,7 @@
 import asyncio
 import json
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -251,6 +252,18 @@ def test_the_slowest_gives_way_if_it_is_slow(tables_dir, case):
         assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
         assert holders == {busy, slow}
         assert (busy.left, slow.left, slower.left) == (False, False, True)
+
+
+def test_free_memory_is_handed_back_when_no_large_batch_is_left(tables_dir, case, monkeypatch):
+    trimmed = threading.Event()
+    monkeypatch.setattr("service.routes.batch.trim", trimmed.set)
+    monkeypatch.setattr("service.routes.batch._QUIET_S", 0.0)
+    app = create_app(Settings(tables=(tables_dir,)))
+    with TestClient(app) as client:
+        assert client.post(PATH, json=[case]).status_code == 200
+        assert not trimmed.is_set()
+        assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
+        assert trimmed.wait(60)
 
 
 def test_a_rate_is_that_of_the_time_waited_for_the_caller(monkeypatch):

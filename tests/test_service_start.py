@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.memory import Room, clean_mappings
+from service.memory import Room, clean_mappings, trim
 
 _DEFERRED = """
 import os, sys
@@ -126,3 +126,9 @@ def test_a_room_is_given_back_with_the_last_who_looks_into_it():
     left[:3] = b"abc"
     left.close()
     del left
+
+
+def test_handing_memory_back_changes_nothing():
+    kept = [bytes([number]) * 5000 for number in range(100)]
+    trim()
+    assert kept == [bytes([number]) * 5000 for number in range(100)]

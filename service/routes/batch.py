@@ -7,7 +7,7 @@ question has come, and so that no more of either is held than is being worked on
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.util import find_spec
 from typing import TypeVar
@@ -32,6 +32,7 @@ from service.errors import (
     problem_of,
 )
 from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
+from service.memory import trim
 from service.metrics import Metrics
 from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.openapi import batch_bodies, describe_batch, option_parameters
@@ -48,6 +49,7 @@ _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _FEW_LINES = 16
 _COUNTED = 65536  # cases that are counted at a time
+_QUIET_S = 1.0  # without a large batch, before free memory is handed back
 _SHORT_LINE = 1024  # bytes of one case on a line of its own
 
 
@@ -62,6 +64,7 @@ class BatchEndpoint:
         self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
         self._arrow_known = False
         self.holders: set[Budget] = set()
+        self._trimming: asyncio.TimerHandle | None = None
 
     def start(self, threads: ThreadPoolExecutor) -> None:
         """Take over the threads that large batches run in."""
@@ -107,10 +110,18 @@ class BatchEndpoint:
             holders.discard(slowest)
             slowest.give_way()
         holders.add(budget)
+        if self._trimming is not None:
+            self._trimming.cancel()
         try:
             yield
         finally:
             holders.discard(budget)
+            if not holders:  # not at once: the next batch would have to ask for it again
+                self._trimming = asyncio.get_running_loop().call_later(_QUIET_S, self._trim)
+
+    def _trim(self) -> None:
+        with suppress(RuntimeError):  # the threads have been stopped
+            asyncio.get_running_loop().run_in_executor(self._threads, trim)
 
     async def _run(self, size: int, work: Callable[[], T]) -> T:
         """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
