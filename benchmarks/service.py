@@ -2,6 +2,7 @@
 
     python benchmarks/service.py                                 prints the tables, takes about ten minutes
     python benchmarks/service.py --write                         and puts them, with the plot, into docs/
+    python benchmarks/service.py --only waiting start            some of the parts that need no other
     python benchmarks/service.py --peers /path/to/other/python   an interpreter that has umbridge or mlserver
 
 Needs ``wrk``, ``curl``, Linux, and two processors: the servers get one, who asks the other.  Servers run side by side
@@ -471,27 +472,28 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
 
 def measure_start(rounds: int) -> list[list[str]]:
     """Seconds until ready, and memory then and after work."""
-    seconds, fresh, own, worked = [], [], [], []
-    body = body_of("columns", 100_000)
+    forms = {"columns": "as columns", "rows": "then as rows", "lines": "then as lines", "arrow": "then as Arrow"}
+    bodies = {form: body_of(form, 100_000) for form in forms}
+    names = ["ready after [s]", "memory when ready [MB]"]
+    names += ["of it its own; the rest is files, which all workers share [MB]", "most memory during the start [MB]"]
+    names += [f"memory two seconds after five batches of 100,000 {form} [MB]" for form in forms.values()]
+    found = []
     for _ in range(rounds):
         started = time.monotonic()
         with ours() as server:
-            seconds.append(time.monotonic() - started)
-            fresh.append(server.memory())
-            own.append(server.memory("RssAnon"))
-            for _ in range(5):
-                server.ask("POST", BATCH, body)
-            worked.append(server.memory())
-    return [
-        ["ready after [s]", quantity(statistics.median(seconds))],
-        ["memory when ready [MB]", quantity(statistics.median(fresh), 3)],
-        ["of it its own; the rest is libraries, which all workers share [MB]", quantity(statistics.median(own), 3)],
-        ["memory after five batches of 100,000 [MB]", quantity(statistics.median(worked), 3)],
-    ]
+            row = [time.monotonic() - started, *map(server.memory, ("VmRSS", "RssAnon", "VmHWM"))]
+            for form, body in bodies.items():
+                for _ in range(5):
+                    server.ask("POST", BATCH, body, KINDS[form])
+                time.sleep(2.0)  # memory is handed back a second after the last
+                row.append(server.memory())
+            found.append(row)
+    middle = map(statistics.median, zip(*found, strict=True))
+    return [[name, quantity(value, 3)] for name, value in zip(names, middle, strict=True)]
 
 
 def measure_waiting() -> list[list[str]]:
-    """Longest wait for short requests while large batches run, beside one for a server that has nothing to do."""
+    """Waits for short requests while large batches run, beside those for a server that has nothing to do."""
     rows = []
     case = json.dumps(cases(1)[0]).encode()
     path = get().paths[0]
@@ -519,10 +521,15 @@ def measure_waiting() -> list[list[str]]:
                         other.ask(method, target, content)
                         waits[name].append(time.perf_counter() - begun)
                 thread.join()
-            middle = statistics.median(waits["livez"] + waits["case"])
-            longest = [quantity(1e3 * max(waits[name])) for name in asked]
-            rows.append([LABELS[form], str(len(waits["case"])), quantity(1e3 * middle), *longest])
+            short = waits["livez"] + waits["case"]
+            rows.append([LABELS[form], str(len(short)), *_distribution(short), *_distribution(waits["idle"])])
     return rows
+
+
+def _distribution(waits: list[float]) -> list[str]:
+    """Median, 99 of 100, 999 of 1000 and longest [ms]."""
+    ranked = sorted(waits)
+    return [quantity(1e3 * ranked[min(len(ranked) - 1, int(part * len(ranked)))]) for part in (0.5, 0.99, 0.999, 1.0)]
 
 
 def measure_at_once() -> list[list[str]]:
@@ -621,6 +628,23 @@ NAMES = {
 }
 
 
+def others(options: argparse.Namespace, folder: Path) -> dict[str, Callable[[], str]]:
+    """The sections that are measured by themselves."""
+    spread = ("median", "99 %", "99.9 %", "longest")
+    waiting = ["[ms] beside batches of 1,000,000 as", "asked", *spread, *(f"idle server: {name}" for name in spread)]
+    return {
+        "includes": lambda: markdown(
+            ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
+        ),
+        "waiting": lambda: markdown(waiting, measure_waiting()),
+        "streams": lambda: markdown(["cases in a stream", "memory above the start [MB]"], measure_streams()),
+        "once": lambda: markdown(
+            ["batches of 100,000 at once", "one body [MB]", *(f"{n} [MB]" for n in AT_ONCE)], measure_at_once()
+        ),
+        "start": lambda: markdown(["one worker, one table", ""], measure_start(options.rounds)),
+    }
+
+
 def report(
     options: argparse.Namespace, folder: Path
 ) -> tuple[dict[str, str], dict[str, dict[int, float]], dict[str, float]]:
@@ -653,25 +677,8 @@ def report(
         ["alone, in one thread", "million cases/s"], [[k, quantity(v)] for k, v in alone.items()]
     )
     sections["readers"] = markdown(["million cases/s from text to arrays", "columns", "rows"], reader_rows(alone))
-    sections["includes"] = markdown(
-        ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
-    )
-    sections["waiting"] = markdown(
-        [
-            "beside batches of 1,000,000 as",
-            "asked",
-            "median [ms]",
-            "longest `/livez` [ms]",
-            "longest case [ms]",
-            "longest, idle server [ms]",
-        ],
-        measure_waiting(),
-    )
-    sections["streams"] = markdown(["cases in a stream", "memory above the start [MB]"], measure_streams())
-    sections["once"] = markdown(
-        ["batches of 100,000 at once", "one body [MB]", *(f"{n} [MB]" for n in AT_ONCE)], measure_at_once()
-    )
-    sections["start"] = markdown(["one worker, one table", ""], measure_start(options.rounds))
+    for name, measure in others(options, folder).items():
+        sections[name] = measure()
     note = machine("fastapi", "uvicorn", "orjson", "pydantic", "pyarrow")
     sections["machine"] = note
     return sections, rates, alone
@@ -683,6 +690,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--seconds", type=int, default=3)
     parser.add_argument("--peers", nargs="*", default=[], metavar="PYTHON")
+    parser.add_argument("--only", nargs="*", default=[], choices=("includes", "waiting", "streams", "once", "start"))
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     for program in ("wrk", "taskset", "curl"):
@@ -690,13 +698,18 @@ def main() -> None:
             raise SystemExit(f"{program} is not installed")
     os.sched_setaffinity(0, {CLIENT_CORE})
     with tempfile.TemporaryDirectory() as name:
-        sections, rates, alone = report(options, Path(name))
+        if options.only:
+            measures = others(options, Path(name))
+            sections: dict[str, str] = {chosen: measures[chosen]() for chosen in options.only}
+        else:
+            sections, rates, alone = report(options, Path(name))
     for text in sections.values():
         print(text, end="\n\n")
     if options.write:
         for name, text in sections.items():
             write_section(name, text, DECISION if name == "readers" else PAGE)
-        plot(rates, alone, IMAGES / "service.png")
+        if not options.only:
+            plot(rates, alone, IMAGES / "service.png")
 
 
 if __name__ == "__main__":

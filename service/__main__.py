@@ -74,17 +74,16 @@ def _serve(settings: Settings) -> int:
     # Imported here: a health check must not pay for the server and the kernels.
     import uvicorn
 
-    from service.app import create_app
-    from service.connection import Connection
     from service.logs import log_config
-    from service.metrics import shared_folder
+    from service.shared import shared_folder
 
     try:
         with shared_folder() if settings.workers > 1 else nullcontext():
             uvicorn.run(
-                create_app(settings) if settings.workers == 1 else "service.app:create_app",
-                factory=settings.workers > 1,
-                http=Connection,
+                # By name, so that only the processes that serve import it, not the one that watches over several.
+                "service.app:create_app",
+                factory=True,
+                http="service.connection:Connection",
                 host=settings.host,
                 port=settings.port,
                 workers=settings.workers,

@@ -7,9 +7,11 @@ come from the environment.
 import asyncio
 import logging
 import os
+import sys
+import threading
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -43,7 +45,15 @@ _ROUTERS = (
 )  # fmt: skip
 # The pages are the same for everyone and tell nothing; they ask their user for the key and send it with every question.
 _OPEN_PATHS = HEALTH_PATHS | page.OPEN_PATHS | docs.OPEN_PATHS
+_NICENESS = 5  # of threads for batches: a third of the weight
 _log = logging.getLogger("mumacro.app")
+
+
+def _stand_back() -> None:
+    """Let who answers short requests go first where both want one processor.  On Linux threads have priorities."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
 
 @asynccontextmanager
@@ -52,14 +62,14 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         _log.warning("%s is no setting and has no effect", name)
     state = app.state
     settings: Settings = state.settings
-    with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="batch") as threads:
-        await asyncio.get_running_loop().run_in_executor(threads, prepare, state.shelf)
+    with ThreadPoolExecutor(1) as start:
+        await asyncio.get_running_loop().run_in_executor(start, prepare, state.shelf)
+    with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="batch", initializer=_stand_back) as threads:
         state.metrics.start([table.label for table in state.shelf.tables])
         state.access_log.start()
         state.batches.start(threads)
         settle_memory()
-        always = sweep(settings.client_timeout_s), state.metrics.share(), state.batches.rooms.keep_tidy()
-        tasks = [asyncio.create_task(work) for work in always]
+        tasks = [asyncio.create_task(sweep(settings.client_timeout_s)), asyncio.create_task(state.metrics.share())]
         with draining(state.shelf, settings.drain_s):
             yield
         for task in tasks:

@@ -6,6 +6,7 @@ callers are that server's business.
 
 import asyncio
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -25,6 +26,7 @@ PIECES = "mumacro.pieces"
 
 _AHEAD = 256 * 1024  # bytes that are read while the application is busy with what came before
 _EVERY_S = 1.0
+_TURN = 512 * 1024  # bytes of a body that are taken before others get their turn
 _open: "WeakSet[Connection]" = WeakSet()
 
 
@@ -41,6 +43,7 @@ class Connection(HttpToolsProtocol):
     _short: ShortWay | None = None
     _filling: "_Filling | None" = None
     _stream: "_Stream | None" = None
+    _taken = 0
     _held: tuple[Any, Any] | None = None
     _date: tuple[Any, bytes] = (None, b"")
 
@@ -70,15 +73,17 @@ class Connection(HttpToolsProtocol):
                 return
         super()._start_asgi_task(cycle, app)
 
-    async def fill(self, cycle: Any, room: memoryview, start: int) -> bool:
+    async def fill(self, cycle: Any, room: memoryview, start: int, note: Callable[[int], None]) -> bool:
         """Put the rest of the body into ``room``, from ``start`` on; False if the caller leaves before all is there.
+
+        ``note`` is told of the bytes as they come.
 
         Raises
         ------
         ValueError
             There is more than room.
         """
-        filling = _Filling(cycle, room, start, asyncio.get_running_loop().create_future())
+        filling = _Filling(cycle, room, start, note, asyncio.get_running_loop().create_future())
         filling.put(cycle.body)
         cycle.body = bytearray()
         if cycle.disconnected or not cycle.more_body:
@@ -111,6 +116,12 @@ class Connection(HttpToolsProtocol):
         filling, stream = self._filling, self._stream
         if filling is not None and filling.cycle is self.cycle:
             filling.put(body)
+            self._taken += len(body)
+            if self._taken >= _TURN:
+                # The loop would read on while there is more: megabytes, for which all others would wait.
+                self._taken = 0
+                self.transport.pause_reading()
+                self.loop.call_soon(self._read_on)
         elif stream is not None and stream.cycle is self.cycle and not stream.cycle.response_complete:
             stream.pieces.append(body)
             stream.size += len(body)
@@ -119,6 +130,10 @@ class Connection(HttpToolsProtocol):
             stream.cycle.message_event.set()
         else:
             super().on_body(body)
+
+    def _read_on(self) -> None:
+        if not (self.flow.read_paused or self.transport.is_closing()):
+            self.transport.resume_reading()
 
     def on_message_complete(self) -> None:
         """Answer what was held back, or start the application after all."""
@@ -201,12 +216,14 @@ class _Filling:
     cycle: Any
     room: memoryview
     end_of_text: int
+    note: Callable[[int], None]
     done: "asyncio.Future[bool]"
 
     def put(self, piece: bytes | bytearray) -> None:
         end = self.end_of_text + len(piece)
         self.room[self.end_of_text : end] = piece
         self.end_of_text = end
+        self.note(len(piece))
 
     def end(self, whole: bool) -> None:
         if not self.done.done():

@@ -7,12 +7,9 @@ counter ever falls.
 
 import asyncio
 import os
-import shutil
-import tempfile
 from array import array
 from bisect import bisect_left
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +17,11 @@ import numpy as np
 
 from friction.regions import REGIMES, SOURCES
 from friction.surrogate import REGIME_OF_SOURCE
+from service.shared import FOLDER_VARIABLE
 
-__all__ = ["CONTENT_TYPE", "FOLDER_VARIABLE", "Metrics", "shared_folder", "source_place"]
+__all__ = ["CONTENT_TYPE", "Metrics", "source_place"]
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-#: names the folder to the workers; not a setting
-FOLDER_VARIABLE = "_MUMACRO_METRICS_FOLDER"
 
 ROUTES = (
     "/v1/mu-macro", "/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/law.csv", "/v1/table", "/v1/table.nc",
@@ -47,26 +43,6 @@ _PER_TABLE = len(SOURCES) + 1  # by source; bad cases
 _SHARE_EVERY_S = 0.25
 
 Place = tuple[int, int]
-
-
-@contextmanager
-def shared_folder() -> Iterator[None]:
-    """Make the folder that the workers share, in memory where there is such a place; remove it in the end."""
-    for place in ("/dev/shm", None):  # noqa: S108  (mkdtemp makes a folder of its own there)
-        try:
-            folder = tempfile.mkdtemp(prefix="mumacro-metrics-", dir=place)
-            break
-        except OSError:
-            continue
-    else:  # nowhere to write: every worker tells its own numbers
-        yield
-        return
-    os.environ[FOLDER_VARIABLE] = folder
-    try:
-        yield
-    finally:
-        os.environ.pop(FOLDER_VARIABLE, None)
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def source_place(table: int) -> int:

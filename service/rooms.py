@@ -1,25 +1,23 @@
 """Memory for the texts of large bodies, used again: new memory costs more than reading what is put into it.
 
 The system hands out memory page by page, each cleared and accounted for when it is first touched: a quarter of what
-answering an Arrow stream takes.  So what one body leaves is kept a moment for the next, but no more than one body may
-have in all.
+answering an Arrow stream takes.  So what one body leaves is kept for the next until large bodies have stopped coming,
+but no more than one body may have in all.
 """
 
-import asyncio
 import mmap
 import sys
-import time
 import weakref
 from typing import Any
 
 import numpy as np
 
 from service.compiled.digits import PADDING, Bytes
+from service.memory import Mapped
 
 __all__ = ["Rooms"]
 
 _MAPPED_FROM = 1024 * 1024
-_KEPT_S = 1.0
 _PRIVATE: dict[str, Any] = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
 
 
@@ -57,24 +55,17 @@ class Rooms:
                 self._kept.append(room)
         return room.lend(need)
 
-    def tidy(self, now: float) -> None:
-        """Let go of what has not been used for a while."""
-        self._kept = [room for room in self._kept if not (room.free and now - room.since > _KEPT_S)]
-
-    async def keep_tidy(self) -> None:
-        """Let go of it, for ever."""
-        while True:
-            await asyncio.sleep(_KEPT_S / 2)
-            self.tidy(time.monotonic())
+    def empty(self) -> None:
+        """Let go of what nobody has."""
+        self._kept = [room for room in self._kept if not room.free]
 
 
 class _Room:
-    """A piece of mapped memory, who has it, and since when nobody has."""
+    """A piece of mapped memory, and who has it."""
 
     def __init__(self, size: int) -> None:
         self.size = size
-        self.since = 0.0
-        self._memory = mmap.mmap(-1, size, **_PRIVATE)
+        self._memory = Mapped(-1, size, **_PRIVATE)
         self._user: weakref.ref[Any] | None = None
 
     @property
@@ -87,5 +78,4 @@ class _Room:
         return text
 
     def _returned(self, _user: object) -> None:
-        self.since = time.monotonic()
         self._user = None

@@ -56,6 +56,7 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(16 * 2**20, ge=1024, le=2**31, description="an integer from 1024 to 2147483648")
     max_batch: int = Field(100_000, ge=1, le=10_000_000, description="an integer from 1 to 10000000")
     max_batches: int = Field(8, ge=1, le=1024, description="an integer from 1 to 1024")
+    least_rate: int = Field(65536, ge=0, le=2**31, description="an integer from 0 to 2147483648")
     client_timeout_s: int = Field(30, ge=1, le=3600, description="an integer from 1 to 3600")
     time_limit_s: int = Field(300, ge=1, le=86400, description="an integer from 1 to 86400")
     api_key: SecretStr | None = Field(None, description="1 to 512 printable ASCII characters without spaces")

@@ -18,6 +18,7 @@ from service.codecs import columns_text, read_batch, rows_text, terminated
 from service.compiled.block import count_codes
 from service.errors import RequestError
 from service.intake import Options
+from service.memory import give_back
 from service.shelf import Shelf
 from service.streams import LineAnswers, Lines
 
@@ -57,13 +58,14 @@ def _count(answers: Answers) -> None:
 
 
 def settle_memory() -> None:
-    """Tell the collector that what is there now stays.
+    """Give back what only the start needed, and tell the collector that the rest stays.
 
     It would walk through a hundred thousand objects of libraries again and again, for some fifty milliseconds, and
     nobody is answered meanwhile.  Only where the process is the service and nothing else.
     """
     if threading.current_thread() is threading.main_thread():
         gc.collect()
+        give_back()
         gc.freeze()
         gc.enable()
 

@@ -1,6 +1,9 @@
 """Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, limits of size."""
 
+import asyncio
 import json
+import math
+import threading
 
 import numpy as np
 import pytest
@@ -9,6 +12,8 @@ from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
 from service.app import create_app
+from service.errors import SlowClientError
+from service.sending import Budget
 from service.settings import Settings
 
 PATH = "/v1/mu-macro/batch"
@@ -209,10 +214,21 @@ def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
             assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
 
 
+class Holder:
+    """Somebody who holds a place."""
+
+    def __init__(self, rate, is_slow):
+        self.rate, self.is_slow, self.left = (lambda: rate), is_slow, False
+
+    def give_way(self):
+        self.left = True
+
+
 def test_one_batch_too_many_is_turned_away_before_it_is_read(tables_dir, case, problem):
     app = create_app(Settings(tables=(tables_dir,), max_batches=2))
     with TestClient(app) as client:
-        app.state.batches.running = 2
+        holders = app.state.batches.holders
+        holders |= {Holder(math.inf, is_slow=False), Holder(70_000.0, is_slow=False)}
 
         def pieces():
             yield json.dumps({**case, "v0": [0.1] * 10_000}).encode()
@@ -222,6 +238,74 @@ def test_one_batch_too_many_is_turned_away_before_it_is_read(tables_dir, case, p
         assert response.headers["retry-after"] == "1"
         problem(client.post(PATH, content=pieces()), 503)
         assert client.post(PATH, json=[case]).status_code == 200  # a small one takes no place
-        app.state.batches.running = 0
+        holders.clear()
         assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
-        assert app.state.batches.running == 0
+        assert not holders
+
+
+def test_the_slowest_gives_way_if_it_is_slow(tables_dir, case):
+    app = create_app(Settings(tables=(tables_dir,), max_batches=3))
+    with TestClient(app) as client:
+        busy, slow, slower = Holder(math.inf, is_slow=False), Holder(2.0, is_slow=True), Holder(1.0, is_slow=True)
+        holders = app.state.batches.holders
+        holders |= {busy, slow, slower}
+        assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
+        assert holders == {busy, slow}
+        assert (busy.left, slow.left, slower.left) == (False, False, True)
+
+
+def test_free_memory_is_handed_back_when_no_large_batch_is_left(tables_dir, case, monkeypatch):
+    trimmed = threading.Event()
+    monkeypatch.setattr("service.routes.batch.trim", trimmed.set)
+    monkeypatch.setattr("service.routes.batch._QUIET_S", 0.0)
+    app = create_app(Settings(tables=(tables_dir,)))
+    with TestClient(app) as client:
+        assert client.post(PATH, json=[case]).status_code == 200
+        assert not trimmed.is_set()
+        assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
+        assert trimmed.wait(60)
+
+
+def test_a_rate_is_that_of_the_time_waited_for_the_caller(monkeypatch):
+    async def run():
+        loop = asyncio.get_running_loop()
+        now = loop.time()
+        monkeypatch.setattr(loop, "time", lambda: now)
+        budget = Budget(Settings(least_rate=1000))
+        assert budget.rate() == math.inf  # the move is ours
+        move = loop.create_future()
+        waiting = asyncio.create_task(budget.client(move))
+        await asyncio.sleep(0)
+        budget.note(3000)
+        assert budget.rate() == math.inf  # not for long
+        now += 2.0
+        assert (budget.rate(), budget.is_slow) == (1500.0, False)
+        now += 2.0
+        assert (budget.rate(), budget.is_slow) == (750.0, True)
+        move.set_result("made")
+        assert await waiting == "made"
+        now += 100.0
+        assert (budget.rate(), budget.is_slow) == (math.inf, False)
+        waiting = asyncio.create_task(budget.client(loop.create_future()))
+        await asyncio.sleep(0)
+        assert budget.rate() == 750.0  # a hundred seconds of work were not the caller's
+        budget.give_way()
+        with pytest.raises(SlowClientError, match="gives way"):
+            await waiting
+
+    asyncio.run(run())
+
+
+def test_who_gave_way_does_not_go_on_though_the_move_was_made():
+    async def run():
+        loop = asyncio.get_running_loop()
+        budget = Budget(Settings())
+        move = loop.create_future()
+        waiting = asyncio.create_task(budget.client(move))
+        await asyncio.sleep(0)
+        move.set_result("made")
+        budget.give_way()
+        with pytest.raises(SlowClientError):
+            await waiting
+
+    asyncio.run(run())

@@ -6,6 +6,7 @@ import signal
 import socket
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -254,10 +255,33 @@ def test_a_body_is_read_whole_in_pieces_of_any_size_and_after_leave_to_send_it(s
         assert (reply.status, reply.read()) == (200, expected)
 
 
-def test_a_caller_who_leaves_in_the_middle_of_a_body_frees_its_place(server, case):
+def test_a_request_right_behind_a_large_body_is_answered(server, case):
+    body = json.dumps([case]).encode() + b" " * 3_000_000
+    with connect(server) as raw:
+        for _ in range(2):
+            raw.sendall(head(BATCH, len(body)) + body)
+        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        received = read_to_end(raw)
+    assert received.count(b"HTTP/1.1 200 OK\r\n") == 3
+    assert received.count(b'"n_errors":0') == 2
+    assert b'"alive"' in received
+
+
+def test_who_answers_batches_stands_back(server, case):
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})
+    assert server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] == 200
+    found = {}
+    for task in Path(f"/proc/{server.process.pid}/task").iterdir():
+        found[int(task.name)] = int((task / "stat").read_text().rpartition(")")[2].split()[16])
+    loop = found.pop(server.process.pid)
+    assert loop < max(found.values())
+
+
+@pytest.mark.parametrize("sent", [300_000, 3_000_000])
+def test_a_caller_who_leaves_in_the_middle_of_a_body_frees_its_place(server, case, sent):
     for _ in range(3):  # one more than there are places
         with connect(server) as raw:
-            raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * 300_000)
+            raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 20_001)]})
     deadline = time.monotonic() + PATIENCE_S
     while server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] != 200:
@@ -281,6 +305,45 @@ def test_a_third_batch_is_turned_away_unread(server, case):
     assert server.ask("POST", BATCH, json.dumps([case]), {"Content-Type": "application/json"})[0] == 200
     for raw in held:
         raw.close()
+
+
+def ask_for_a_place(server, case):
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 20_001)]})
+    return server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0]
+
+
+@pytest.mark.parametrize("length", [5_000_000, None])
+@pytest.mark.parametrize("kind", ["application/json", "application/x-ndjson"])
+def test_a_slow_caller_gives_way_to_another(serving, surrogate, case, kind, length):
+    with (
+        serving(surrogate.path, MUMACRO_MAX_BATCHES="1", MUMACRO_CLIENT_TIMEOUT_S="600") as server,
+        connect(server) as slow,
+    ):
+        line = json.dumps(case).encode() + b"\n"
+        slow.sendall(head(BATCH, length, kind) + (line if length else b"%x\r\n%b\r\n" % (len(line), line)))
+        deadline = time.monotonic() + PATIENCE_S
+        while ask_for_a_place(server, case) != 200:
+            assert time.monotonic() < deadline
+        received = read_to_end(slow)
+    if kind == "application/json":
+        assert received.startswith(b"HTTP/1.1 408")
+        assert b"application/problem+json" in received
+    else:
+        assert received.startswith(b"HTTP/1.1 200")
+        assert not received.endswith(b"0\r\n\r\n")
+
+
+@pytest.mark.parametrize(("rate", "sent"), [("0", 1), ("1", 200_000)])
+def test_a_caller_who_keeps_up_keeps_its_place(serving, surrogate, case, rate, sent):
+    body = json.dumps([case]).encode() + b" " * 400_000
+    with serving(surrogate.path, MUMACRO_MAX_BATCHES="1", MUMACRO_LEAST_RATE=rate) as server, connect(server) as raw:
+        raw.sendall(head(BATCH, len(body)) + body[:sent])
+        while ask_for_a_place(server, case) == 200:  # until the first has come in
+            pass
+        time.sleep(1.5)
+        assert ask_for_a_place(server, case) == 503
+        raw.sendall(body[sent:])
+        assert raw.recv(4096).startswith(b"HTTP/1.1 200")
 
 
 def test_a_declared_length_over_the_limit_is_a_problem_document(server):

@@ -20,6 +20,7 @@ BAD = {
     "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)),
     "MUMACRO_MAX_BATCH": ("0", "10000001"),
     "MUMACRO_MAX_BATCHES": ("0", "1025"),
+    "MUMACRO_LEAST_RATE": ("-1", "1.5", str(2**31 + 1)),
     "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
     "MUMACRO_TIME_LIMIT_S": ("0", "86401"),
     "MUMACRO_DRAIN_S": ("-1", "601", "soon"),

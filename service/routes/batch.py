@@ -7,7 +7,7 @@ question has come, and so that no more of either is held than is being worked on
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.util import find_spec
 from typing import TypeVar
@@ -32,6 +32,7 @@ from service.errors import (
     problem_of,
 )
 from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
+from service.memory import trim
 from service.metrics import Metrics
 from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.openapi import batch_bodies, describe_batch, option_parameters
@@ -49,6 +50,7 @@ T = TypeVar("T")
 _SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _FEW_LINES = 16
+_QUIET_S = 1.0  # without a large batch, before free memory is handed back
 
 
 class BatchEndpoint:
@@ -61,8 +63,9 @@ class BatchEndpoint:
         self._threads: ThreadPoolExecutor | None = None
         self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
         self._arrow_known = False
-        self.running = 0
         self.rooms = Rooms(settings.max_body_bytes)
+        self.holders: set[Budget] = set()
+        self._trimming: asyncio.TimerHandle | None = None
 
     def start(self, threads: ThreadPoolExecutor) -> None:
         """Take over the threads that large batches run in."""
@@ -84,7 +87,7 @@ class BatchEndpoint:
             budget = Budget(self._settings)
             given = request.headers.get("content-length", "")
             length = int(given) if given.isdigit() else -1
-            async with self._place(length):
+            async with self._place(length, budget):
                 if kind == NDJSON:
                     await self._stream(request, receive, send_noted, options, budget)
                 else:
@@ -95,17 +98,32 @@ class BatchEndpoint:
             await problem_of(error, scope["path"])(scope, receive, send)
 
     @asynccontextmanager
-    async def _place(self, length: int) -> AsyncIterator[None]:
+    async def _place(self, length: int, budget: Budget) -> AsyncIterator[None]:
         if 0 <= length <= _SMALL:
             yield
             return
-        if self.running >= self._settings.max_batches:
-            raise OverloadedError(f"{self.running} large batches are being answered already", headers=CLOSE)
-        self.running += 1
+        holders = self.holders
+        if len(holders) >= self._settings.max_batches:
+            slowest = min(holders, key=lambda held: held.rate())
+            if not slowest.is_slow:
+                raise OverloadedError(f"{len(holders)} large batches are being answered already", headers=CLOSE)
+            # Places are for who uses them: a few who send a byte a second would keep all others out.
+            holders.discard(slowest)
+            slowest.give_way()
+        holders.add(budget)
+        if self._trimming is not None:
+            self._trimming.cancel()
         try:
             yield
         finally:
-            self.running -= 1
+            holders.discard(budget)
+            if not holders:  # not at once: the next batch would have to ask for it again
+                self._trimming = asyncio.get_running_loop().call_later(_QUIET_S, self._trim)
+
+    def _trim(self) -> None:
+        self.rooms.empty()
+        with suppress(RuntimeError):  # the threads have been stopped
+            asyncio.get_running_loop().run_in_executor(self._threads, trim)
 
     async def _run(self, size: int, work: Callable[[], T]) -> T:
         """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
@@ -149,7 +167,7 @@ class BatchEndpoint:
             fill = scope.get("extensions", {}).get(FILL)
             if more and fill is not None:
                 # the server below puts the rest in its place, instead of sending a message for every few kilobytes
-                if not await budget.client(fill(room, filled), deadline):
+                if not await budget.client(fill(room, filled, budget.note), deadline):
                     raise ClientDisconnect
                 return text
             while more:
@@ -175,6 +193,7 @@ class BatchEndpoint:
         message = await budget.client(receive(), deadline)
         if message["type"] != "http.request":
             raise ClientDisconnect
+        budget.note(len(message.get("body", b"")))
         return message
 
     def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
@@ -226,6 +245,7 @@ class BatchEndpoint:
                 await send({"type": "http.response.start", "status": 200, "headers": headers})
             if packer is not None:
                 piece = await self._run(len(piece), partial(packer.pack, piece, last=last))
+            budget.note(len(piece))
             await budget.client(send({"type": "http.response.body", "body": piece, "more_body": not last}))
 
     async def _each(self, size: int, pieces: Iterator[bytes]) -> AsyncIterator[tuple[bytes, bool]]:
@@ -254,6 +274,7 @@ class BatchEndpoint:
             async for piece, _ in self._each(size, gather(answers.pieces(lines, spans, number))):
                 if packer is not None:
                     piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
+                budget.note(len(piece))
                 await budget.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
@@ -287,6 +308,7 @@ class BatchEndpoint:
                 if taken is None:
                     raise ClientDisconnect
                 pieces, more = taken
+                budget.note(sum(map(len, pieces)))
 
 
 def _body_too_large(limit: int) -> BodyTooLargeError:
