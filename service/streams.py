@@ -18,7 +18,7 @@ from service.intake import Options, merged_options
 from service.middleware import BATCH_PATH
 from service.shelf import LoadedTable, Shelf
 
-__all__ = ["LineAnswers", "Lines", "Spans"]
+__all__ = ["Blocks", "LineAnswers", "Lines", "Spans"]
 
 #: where lines begin and end, the end without its newline
 Spans = Sequence[tuple[int, int]]
@@ -76,6 +76,34 @@ class Lines:
         return self._filled - self._begin
 
 
+class Blocks:
+    """Reads, evaluates and writes plain blocks of columns, some at a time, in memory that is used again.
+
+    For one thread at a time, up to ``room`` cases together.
+    """
+
+    def __init__(self, room: int) -> None:
+        self._words = np.empty((6, min(_CASES, room)), dtype=np.uint64)
+        self._columns = [read_only(row.view(np.float64)) for row in self._words]
+        self._hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
+        self._writer: tuple[LoadedTable, BlockWriter] | None = None
+
+    def read(self, text: Bytes, start: int, end: int, first: int = 0) -> int:
+        """Read a block; see :func:`read_block`."""
+        return read_block(text, start, end, self._words, first, self._hard)
+
+    def answer(self, table: LoadedTable, size: int) -> Answers | None:
+        """Answer what was read; None where a case is bad."""
+        answers = answer_columns(table, size, [column[:size] for column in self._columns])
+        return None if answers.n_bad else answers
+
+    def text(self, table: LoadedTable, answers: Answers, edges: Sequence[int]) -> bytes:
+        """Each block's answer on a line; see :class:`BlockWriter`."""
+        if self._writer is None or self._writer[0] is not table:
+            self._writer = table, BlockWriter(signature(table))
+        return self._writer[1].text(answers, edges)
+
+
 class LineAnswers:
     """Answers the lines of one stream.
 
@@ -94,11 +122,8 @@ class LineAnswers:
         self._options, self._place = merged_options(query, {})
         self._answer = answer
         self._count = count
-        self._words = np.empty((6, min(_CASES, max_batch)), dtype=np.uint64)
-        self._hard = np.empty((HARD_ROOM, 4), dtype=np.int64)
-        self._columns = [read_only(row.view(np.float64)) for row in self._words]
-        self._table = shelf.pick(self._options.tolerance, self._place)
-        self._writer = BlockWriter(signature(self._table))
+        self._plain = Blocks(max_batch)
+        shelf.pick(self._options.tolerance, self._place)  # or an error, before the first line
 
     def pieces(self, lines: Lines, spans: Spans, number: int) -> Iterator[bytes]:
         """The answers to some lines; ``number`` is how many came before."""
@@ -126,7 +151,7 @@ class LineAnswers:
     def _read(self, text: Bytes, start: int, end: int, first: int) -> int:
         if self._options.include:
             return 0
-        return read_block(text, start, end, self._words, first, self._hard)
+        return self._plain.read(text, start, end, first)
 
     def _blocks(self, lines: Lines, spans: Spans, stop: int, number: int, blocks: list[int]) -> Iterator[bytes]:
         """Answer the blocks that were read from the lines before ``stop``."""
@@ -134,15 +159,13 @@ class LineAnswers:
         if size == 0:
             return
         table = self._shelf.pick(self._options.tolerance, self._place)
-        answers = answer_columns(table, size, [column[:size] for column in self._columns])
-        if answers.n_bad:
+        answers = self._plain.answer(table, size)
+        if answers is None:
             for index in range(stop - len(blocks) + 1, stop):
                 yield from self._line(lines.line(spans[index]), number + index + 1)
             return
         self._count(table, answers, 0)
-        if self._table is not table:
-            self._table, self._writer = table, BlockWriter(signature(table))
-        yield self._writer.text(answers, blocks)
+        yield self._plain.text(table, answers, blocks)
 
     def _line(self, line: bytearray, number: int) -> Iterator[bytes]:
         if not line or line.isspace():

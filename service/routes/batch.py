@@ -40,7 +40,7 @@ from service.rooms import Rooms
 from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
-from service.streams import LineAnswers, Lines, Spans
+from service.streams import Blocks, LineAnswers, Lines, Spans
 
 __all__ = ["BatchEndpoint", "router"]
 
@@ -64,6 +64,7 @@ class BatchEndpoint:
         self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
         self._arrow_known = False
         self.rooms = Rooms(settings.max_body_bytes)
+        self._plain = Blocks(settings.max_batch)
         self.holders: set[Budget] = set()
         self._trimming: asyncio.TimerHandle | None = None
 
@@ -198,9 +199,29 @@ class BatchEndpoint:
 
     def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
         """Answer one JSON text when the first piece is asked for."""
+        block = self._block(text, query) if text.size <= _AT_ONCE else None
+        if block is not None:
+            yield block
+            return
         answered = self._answer(text, query)
         del text
         yield from answered
+
+    def _block(self, text: Bytes, query: Options) -> bytes | None:
+        """Answer a small text if it is plain columns of good cases, in a tenth of the time; None if it is not.
+
+        Small texts are answered in the loop's thread, which is why the memory for it is there once.
+        """
+        size = 0 if query.include else self._plain.read(text, 0, text.size - PADDING)
+        if size <= 0:
+            return None
+        query, place = merged_options(query, {})
+        table = self._shelf.pick(query.tolerance, place)
+        answers = self._plain.answer(table, size)
+        if answers is None:
+            return None
+        self._count(table, answers)
+        return self._plain.text(table, answers, (0, size))[:-1]
 
     def _arrow_pieces(self, body: Bytes, table: LoadedTable, query: Options) -> Iterator[bytes]:
         from service.arrow import answer_arrow
