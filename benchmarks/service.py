@@ -44,10 +44,12 @@ from service.shelf import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
 DECISION = ROOT / "docs" / "decisions" / "0011-wire.md"
+PLACES = {"readers": DECISION, "over-http": ROOT / "README.md"}  # all else is on the page
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SERVER_CORE, CLIENT_CORE = 0, 1
 BATCH = "/v1/mu-macro/batch"
+MANY_FROM = 1_000  # cases up to which many callers are needed to keep a server busy
 SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
 ENOUGH_S = 0.6  # processor time that a figure should rest on: the clock ticks in hundredths
 KINDS = {
@@ -246,10 +248,10 @@ def mlserver_question() -> Question:
     return Question("POST", ["/v2/models/mu_macro/infer"] * 64, bodies)
 
 
-def load(server: Server, script: Path, seconds: int) -> tuple[float, float]:
-    """Processor time [us] a request, and requests a second, under 16 connections that never pause."""
+def load(server: Server, script: Path, seconds: int, connections: int = 16) -> tuple[float, float]:
+    """Processor time [us] a request, and requests a second, under connections that never pause."""
     before = server.cpu()
-    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", "-c16", f"-d{seconds}s", "-s", str(script)]
+    command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "-s", str(script)]
     done = subprocess.run(
         [*command, f"http://127.0.0.1:{server.port}"], capture_output=True, text=True, check=True
     ).stdout
@@ -335,21 +337,36 @@ def body_of(form: str, n: int) -> bytes:
     return bytes(sink.getvalue())
 
 
-def measure_batches(rounds: int) -> dict[str, dict[int, float]]:
-    """Million cases a second of processor time by form and size."""
+def measure_batches(rounds: int, folder: Path) -> dict[str, dict[int, float]]:
+    """Million cases a second of processor time by form and size; small ones on connections that never pause."""
     rates: dict[str, dict[int, float]] = {form: {} for form in (*KINDS, "fastapi")}
     with ours() as server, peer("fastapi") as plain:
         for n in SIZES:
             progress(f"batches of {n}")
             for form in KINDS:
                 body = body_of(form, n)
-                rates[form][n] = _rate(server, BATCH, body, KINDS[form], n, rounds)
+                rates[form][n] = _rate(server, body, KINDS[form], n, rounds, folder)
             if n <= 100_000:
-                rates["fastapi"][n] = _rate(plain, BATCH, body_of("rows", n), KINDS["rows"], n, rounds)
+                rates["fastapi"][n] = _rate(plain, body_of("rows", n), KINDS["rows"], n, rounds, folder)
     return rates
 
 
-def _rate(server: Server, path: str, body: bytes, kind: str, n: int, rounds: int) -> float:
+_FILE_SCRIPT = """
+local file = io.open(%s, "rb")
+wrk.method, wrk.body = "POST", file:read("*a")
+wrk.headers["Content-Type"] = "%s"
+wrk.path = "%s"
+"""
+
+
+def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: Path) -> float:
+    if n <= MANY_FROM:
+        # one caller who waits for each answer would have the server fall asleep and wake up in between
+        (folder / "body").write_bytes(body)
+        script = folder / "body.lua"
+        script.write_text(_FILE_SCRIPT % (json.dumps(str(folder / "body")), kind, BATCH))
+        return statistics.median(n / load(server, script, 1, AT_ONCE[-1])[0] for _ in range(rounds))
+    path = BATCH
     caller = Caller(server.port)
     status = caller.ask(path, body, kind)
     if status != 200:
@@ -633,6 +650,19 @@ NAMES = {
 }
 
 
+def overview(single: dict[str, tuple[float, float]], rates: dict[str, dict[int, float]]) -> str:
+    """What the README says."""
+    ours, floor, plain = (quantity(single[f"{name} POST"][0]) for name in ("mumacro", "raw", "fastapi"))
+    rows = [["one case [us]", ours, plain, floor]]
+    rows += [[f"{n} cases in JSON rows [us]", *(quantity(n / rates[name][n]) for name in ("rows", "fastapi")), "-"]
+             for n in (10, 1_000)]  # fmt: skip
+    for form, label in LABELS.items():
+        peer = quantity(100 / rates["fastapi"][100_000]) if form == "rows" else "-"
+        rows.append([f"100,000 cases, {label} [ms]", quantity(100 / rates[form][100_000]), peer, "-"])
+    head = ("processor time of a request", "mumacro", "FastAPI, models in and out", "bare ASGI, computes nothing")
+    return machine("fastapi", "uvicorn") + "\n\n" + markdown(head, rows)
+
+
 def others(options: argparse.Namespace, folder: Path) -> dict[str, Callable[[], str]]:
     """The sections that are measured by themselves."""
     spread = ("median", "99 %", "99.9 %", "longest")
@@ -668,7 +698,7 @@ def report(
     sections = {
         "single": markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table),
     }
-    rates = measure_batches(options.rounds)
+    rates = measure_batches(options.rounds, folder)
     alone = parts(options.rounds)
     rows = [
         [
@@ -684,6 +714,7 @@ def report(
     sections["readers"] = markdown(["million cases/s from text to arrays", "columns", "rows"], reader_rows(alone))
     for name, measure in others(options, folder).items():
         sections[name] = measure()
+    sections["over-http"] = overview(single, rates)
     note = machine("fastapi", "uvicorn", "orjson", "pydantic", "pyarrow")
     sections["machine"] = note
     return sections, rates, alone
@@ -712,7 +743,7 @@ def main() -> None:
         print(text, end="\n\n")
     if options.write:
         for name, text in sections.items():
-            write_section(name, text, DECISION if name == "readers" else PAGE)
+            write_section(name, text, PLACES.get(name, PAGE))
         if not options.only:
             plot(rates, alone, IMAGES / "service.png")
 

@@ -114,7 +114,7 @@ def create_app(settings: Settings | None = None) -> Application:
     app.state.access_log = access_log
     app.state.batches = BatchEndpoint(shelf, settings, metrics)
     app.batch_way = RequestRecord(ApiKeyGate(app.state.batches, key), metrics, access_log)
-    app.short = ShortWay(app.long_way, shelf, settings, metrics, access_log)
+    app.short = ShortWay(app.long_way, app.state.batches.small, shelf, settings, metrics, access_log)
     app.add_exception_handler(MumacroError, answer_problem)
     app.add_exception_handler(HTTPException, _answer_http)
     for router in _ROUTERS:

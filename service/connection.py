@@ -26,6 +26,7 @@ PIECES = "mumacro.pieces"
 
 _AHEAD = 256 * 1024  # bytes that are read while the application is busy with what came before
 _EVERY_S = 1.0
+_SHORT = frozenset({CASE_PATH, BATCH_PATH})  # where the short way leads
 _TURN = 512 * 1024  # bytes of a body that are taken before others get their turn
 _open: "WeakSet[Connection]" = WeakSet()
 
@@ -60,10 +61,10 @@ class Connection(HttpToolsProtocol):
         scope = cycle.scope
         if scope["path"] == BATCH_PATH:
             scope["extensions"] = {FILL: partial(self.fill, cycle), PIECES: partial(self.pieces, cycle)}
-        if self._short is not None and scope["path"] == CASE_PATH and cycle is self.cycle and app is self.app:
+        if self._short is not None and scope["path"] in _SHORT and cycle is self.cycle and app is self.app:
             headers = dict(scope["headers"])
             if (
-                (scope["method"] == "GET" or (scope["method"] == "POST" and self._short.is_short(scope, headers)))
+                self._short.is_short(scope, headers)
                 and cycle.more_body
                 and cycle.keep_alive
                 and not cycle.waiting_for_100_continue

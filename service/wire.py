@@ -1,4 +1,4 @@
-"""The short way: one good case is answered ahead of the router, straight on the protocol.
+"""The short way: one good case, or a small batch, is answered ahead of the router, straight on the protocol.
 
 Whatever is not plainly good - a fault, a condition, a missing key, an odd header - goes the long way through the
 application, which reads the same request again and finds the words for it.  So there is one definition of what is
@@ -20,15 +20,19 @@ from service.errors import InvalidFieldsError
 from service.intake import canonical
 from service.logs import AccessLog, accept_request_id, new_request_id
 from service.metrics import Metrics
-from service.middleware import BATCH_PATH
+from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.schemas import CaseRequest
 from service.settings import Settings, cache_fields
 from service.shelf import LoadedTable, Shelf
 
-__all__ = ["CASE_PATH", "Application", "ShortWay"]
+__all__ = ["CASE_PATH", "SMALL_BATCH", "Application", "ShortWay"]
 
 CASE_PATH = "/v1/mu-macro"
+#: bytes of a batch that needs no place, and is answered on the connection
+SMALL_BATCH = 64 * 1024
 _LONG = 4  # digits of a Content-Length that no single case has
+_MANY = 6  # and of one that no small batch has
+_UNLIMITED = 1 << 62
 _JSON = frozenset({None, b"application/json", b"application/json; charset=utf-8", b"application/json;charset=utf-8"})
 _PLAIN_QUERY = b"0123456789.eE+-=&" + "".join(sorted(set("mu0Fzky0omegav0tolerance"))).encode()
 _validate = CaseRequest.__pydantic_validator__.validate_json
@@ -40,6 +44,8 @@ _HEAD = (
 
 Headers = dict[bytes, bytes]
 Handler = Callable[[Scope, Receive, Send], Awaitable[None]]
+#: answers a small batch with no more bytes than that, or not at all
+SmallBatch = Callable[[bytes, int], bytes | None]
 
 
 class Application(FastAPI):
@@ -66,10 +72,19 @@ class Application(FastAPI):
 
 
 class ShortWay:
-    """``POST`` and ``GET /v1/mu-macro`` for one good case."""
+    """``POST`` and ``GET /v1/mu-macro`` for one good case; on our own connections also batches of up to 64 KiB."""
 
-    def __init__(self, long_way: Handler, shelf: Shelf, settings: Settings, metrics: Metrics, log: AccessLog) -> None:
+    def __init__(
+        self,
+        long_way: Handler,
+        batch: SmallBatch,
+        shelf: Shelf,
+        settings: Settings,
+        metrics: Metrics,
+        log: AccessLog,
+    ) -> None:
         self._long_way = long_way
+        self._batch = batch
         self._shelf = shelf
         self._max_bytes = settings.max_body_bytes
         self._key = None if settings.api_key is None else settings.api_key.get_secret_value().encode("ascii")
@@ -77,7 +92,8 @@ class ShortWay:
         self._kept_head = b"".join(b"%b: %b\r\n" % field for field in self._kept)
         self._metrics = metrics
         self._log = log
-        self._durations = {m: metrics.pending(metrics.place(CASE_PATH, m, 200)) for m in ("GET", "POST")}
+        kinds = ((CASE_PATH, "GET"), (CASE_PATH, "POST"), (BATCH_PATH, "POST"))
+        self._durations = {kind: metrics.pending(metrics.place(*kind, 200)) for kind in kinds}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, or hand the request on with nothing taken from it."""
@@ -114,9 +130,18 @@ class ShortWay:
 
     @staticmethod
     def is_short(scope: Scope, headers: Headers) -> bool:
-        """Whether the head of a POST promises one case, plainly put."""
+        """Whether the head of a request promises one case, or a small batch, plainly put."""
+        path, method = scope["path"], scope["method"]
+        if method == "GET":
+            return bool(path == CASE_PATH)
+        length = headers.get(b"content-length", b"")
+        if path == CASE_PATH:
+            few = 0 < len(length) < _LONG
+        else:
+            few = path == BATCH_PATH and 0 < len(length) < _MANY and length.isdigit() and int(length) <= SMALL_BATCH
         return (
-            0 < len(headers.get(b"content-length", b"")) < _LONG
+            few
+            and method == "POST"
             and headers.get(b"content-type") in _JSON
             and not scope["query_string"]
             and b"content-encoding" not in headers
@@ -126,6 +151,11 @@ class ShortWay:
         """Request id, entity tag (for GET) and content; None for what has to go the long way."""
         if self._key is not None and not secrets.compare_digest(headers.get(b"x-api-key", b""), self._key):
             return None
+        if scope["path"] == BATCH_PATH:
+            offers = headers.get(b"accept-encoding", b"")
+            packed = b"gzip" in offers.lower() or b"*" in offers
+            content = self._batch(body, COMPRESS_FROM - 1 if packed else _UNLIMITED)
+            return None if content is None else (self._identity(headers), None, content)
         if scope["method"] == "GET":
             if b"if-none-match" in headers:
                 return None
@@ -139,8 +169,12 @@ class ShortWay:
             return None
         content = self._write(table, case)
         etag = case_etag(table, case, ()) if scope["method"] == "GET" else None
+        return self._identity(headers), etag, content
+
+    @staticmethod
+    def _identity(headers: Headers) -> str:
         offered = headers.get(b"x-request-id")
-        return (new_request_id() if offered is None else accept_request_id(offered)), etag, content
+        return new_request_id() if offered is None else accept_request_id(offered)
 
     def head(self, identity: str, etag: str | None, length: int) -> bytes:
         """The fields of a reply as they stand on the wire."""
@@ -149,9 +183,9 @@ class ShortWay:
 
     def finish(self, scope: Scope, identity: str, seconds: float) -> None:
         """Count and log."""
-        method, client = scope["method"], scope["client"]
-        self._durations[method].append(seconds)
-        self._log.write(identity, method, CASE_PATH, 200, seconds, client[0] if client else None)
+        path, method, client = scope["path"], scope["method"], scope["client"]
+        self._durations[path, method].append(seconds)
+        self._log.write(identity, method, path, 200, seconds, client[0] if client else None)
 
     def _case_in_body(self, body: bytes) -> CaseRequest | None:
         if len(body) > self._max_bytes:

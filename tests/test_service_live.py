@@ -58,6 +58,55 @@ def test_a_body_over_the_limit_is_refused_with_and_without_a_length(server):
     assert headers["connection"] == "close"
 
 
+@pytest.fixture(scope="module")
+def roomy(serving, surrogate):
+    """A server that takes bodies of any size."""
+    with serving(surrogate.path) as started:
+        yield started
+
+
+SMALL = [
+    ({"v0": [0.01, 0.02]}, 200),
+    ({"v0": [0.01, -1, None]}, 200),
+    ({"v0": [0.01] * 3000}, 200),
+    ({"v0": []}, 200),
+    ({"v0": 0.01}, 200),
+    ({"v0": [0.01], "include": ["groups", "gradient"]}, 200),
+    ({"v0": [0.01], "include": ["nonsense"]}, 422),
+    ({"v0": [0.01], "y0": [1e-6] * 2}, 422),
+    ({"v0": [0.01], "tolerance": 1e-30}, 422),
+    ({"mu0": "x"}, 422),
+]
+
+
+@pytest.mark.parametrize("packing", ["identity", "gzip", "gzip;q=0, br", "*"])
+def test_a_small_batch_gets_the_same_answer_the_short_and_the_long_way(roomy, case, packing):
+    texts = [(json.dumps({**case, **change}).encode(), status) for change, status in SMALL]
+    texts += [(json.dumps([{**case, "v0": v0} for v0 in (0.1, -1, 0.2)]).encode(), 200)]
+    texts += [(b"[]", 200), (b"[17, {}]", 200), (b"{", 400), (b"17", 422), (b'{"mu0": 0.3}' + b" " * 60_000, 422)]
+    asked = {"Content-Type": "application/json", "Accept-Encoding": packing, "X-Request-ID": "small-1"}
+    for text, expected in texts:
+        short = roomy.ask("POST", "/v1/mu-macro/batch", text, asked)
+        long = roomy.ask("POST", "/v1/mu-macro/batch", text, {**asked, "X-Forwarded-For": "127.0.0.1"})
+        assert short[0] == long[0] == expected
+        assert short[2] == long[2]
+        heads = [{name: value for name, value in headers.items() if name != "date"} for _, headers, _ in (short, long)]
+        assert heads[0] == heads[1]
+
+
+def test_a_small_batch_is_counted_once(serving, surrogate, case):
+    with serving(surrogate.path) as server:
+        body = json.dumps({**case, "v0": [0.01] * 1000 + [-1]}).encode()
+        kinds = {"Content-Type": "application/json", "Accept-Encoding": "gzip"}  # too long for it to go the short way
+        for text, kind in ((body, kinds), (json.dumps({**case, "v0": [0.01, 0.02]}).encode(), kinds)):
+            assert server.ask("POST", "/v1/mu-macro/batch", text, kind)[0] == 200
+        lines = server.ask("GET", "/metrics")[2].decode().splitlines()
+        found = {line.rpartition(" ")[0]: float(line.rpartition(" ")[2]) for line in lines if not line.startswith("#")}
+        assert sum(value for name, value in found.items() if name.startswith("mumacro_cases_total")) == 1002
+        asked = [value for name, value in found.items() if "requests_total" in name and "mu-macro/batch" in name]
+        assert sum(asked) == 2
+
+
 def test_a_chunked_body_within_the_limit_is_read(server, case):
     text = json.dumps(case).encode()
     chunks = iter([text[:20], text[20:]])

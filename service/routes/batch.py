@@ -41,13 +41,13 @@ from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
 from service.settings import Settings
 from service.shelf import LoadedTable, Shelf
 from service.streams import Blocks, LineAnswers, Lines, Spans
+from service.wire import SMALL_BATCH
 
 __all__ = ["BatchEndpoint", "router"]
 
 router = APIRouter(tags=["answers"])
 T = TypeVar("T")
 
-_SMALL = 64 * 1024  # bytes of a batch that needs no place
 _AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
 _FEW_LINES = 16
 _QUIET_S = 1.0  # without a large batch, before free memory is handed back
@@ -100,7 +100,7 @@ class BatchEndpoint:
 
     @asynccontextmanager
     async def _place(self, length: int, budget: Budget) -> AsyncIterator[None]:
-        if 0 <= length <= _SMALL:
+        if 0 <= length <= SMALL_BATCH:
             yield
             return
         holders = self.holders
@@ -199,29 +199,45 @@ class BatchEndpoint:
 
     def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
         """Answer one JSON text when the first piece is asked for."""
-        block = self._block(text, query) if text.size <= _AT_ONCE else None
+        block = self._block(text) if text.size <= _AT_ONCE and query == Options() else None
         if block is not None:
-            yield block
+            table, answers, content = block
+            self._count(table, answers)
+            yield content
             return
         answered = self._answer(text, query)
         del text
         yield from answered
 
-    def _block(self, text: Bytes, query: Options) -> bytes | None:
-        """Answer a small text if it is plain columns of good cases, in a tenth of the time; None if it is not.
-
-        Small texts are answered in the loop's thread, which is why the memory for it is there once.
-        """
-        size = 0 if query.include else self._plain.read(text, 0, text.size - PADDING)
-        if size <= 0:
+    def small(self, body: bytes, most: int) -> bytes | None:
+        """Answer a small batch without options beside it, in ``most`` bytes; None where that cannot be done."""
+        text = terminated(body)
+        if text.size > self._settings.max_body_bytes + PADDING or self._shelf.fault is not None:
             return None
-        query, place = merged_options(query, {})
-        table = self._shelf.pick(query.tolerance, place)
-        answers = self._plain.answer(table, size)
-        if answers is None:
+        try:
+            table, answers, content = self._block(text) or self._small(text)
+        except MumacroError:
+            return None  # the long way will find the words for it
+        if len(content) > most:
             return None
         self._count(table, answers)
-        return self._plain.text(table, answers, (0, size))[:-1]
+        return content
+
+    def _block(self, text: Bytes) -> tuple[LoadedTable, Answers, bytes] | None:
+        """Answer plain columns of good cases, in a tenth of the time; None if it is anything else.
+
+        In the loop's thread only, which small texts never leave: the memory for it is there once.
+        """
+        size = self._plain.read(text, 0, text.size - PADDING)
+        if size <= 0:
+            return None
+        table = self._shelf.pick()
+        answers = self._plain.answer(table, size)
+        return None if answers is None else (table, answers, self._plain.text(table, answers, (0, size))[:-1])
+
+    def _small(self, text: Bytes) -> tuple[LoadedTable, Answers, bytes]:
+        table, answers, pieces = self._answered(text, Options())
+        return table, answers, b"".join(pieces)
 
     def _arrow_pieces(self, body: Bytes, table: LoadedTable, query: Options) -> Iterator[bytes]:
         from service.arrow import answer_arrow
@@ -230,16 +246,21 @@ class BatchEndpoint:
         yield from answer_arrow(body[: body.size - PADDING], table, query, self._settings.max_batch, self._count)
 
     def _answer(self, text: Bytes, query: Options, *, line: bool = False) -> Iterator[bytes]:
-        """Answer one JSON text, which ends in 0 bytes; what is returned writes it, piece by piece."""
+        """Answer and count one JSON text, which ends in 0 bytes; what is returned writes it, piece by piece."""
+        table, answers, pieces = self._answered(text, query, line=line)
+        self._count(table, answers)
+        return pieces
+
+    def _answered(
+        self, text: Bytes, query: Options, *, line: bool = False
+    ) -> tuple[LoadedTable, Answers, Iterator[bytes]]:
         rows = is_rows(text)
         cases, given = read_batch(text, self._settings.max_batch)
         options, place = merged_options(query, given)
         table = self._shelf.pick(options.tolerance, place)
         answers = answer_cases(table, cases, options.include, options.std)
-        self._count(table, answers)
-        if line and not rows and not cases.listed:
-            return row_text(answers, signature(table))
-        return (rows_text if rows else columns_text)(answers, signature(table))
+        write = row_text if line and not rows and not cases.listed else rows_text if rows else columns_text
+        return table, answers, write(answers, signature(table))
 
     def _count(self, table: LoadedTable, answers: Answers, n_bad: int | None = None) -> None:
         by_source = np.zeros(len(SOURCES) + 1, dtype=np.int64)
