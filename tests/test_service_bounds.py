@@ -168,6 +168,31 @@ def test_answers_come_while_the_question_is_still_being_sent(server, case):
         raw.sendall(b"0\r\n\r\n")
 
 
+@pytest.mark.parametrize("kind", ["application/x-ndjson", "application/json"])
+def test_who_asks_whether_to_go_on_is_told(server, case, kind):
+    body = json.dumps({**case, "v0": [0.01] * 5000}).encode()
+    with connect(server) as raw:
+        raw.sendall(head(BATCH, len(body), kind).replace(b"\r\n\r\n", b"\r\nExpect: 100-continue\r\n\r\n"))
+        said = b""
+        while not said.endswith(b"\r\n\r\n"):
+            said += raw.recv(4096)
+        assert said.startswith(b"HTTP/1.1 100 ")  # and nothing else before the body
+        assert said.count(b"HTTP/1.1") == 1
+        raw.sendall(body)
+        reply = http.client.HTTPResponse(raw, method="POST")
+        reply.begin()
+        assert (reply.status, len(json.loads(reply.read())["mu_macro"])) == (200, 5000)
+
+
+def test_the_answer_to_a_stream_begins_before_its_first_line(server, case):
+    with connect(server) as raw:
+        raw.sendall(head(BATCH, None, "application/x-ndjson"))
+        assert raw.recv(65536).startswith(b"HTTP/1.1 200 ")
+        line = json.dumps(case).encode() + b"\n"
+        raw.sendall(b"%x\r\n%b\r\n0\r\n\r\n" % (len(line), line))
+        assert b'"mu_macro"' in raw.recv(65536)
+
+
 def test_no_piece_of_a_stream_is_lost(server, case):
     # The pieces are cut so that lines end within them and between them, and both directions are busy at once.
     lines = b"".join(json.dumps({**case, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))

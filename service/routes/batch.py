@@ -309,8 +309,11 @@ class BatchEndpoint:
         packer = Packer() if wants_gzip(request) else None
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
+        # Who asks whether to go on sends nothing until the server says so, which it does when it is to receive; others
+        # may send nothing until they see that the answer begins.
+        first = await self._message(receive, budget, budget.deadline()) if "expect" in request.headers else None
         await send({"type": "http.response.start", "status": 200, "headers": headers})
-        async for lines, spans, number in self._lines(request.scope, receive, budget):
+        async for lines, spans, number in self._lines(request.scope, receive, budget, first):
             # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
             size = max(end - start for start, end in spans) if len(spans) <= _FEW_LINES else _AT_ONCE + 1
             async for piece, _ in self._each(size, gather(answers.pieces(lines, spans, number))):
@@ -321,14 +324,16 @@ class BatchEndpoint:
         end = b"" if packer is None else packer.pack(b"", last=True)
         await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
 
-    async def _lines(self, scope: Scope, receive: Receive, budget: Budget) -> AsyncIterator[tuple[Lines, Spans, int]]:
+    async def _lines(
+        self, scope: Scope, receive: Receive, budget: Budget, first: Message | None
+    ) -> AsyncIterator[tuple[Lines, Spans, int]]:
         """Whole lines, some at a time, and how many came before."""
         limit = self._settings.max_body_bytes
         take = scope.get("extensions", {}).get(PIECES)
         lines = Lines()
         number = 0
         deadline = budget.deadline()
-        message = await self._message(receive, budget, deadline)
+        message = first or await self._message(receive, budget, deadline)
         pieces, more = [message.get("body", b"")], message.get("more_body", False)
         while True:
             for piece in pieces:
