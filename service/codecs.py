@@ -7,7 +7,7 @@ Cases go from text to arrays and back in compiled loops; Python objects are made
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -286,10 +286,11 @@ def _scalar_faults(name: str, value: Any) -> list[FieldFault]:
 @cache
 def _words(names: tuple[str, ...]) -> tuple[Bytes, NDArray[np.int64]]:
     """The names as JSON strings."""
-    return _joined([orjson.dumps(name) for name in names])
+    return _joined(tuple(orjson.dumps(name) for name in names))
 
 
-def _joined(texts: Sequence[bytes]) -> tuple[Bytes, NDArray[np.int64]]:
+@lru_cache(maxsize=256)
+def _joined(texts: tuple[bytes, ...]) -> tuple[Bytes, NDArray[np.int64]]:
     """The texts one behind the other, and where each begins."""
     ends = np.cumsum([0, *map(len, texts)]).astype(np.int64)
     return np.frombuffer(b"".join(texts) + bytes(PADDING), dtype=np.uint8).copy(), ends
@@ -361,7 +362,7 @@ class BlockWriter:
     def __init__(self, signature: Mapping[str, Any]) -> None:
         closing = encode({"errors": [], "n_errors": 0, **signature})[1:]
         pieces = [b'{"mu_macro":[', b'],"mu_ratio":[', b'],"regime":[', b'],"error_bound":[', b'],"source":[']
-        self._pieces = _joined([*pieces, b"]," + closing + b"\n"])
+        self._pieces = _joined((*pieces, b"]," + closing + b"\n"))
         self._names = (*_words(_REGIME_NAMES), *_words(_SOURCE_NAMES))
         self._room = np.empty(0, dtype=np.uint8)
 
@@ -420,7 +421,7 @@ def _objects(answers: Answers, end: bytes, behind: bytes) -> Iterator[tuple[int,
             numbers.append(group)
             closing = b""
     pieces.append(closing + end)
-    text, ends = _joined(pieces)
+    text, ends = _joined(tuple(pieces))
     width = text.size + len(numbers) * TEXT_WIDTH + 2 * _NAME_WIDTH
     room = np.empty(min(_SLICE, answers.size) * width + PADDING, dtype=np.uint8)
     names = (*_words(_REGIME_NAMES), *_words(_SOURCE_NAMES))
