@@ -68,8 +68,8 @@ def _mat(table: Table, out: BinaryIO) -> None:
     content["info"] = {
         name: json.dumps(value) if isinstance(value, dict) else value for name, value in attributes.items()
     }
-    held = io.BytesIO()
-    savemat(held, content, do_compression=True, oned_as="column")  # type: ignore[arg-type]  # takes streams too
+    held: Any = io.BytesIO()  # it takes streams, too, though not all of its releases say so
+    savemat(held, content, do_compression=True, oned_as="column")
     data = bytearray(held.getvalue())
     text = f"MATLAB 5.0 MAT-file, mumacro table of tolerance {table.attributes['tolerance']:g}"
     data[:_MAT_TEXT] = text.encode("ascii").ljust(_MAT_TEXT)

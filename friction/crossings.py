@@ -155,6 +155,6 @@ def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
         step, rest = np.divmod(b - a, parts)
         cuts = a[:, None] + step[:, None] * inner + rest[:, None] * inner // parts
         count = np.argmin(np.column_stack((below(cuts.view(np.float64)), np.zeros(a.size, dtype=np.bool_))), axis=1)
-        ends = np.column_stack((a, cuts, b))
+        ends: NDArray[np.int64] = np.column_stack((a, cuts, b))
         a, b = ends[rows, count], ends[rows, count + 1]
     return a.view(np.float64), b.view(np.float64)
