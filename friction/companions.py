@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, prange
 
 from friction.kernels import (
@@ -44,12 +45,18 @@ from friction.patch_simd import patch_value
 
 __all__ = ["companions_array", "fast_power", "power_scale", "stick_scale"]
 
+SERIES_MAX = 0.2  # of y~/v~: below, the first eleven terms hold to rounding
+#: <cos^2 / sqrt(1 + n cos^2)> = sum of (-1)^k c_k c_(k+1) n^k, c_k = (2k choose k) / 4^k; highest power first
+SERIES = np.array(
+    [(-1) ** k * math.comb(2 * k, k) * math.comb(2 * k + 2, k + 1) / 4.0 ** (2 * k + 1) for k in range(10, -1, -1)]
+)
+
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=FUSE)
 def power_scale(source: int, v: float, y: float) -> float:
     """Power over what the block ``source`` tabulates for it."""
     if source == C_LOW:
-        return v * y * y / (1.0 + v * v)
+        return v * y * y / (1.0 + v * v) if v < 1e150 else y * (y / v)
     if source < C_TAIL:
         return y * (y / math.hypot(v, y))
     if source == C_TAIL:
@@ -75,17 +82,18 @@ def stick_scale(source: int, y: float) -> float:
 def fast_power(v: float, y: float) -> tuple[float, float]:
     """Power for large v~ to first and to second order: slow manifold of eq. (11), relative error O(v~^-4)."""
     r = y / v
-    _, second, slope, _, _ = outer_expansion(r)
     n = r * r
-    if r < 1e-3:
-        # n <cos^2 / sqrt(1 + n cos^2)>, and the second order, by their power series: the closed form would cancel
-        lead = v * n * (0.5 - 3.0 / 16.0 * n)
-        return lead, lead - 0.5 * n / v
     # <sqrt(1 + n cos^2)> = h^2 J3 and J1 - J3 = -r f'; J1 is f
-    first, _, _, _, bend = outer_expansion(r)
+    first, second, slope, _, bend = outer_expansion(r)
     j3 = first + slope
     j5 = j3 - (first - j3 - bend) / 3.0
     lead = v * ((1.0 + n) * j3 - first)
+    if r < SERIES_MAX:
+        # n <cos^2 / sqrt(1 + n cos^2)> by its power series: of the closed form, digits would cancel
+        series = SERIES[0]
+        for k in range(1, SERIES.size):
+            series = series * n + SERIES[k]
+        lead = y * r * series
     return lead, lead - (0.5 * ((1.0 + n) * j5 - j3) + second) / v
 
 
