@@ -161,4 +161,5 @@ def read_section(name: str, path: Path = PAGE) -> str:
 def write_section(name: str, text: str, path: Path = PAGE) -> None:
     """Replace what :func:`read_section` reads; raises the same."""
     before, _, after = _parts(name, path)
-    path.write_text(f"{before}\n{text.strip()}\n\n{after}", encoding="utf-8")
+    lines = text.strip("\n")  # and no more: a first line may be indented
+    path.write_text(f"{before}\n{lines}\n\n{after}", encoding="utf-8")

@@ -28,7 +28,18 @@ from measuring import ROOT, markdown, progress, quantity
 from friction import Surrogate
 
 PAGE = ROOT / "tables" / "README.md"
-HEADER = ("table", "tolerance", "solves", "bytes", "memory of the cells, bytes", "max abs error", "max rel error")
+HEADER = (
+    "table",
+    "tolerance",
+    "solves",
+    "bytes",
+    "memory of the cells, bytes",
+    "max abs error",
+    "max rel error",
+    "max abs error of the stick fraction",
+    "max rel error of the power",
+)
+COMPANIONS = ("verified_max_stick_error", "verified_max_rel_power_error")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
 
@@ -83,6 +94,7 @@ def main() -> None:
             [
                 f"`{s.path.name}`", f"{s.tolerance:.0e}", f"{int(str(s.attributes['n_solves'])):,}",
                 f"{s.path.stat().st_size:,}", f"{s.memory:,}", f"{s.max_abs_error:.2e}", f"{s.max_rel_error:.2e}",
+                *(f"{float(str(s.attributes[name])):.2e}" for name in COMPANIONS),
             ]
         )  # fmt: skip
         b = build(s, given.workers) if given.build else kept(old, s.checksum)

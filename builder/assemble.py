@@ -112,9 +112,11 @@ def build_table(
         table.attributes = {"tolerance": tolerance}
         errors = block_errors(Surrogate(table, out), sweep, BLOCK_POINTS, seed=attempt)
         late = []
-        for i, (quantity, absolute, relative) in enumerate(errors):
+        for i, (quantity, absolute, relative, power, stick) in enumerate(errors):
             blocks[i].quantity_error = SAFETY * quantity
             blocks[i].max_abs_error, blocks[i].max_rel_error = absolute, relative
+            blocks[i].power_error = SAFETY * power
+            blocks[i].stick_error = SAFETY * stick if blocks[i].stick.size else None
             if absolute > 0.8 * tolerance or relative > 0.8 * ABS_TO_REL * tolerance:
                 late.append(i)
         if not late or attempt == ATTEMPTS - 1:
@@ -133,6 +135,12 @@ def build_table(
             f"tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; {report['not_covered']} answers outside "
             "their bound; no table was written"
         )
+    power, stick = report["power"], report["stick_fraction"]
+    if power["not_covered"] or stick["not_covered"]:
+        raise BuildError(
+            f"{power['not_covered']} powers and {stick['not_covered']} stick fractions outside their bound; "
+            "no table was written"
+        )
     table.attributes = {
         "title": "Macroscopic friction coefficient under transverse oscillation",
         "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a function of the "
@@ -146,6 +154,8 @@ def build_table(
         "tolerance": tolerance,
         "verified_max_abs_error": report["max_abs_error"],
         "verified_max_rel_error": report["max_rel_error"],
+        "verified_max_rel_power_error": power["max_rel_error"],
+        "verified_max_stick_error": stick["max_abs_error"],
         "verified_points": np.int32(report["points"]),
         "n_solves": np.int32(sweep.n_solves),
         "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from builder.blocks import points_of, slope_of
 from builder.sweep import Sweep
 from friction import Surrogate
+from friction.companions import POWER_ROUNDING, edge_uncertainty, power_scale, stick_scale
 from friction.regions import (
     BLOCKS,
+    CONTINUOUS,
     L_MAX,
     RHO_MAX,
     S_CUT,
@@ -25,12 +27,24 @@ from friction.regions import (
     Y_STICK_LO,
     Y_TAIL,
 )  # fmt: skip
+from friction.surrogate import REGIME_OF_SOURCE
 
-__all__ = ["CASES", "block_errors", "draw", "monotony", "seam_jumps", "seam_slope_jumps", "verify"]
+__all__ = [
+    "CASES",
+    "BlockErrors",
+    "block_errors",
+    "draw",
+    "monotony",
+    "power_noise",
+    "seam_jumps",
+    "seam_slope_jumps",
+    "verify",
+]
 
 Array = NDArray[np.float64]
 #: what a fresh solve itself may be wrong by, relative to mu~: rounding, and the input's last digit next to the corner
 SOLVER_NOISE = 2e-15
+STICK_NOISE = 1e-15  # the same of the stick fraction, absolute, away from the border
 SEAMS = (Y_STICK_LO, Y_CONT, Y_MID, Y_HIGH, Y_TAIL)
 
 
@@ -110,8 +124,30 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
     raise ValueError(f"case must be one of {', '.join(name for name, _, _ in CASES)}, got {case!r}")
 
 
-def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[tuple[float, float, float]]:
-    """Largest error of the tabulated quantity, of mu~, and relative error of mu~, block by block, on ``n`` points each.
+def power_noise(v: Array, y: Array, power: Array, regime: int | NDArray[np.int8]) -> Array:
+    """What the power of a fresh solve itself may be wrong by.
+
+    Where it is small it is the difference of larger numbers: in stick-slip what the drive puts in during stick, v~,
+    is taken out; in continuous sliding the angle swings by y~, and only v~ of that is out of phase.
+    """
+    lost = np.where(np.asarray(regime) == CONTINUOUS, 1e-15 * y * y, 4e-15 * v)
+    noise: Array = SOLVER_NOISE * power + np.where((y < 1.0) & (v < 1.0), lost, 0.0)
+    return noise
+
+
+class BlockErrors(NamedTuple):
+    """Largest errors over a block: of what it tabulates for mu~, of mu~ (absolute, relative); of what it tabulates for
+    power and for the stick fraction, the border's share of the latter apart."""
+
+    quantity: float
+    absolute: float
+    relative: float
+    power: float
+    stick: float
+
+
+def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
+    """Largest errors on fresh solves, block by block, on ``n`` points each.
 
     Points crowd towards the edges of the block, where polynomials err most, and beside the seams that cut through it;
     those which the dispatch sends to a neighbour are left out.
@@ -128,13 +164,35 @@ def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[
         mu, _, source = surrogate.ratio_with_bound(p.v, p.y)
         keep = source == index
         v, y, eta = p.v[keep], p.y[keep], p.y[keep] - 1.0
-        truth = sweep.solve("full", v, y, eta)["mu_ratio"]
+        solved = sweep.solve("full", v, y, eta)
+        truth = solved["mu_ratio"]
         kept = type(p)(v, y, eta)
         error = np.abs(mu[keep] - truth)
         # a solve's own rounding is not the table's error
         quantity = np.maximum(error - SOLVER_NOISE * truth, 0.0) / slope_of(spec, kept)
-        found.append((float(quantity.max()), float(error.max()), float((error / truth).max())))
+        scale = np.vectorize(power_scale, otypes=[np.float64])(index, v, y)
+        # nor is half of the rounding that every bound allows for: for y~ -> infinity it would swamp the block's own
+        rounding = power_noise(v, y, solved["power"], spec.regime) + 0.5 * POWER_ROUNDING * solved["power"]
+        power = np.maximum(np.abs(surrogate.power(v, y) - solved["power"]) - rounding, 0.0) / scale
+        stick = np.zeros(1)
+        if spec.regime != CONTINUOUS:
+            off = np.abs(surrogate.stick_fraction(v, y) - solved["stick_fraction"]) - STICK_NOISE
+            scale = np.vectorize(stick_scale, otypes=[np.float64])(index, y)
+            stick = np.maximum(off - _edges(surrogate, v, y, 0.5), 0.0) / scale
+        worst = (quantity, error, error / truth, power, stick)
+        found.append(BlockErrors(*(float(part.max()) for part in worst)))
     return found
+
+
+def _edges(surrogate: Surrogate, v: Array, y: Array, share: float) -> Array:
+    """:func:`friction.companions.edge_uncertainty` where the border errs by ``share`` of its bound.
+
+    Half of the bound is what was found: a larger share would hide errors of the block below the border.
+    """
+    coef, meta = surrogate._data[2:]
+    error = share * max(piece.max_rel_error for piece in surrogate.table.border)
+    found = [edge_uncertainty(a, b, coef, meta, error) for a, b in zip(v.tolist(), y.tolist(), strict=True)]
+    return np.array(found)
 
 
 def _crowded(rng: np.random.Generator, span: tuple[float, float], n: int, radial: bool) -> Array:
@@ -193,6 +251,46 @@ def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 
     return max(worst, 0.0)
 
 
+class _Compared(NamedTuple):
+    """Errors beyond the solver's own, bounds (None: the table has none) and sources of some answers."""
+
+    error: Array
+    bound: Array | None
+    source: NDArray[np.int8]
+
+
+def _compare_companions(
+    surrogate: Surrogate, v: Array, y: Array, source: NDArray[np.int8], solved: dict[str, Array]
+) -> dict[str, _Compared]:
+    """Power, relative to itself, and stick fraction."""
+    power, power_bound = surrogate.power_with_bound(v, y)
+    stick, stick_bound = surrogate.stick_fraction_with_bound(v, y)
+    truth = solved["power"]
+    regime = REGIME_OF_SOURCE[source]
+    off = np.maximum(np.abs(power - truth) - power_noise(v, y, truth, regime), 0.0)
+    far = np.maximum(np.abs(stick - solved["stick_fraction"]) - STICK_NOISE, 0.0)
+    return {
+        "power": _Compared(off / truth, None if power_bound is None else power_bound / truth, source),
+        "stick_fraction": _Compared(far, stick_bound, source),
+    }
+
+
+def _companion_report(parts: list[_Compared], error_name: str, bound_name: str) -> dict[str, Any]:
+    error, source = (np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "source"))
+    bounds = [part.bound for part in parts if part.bound is not None]
+    bound = np.concatenate(bounds) if bounds else None
+
+    def said(at: NDArray[np.bool_]) -> dict[str, Any]:
+        return {
+            error_name: float(error[at].max()),
+            bound_name: None if bound is None else float(bound[at].max()),
+            "not_covered": None if bound is None else int(np.count_nonzero(error[at] > bound[at])),
+        }
+
+    by_source = {SOURCES[code]: said(source == code) for code in np.unique(source)}
+    return {**said(np.ones(error.size, dtype=np.bool_)), "sources": dict(sorted(by_source.items()))}
+
+
 def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
     """Compare the table with ``points`` fresh solves drawn as :data:`CASES` say.
 
@@ -201,9 +299,11 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     dict
         ``points``, ``max_abs_error``, ``max_rel_error``, ``not_covered`` (answers whose error exceeds their bound),
         ``cases`` and ``sources`` (the same, by kind of case and by block or tail), ``seam_jump``, ``seam_slope_jump``,
-        ``monotony``.
+        ``monotony``; ``power`` (relative errors beyond the solver's own) and ``stick_fraction`` (absolute ones):
+        largest error, ``not_covered``, and the same by source.  None where a table has no bounds of them.
     """
     report: dict[str, Any] = {"points": 0, "max_abs_error": 0.0, "max_rel_error": 0.0, "not_covered": 0}
+    companions: dict[str, list[_Compared]] = {"power": [], "stick_fraction": []}
     cases: dict[str, dict[str, Any]] = {}
     by_source: dict[str, list[tuple[Array, Array, Array]]] = {}
     for i, (name, share, how) in enumerate(CASES):
@@ -212,7 +312,10 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         keep = (v > 0.0) & (y > 0.0)
         v, y = v[keep], y[keep]
         mu, bound, source = surrogate.ratio_with_bound(v, y)
-        truth = sweep.solve("full", v, y)["mu_ratio"]
+        solved = sweep.solve("full", v, y)
+        truth = solved["mu_ratio"]
+        for key, compared in _compare_companions(surrogate, v, y, source, solved).items():
+            companions[key].append(compared)
         error = np.abs(mu - truth)
         relative = error / truth
         missed = int(np.count_nonzero(error > bound + SOLVER_NOISE * truth))
@@ -237,6 +340,8 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         }
         for name, parts in sorted(by_source.items())
     }
+    report["power"] = _companion_report(companions["power"], "max_rel_error", "max_rel_bound")
+    report["stick_fraction"] = _companion_report(companions["stick_fraction"], "max_abs_error", "max_bound")
     report["seam_jump"] = seam_jumps(surrogate)
     report["seam_slope_jump"] = seam_slope_jumps(surrogate)
     report["monotony"] = monotony(surrogate)

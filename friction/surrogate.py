@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from friction import kernels, lanes, nondim, regions
 from friction.border import Border
-from friction.companions import companions_array
+from friction.companions import bounds_array, companions_array
 from friction.errors import InputError, TableError
 from friction.patches import aligned, cells_2d, pace_of
 from friction.slopes import slopes_array
@@ -175,6 +175,12 @@ class Surrogate:
             first += na * nb
         self._data = (_joined(patches), np.array(rows), *self.border.arrays)
         self._companion_data: tuple[Array, Array] | None = None
+        self._companion_errors: tuple[Array, Array, float] | None = None
+        errors = [(block.power_error, block.stick_error) for block in table.blocks]
+        if all(power is not None for power, _ in errors):
+            measured = np.array([(power, stick or 0.0) for power, stick in errors], dtype=np.float64)
+            border_error = max(piece.max_rel_error for piece in table.border)
+            self._companion_errors = (measured[:, 0].copy(), measured[:, 1].copy(), border_error)
 
     @classmethod
     def open(cls, path: str | Path, threads: int | None = None) -> Surrogate:
@@ -198,7 +204,12 @@ class Surrogate:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle small: by path and checksum; the file must say the same where it is opened again."""
-        return _reopen, (str(self.path.resolve()), self.checksum, self.threads)
+        return _reopen, (str(self.path.resolve()), self.seal, self.threads)
+
+    @property
+    def seal(self) -> str:
+        """Checksum of all that answers depend on: of the bounds too, which covers the content, where there are any."""
+        return str(self.attributes.get("bounds_sha256", self.checksum))
 
     @property
     def id(self) -> str:
@@ -219,6 +230,8 @@ class Surrogate:
                 "quantity": spec.quantity,
                 "verified_max_abs_error": block.max_abs_error,
                 "verified_max_rel_error": block.max_rel_error,
+                "power_error": block.power_error,
+                "stick_error": block.stick_error,
             }
             for spec, block in zip(regions.BLOCKS, self.table.blocks, strict=True)
         ]
@@ -237,18 +250,47 @@ class Surrogate:
             companions_array(v_all, y_all, *self._companion_data, *self._data[1:], power_out, stick_out)
         return power_out, stick_out, shape
 
+    def _companion_bounds(self, v_tilde: ArrayLike, y_tilde: ArrayLike, power: Array) -> tuple[Array, Array] | None:
+        """Bounds of power and stick fraction, flat; None when the table does not have them."""
+        if self._companion_errors is None:
+            return None
+        (v_all, y_all), _ = _columns(v_tilde, y_tilde)
+        of_power, of_stick = np.empty(v_all.size), np.empty(v_all.size)
+        with _loop(v_all.size, self.threads):
+            bounds_array(v_all, y_all, power, *self._companion_errors, *self._data[2:], of_power, of_stick)
+        return of_power, of_stick
+
+    def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+        """:meth:`power` and the bound of its absolute error; scalars in, floats out.
+
+        The bound is None from a table that was built before power and stick fraction were verified.
+        """
+        power, _, shape = self._companions(v_tilde, y_tilde)
+        bounds = self._companion_bounds(v_tilde, y_tilde, power)
+        return _shaped(power, shape), None if bounds is None else _shaped(bounds[0], shape)
+
+    def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+        """:meth:`stick_fraction` and the bound of its absolute error; as :meth:`power_with_bound`.
+
+        At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
+        distance to v~crit, and v~crit is known to some digits only.
+        """
+        power, stick, shape = self._companions(v_tilde, y_tilde)
+        bounds = self._companion_bounds(v_tilde, y_tilde, power)
+        return _shaped(stick, shape), None if bounds is None else _shaped(bounds[1], shape)
+
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
 
         The slip dissipates v~ mu~ plus this power.  Tabulated at the nodes of mu~; the cells are prepared on first use.
         """
         power, _, shape = self._companions(v_tilde, y_tilde)
-        return power.reshape(shape) if shape else float(power[0])
+        return _shaped(power, shape)
 
     def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
         """Share of the period during which the contact sticks [-]; legal inputs, scalar in, float out."""
         _, stick, shape = self._companions(v_tilde, y_tilde)
-        return stick.reshape(shape) if shape else float(stick[0])
+        return _shaped(stick, shape)
 
     @property
     def memory(self) -> int:
@@ -263,7 +305,7 @@ class Surrogate:
         for mu0 in (0.3, np.array([0.3, 0.3])):
             self.evaluate(mu0, 10.0, 1e6, 2e-6, 1.3e5, 0.01, gradient=True)
         self.v_tilde_crit(np.array([0.5]))
-        self.power(0.1, 0.5)
+        self.power_with_bound(0.1, 0.5)
 
     def self_check(self) -> None:
         """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
@@ -456,6 +498,10 @@ def _joined(patches: list[Array]) -> Array:
     return np.concatenate(patches, out=out)
 
 
+def _shaped(flat: Array, shape: tuple[int, ...]) -> Any:
+    return flat.reshape(shape) if shape else float(flat[0])
+
+
 def _columns(*values: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     """The values broadcast together, flat, contiguous and writable (one numba signature), and their shape."""
     arrays = [np.asarray(value, dtype=np.float64) for value in values]
@@ -474,6 +520,6 @@ def _flat(a: Array, shape: tuple[int, ...]) -> Array:
 
 def _reopen(path: str, checksum: str, threads: int | None = None) -> Surrogate:
     surrogate = Surrogate.open(path, threads)
-    if checksum and surrogate.checksum != checksum:
-        raise TableError(path, f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}")
+    if checksum and surrogate.seal != checksum:
+        raise TableError(path, f"holds {surrogate.seal[:12]}, the pickled surrogate was made from {checksum[:12]}")
     return surrogate

@@ -50,7 +50,8 @@ class Block:
 
     ``quantity_error`` bounds the error of the tabulated quantity; ``max_abs_error`` and ``max_rel_error`` are those of
     mu~ over the block.  ``power`` (m, n) and, in stick-slip, ``stick`` (m, n) hold the scaled oscillation
-    power and stick fraction of :mod:`friction.companions` at the same nodes.
+    power and stick fraction of :mod:`friction.companions` at the same nodes; ``power_error`` and ``stick_error`` bound
+    the errors of those two, and are None where nobody has measured them.
     """
 
     a: Array
@@ -62,6 +63,8 @@ class Block:
     max_rel_error: float = 0.0
     power: Array = field(default_factory=lambda: np.empty(0))
     stick: Array = field(default_factory=lambda: np.empty(0))
+    power_error: float | None = None
+    stick_error: float | None = None
 
 
 @dataclass
@@ -99,6 +102,18 @@ def _digest(table: Table) -> str:
     return h.hexdigest()
 
 
+def _bounds_digest(table: Table, content: str) -> str | None:
+    """SHA-256 over the errors of power and stick fraction and the content that they belong to; None without them.
+
+    A checksum of its own: the other one is the same for a table with and without them, and programs that do not know
+    them read such a table.
+    """
+    errors = [(name, b.power_error, b.stick_error) for name, b in zip(regions.NAMES, table.blocks, strict=True)]
+    if all(power is None for _, power, _ in errors):
+        return None
+    return hashlib.sha256(f"{content} {errors!r}".encode()).hexdigest()
+
+
 def write_table(table: Table, path: str | Path) -> str:
     """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
 
@@ -112,6 +127,10 @@ def write_table(table: Table, path: str | Path) -> str:
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
     table.attributes["content_sha256"] = _digest(table)
+    bounds = _bounds_digest(table, table.attributes["content_sha256"])
+    table.attributes.pop("bounds_sha256", None)
+    if bounds is not None:
+        table.attributes["bounds_sha256"] = bounds
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".partial")
     except OSError as error:
@@ -177,6 +196,7 @@ def _read(root: Any, path: Path) -> Table:
             float(group.verified_max_rel_error),
             _array(group, "power", path),
             _array(group, "stick", path) if spec.regime == regions.STICK_SLIP else np.empty(0),
+            *(float(group.getncattr(n)) if n in group.ncattrs() else None for n in ("power_error", "stick_error")),
         )
         shapes = {block.values.shape, block.power.shape} | ({block.stick.shape} if block.stick.size else set())
         if shapes != {(block.a.size, block.b.size)} or min(block.cells) < 1:
@@ -208,6 +228,8 @@ def read_table(path: str | Path) -> Table:
         raise TableError(path, f"not a readable netCDF-4 table ({error})") from error
     if _digest(table) != table.attributes["content_sha256"]:
         raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
+    if _bounds_digest(table, table.attributes["content_sha256"]) != table.attributes.get("bounds_sha256"):
+        raise TableError(path, "checksum does not match the bounds: the file is damaged or was edited")
     return table
 
 

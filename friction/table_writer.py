@@ -144,6 +144,7 @@ def _fill(root: Any, table: Table) -> None:
         for name, nodes in (("power", block.power), ("stick", block.stick)):
             if nodes.size:
                 _put(group, name, nodes, _COMPANIONS[name], axes)
+        measured = {"power_error": block.power_error, "stick_error": block.stick_error}
         _describe(
             group,
             {
@@ -153,5 +154,6 @@ def _fill(root: Any, table: Table) -> None:
                 "quantity_error": block.quantity_error,
                 "verified_max_abs_error": block.max_abs_error,
                 "verified_max_rel_error": block.max_rel_error,
+                **{name: error for name, error in measured.items() if error is not None},
             },
         )

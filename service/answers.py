@@ -169,15 +169,18 @@ def answer_cases(table: LoadedTable, cases: Cases, include: Sequence[str], std: 
     return answers
 
 
-#: what each included name holds; None: one number
+#: what each part of an answer that is included holds; None: one number
 _KEYS: dict[str, tuple[str, ...] | None] = {
     "groups": tuple(Groups.model_fields),
     "limits": tuple(Limits.model_fields),
     "gradient": FIELDS,
     "std": None,
     "stick_fraction": None,
+    "stick_fraction_bound": None,
     "power": tuple(Power.model_fields),
 }
+#: names that add more than the part that is called like them
+_PARTS = {"stick_fraction": ("stick_fraction", "stick_fraction_bound")}
 
 
 def _extras(
@@ -196,7 +199,7 @@ def _extras(
         elif name == "gradient":
             values[name] = {field: gradient.get(field, np.nan) for field in FIELDS}
         elif name == "stick_fraction":
-            values[name] = stick_fraction(surrogate, answer)
+            values.update(stick_fraction(surrogate, case, answer))
         elif name == "power":
             values[name] = power(surrogate, case, answer)
         elif std is not None:
@@ -212,7 +215,7 @@ def _extras(
 
 def _batch_extras(surrogate: Surrogate, cases: Cases, include: Sequence[str], std: InputStd | None) -> dict[str, Any]:
     extras: dict[str, Any] = {}
-    for name in include:
+    for name in (part for wanted in include for part in _PARTS.get(wanted, (wanted,))):
         keys = _KEYS[name]
         empty = [np.full(cases.size, np.nan) for _ in keys or (name,)]
         extras[name] = empty[0] if keys is None else dict(zip(keys, empty, strict=True))

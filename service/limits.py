@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from friction import Answer, Surrogate
+from friction.kernels import ROUNDING
 
 __all__ = ["groups", "limits", "power", "stick_fraction"]
 
@@ -69,13 +70,15 @@ def limits(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, NDAr
 
 
 def power(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, Any]:
-    """What the oscillation costs and what it saves: ``oscillation`` and ``saved``, both mean powers [W].
+    """What the oscillation costs and what it saves: ``oscillation`` and ``saved``, mean powers [W], with their bounds.
 
     Notes
     -----
     ``oscillation`` is what the shaker puts in, mu0 Fz l0 omega <y~ cos tau u_y>; what the contact turns into heat is
     this plus mu_macro Fz v0, which the drive puts in.  NaN for rigid contact, whose l0 = 0 is no unit, and where the
     groups are beyond double range.  ``saved`` is what the drive is spared, (mu0 - mu_macro) Fz v0.
+    ``oscillation_bound`` and ``saved_bound`` bound their absolute errors; the first is NaN where the power is, and
+    where the table has none.
     """
     mu0, load, omega, v0 = (np.asarray(case[name], dtype=np.float64) for name in ("mu0", "Fz", "omega", "v0"))
     at_rest = (np.asarray(case["y0"]) == 0.0) | (omega == 0.0)
@@ -83,11 +86,27 @@ def power(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, Any]:
     v, y = (np.where(usable, group, 1.0) for group in (answer.v_tilde, answer.y_tilde))
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         unit = mu0 * load * (np.asarray(answer.length_scale) * omega)
-        found = np.asarray(surrogate.power(v, y)) * unit
+        value, error = surrogate.power_with_bound(v, y)
+        found = np.asarray(value) * unit
+        bound = np.nan if error is None else np.asarray(error) * unit
         saved = (mu0 - np.asarray(answer.mu_macro)) * load * v0
-    return {"oscillation": np.where(at_rest, 0.0, np.where(usable, found, np.nan)), "saved": saved}
+        saved_bound = np.asarray(answer.error_bound) * load * v0 + ROUNDING * np.abs(saved)
+    return {
+        "oscillation": np.where(at_rest, 0.0, np.where(usable, found, np.nan)),
+        "saved": saved,
+        "oscillation_bound": np.where(at_rest, 0.0, np.where(usable, bound, np.nan)),
+        "saved_bound": saved_bound,
+    }
 
 
-def stick_fraction(surrogate: Surrogate, answer: Answer) -> Any:
-    """Share of the period during which the contact sticks [-]; 0 where nothing oscillates, and for rigid contact."""
-    return np.asarray(surrogate.stick_fraction(np.asarray(answer.v_tilde), np.asarray(answer.y_tilde)))
+def stick_fraction(surrogate: Surrogate, case: Values, answer: Answer) -> dict[str, Any]:
+    """Share of the period during which the contact sticks [-], and the bound of its error, NaN where there is none.
+
+    Both are 0 where nothing oscillates, and for rigid contact.
+    """
+    v, y = np.asarray(answer.v_tilde), np.asarray(answer.y_tilde)
+    value, error = surrogate.stick_fraction_with_bound(v, y)
+    bound = np.asarray(np.nan if error is None else error)
+    # y~ below double range: whether such a contact sticks, the groups no longer tell
+    lost = (y == 0.0) & (v < np.inf) & (np.asarray(case["y0"]) > 0.0) & (np.asarray(case["omega"]) > 0.0)
+    return {"stick_fraction": np.asarray(value), "stick_fraction_bound": np.where(lost, 1.0, bound)}

@@ -48,7 +48,8 @@ _REQUESTS: tuple[Any, ...] = (
 _ARROW_BODY = "Arrow IPC stream with number columns mu0, Fz, y0, omega, v0 and, unless contact is rigid, k"
 _ARROW_ANSWER = (
     "Arrow IPC stream, order kept: mu_macro, mu_ratio, regime, error_bound, source, error; "
-    "null results and a text in error where a case is bad; the table and the version in the schema's metadata"
+    "null results and a text in error where a case is bad; the table and the version in the schema's metadata; what "
+    "include adds are columns like stick_fraction, stick_fraction_bound, power.oscillation, power.oscillation_bound"
 )
 _ANSWERS: tuple[Any, ...] = (
     models.CaseAnswer,

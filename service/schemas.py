@@ -35,6 +35,10 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _K = "Tangential contact stiffness [N/m], finite and > 0; left out or null: rigid contact"
 _STD = "Standard deviations of the inputs; needed where include asks for std, and nowhere else"
 _STICK = "Share of the period during which the contact sticks [-]; only if asked for"
+_STICK_BOUND = (
+    "Bound of the absolute error of stick_fraction [-]; comes with it. null: the table does not have it. Larger at the "
+    "border of continuous sliding than elsewhere"
+)
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
@@ -135,6 +139,10 @@ class Power(BaseModel):
         description="What the shaker puts in: mu0 Fz l0 omega <y~ cos tau u_y>; null for rigid contact"
     )
     saved: float | None = Field(description="What the drive is spared: (mu0 - mu_macro) Fz v0")
+    oscillation_bound: float | None = Field(
+        description="Bound of the absolute error of oscillation; null also where the table does not have it"
+    )
+    saved_bound: float | None = Field(description="Bound of the absolute error of saved")
 
 
 class Result(BaseModel):
@@ -150,6 +158,7 @@ class Result(BaseModel):
     gradient: Gradient | None = Field(None, description="Only if asked for")
     std: float | None = Field(None, description="Standard deviation of mu_macro [-], to first order; only if asked for")
     stick_fraction: float | None = Field(None, description=_STICK)
+    stick_fraction_bound: float | None = Field(None, description=_STICK_BOUND)
     power: Power | None = Field(None, description="Only if asked for")
 
 
@@ -188,6 +197,7 @@ class ColumnsAnswer(_BatchEnd):
     gradient: dict[str, list[float | None]] | None = None
     std: list[float | None] | None = None
     stick_fraction: list[float | None] | None = None
+    stick_fraction_bound: list[float | None] | None = None
     power: dict[str, list[float | None]] | None = None
 
 

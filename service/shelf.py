@@ -88,7 +88,7 @@ class LoadedTable:
     @cached_property
     def tag_key(self) -> bytes:
         """What entity tags depend on beside the question: this table, this version."""
-        text = repr((self.surrogate.checksum, self.surrogate.id, __version__, API_VERSION))
+        text = repr((self.surrogate.seal, self.surrogate.id, __version__, API_VERSION))
         return blake2b(text.encode(), digest_size=32).digest()
 
     @cached_property

@@ -9,7 +9,16 @@ import pytest
 
 from builder.assemble import ABS_TO_REL, build_table
 from builder.sweep import Sweep
-from builder.verify import CASES, SOLVER_NOISE, draw, monotony, seam_jumps, seam_slope_jumps
+from builder.verify import (
+    CASES,
+    SOLVER_NOISE,
+    STICK_NOISE,
+    draw,
+    monotony,
+    power_noise,
+    seam_jumps,
+    seam_slope_jumps,
+)
 from friction import InputError, Surrogate, TableError
 from friction.regions import REGIMES, SOURCES, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from friction.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP, REGIME_OF_SOURCE
@@ -170,6 +179,69 @@ def test_power_and_stick_fraction(fine, sweep, case):
     solved = sweep.solve("full", v, y)
     assert np.abs(fine.power(v, y) / solved["power"] - 1.0).max() <= 1e-6
     assert np.abs(fine.stick_fraction(v, y) - solved["stick_fraction"]).max() <= 1e-6
+
+
+def inside(table, sweep, v, y):
+    """Whether fresh solves lie within the bounds of power and stick fraction; the bounds, too."""
+    solved = sweep.solve("full", v, y)
+    power, of_power = table.power_with_bound(v, y)
+    stick, of_stick = table.stick_fraction_with_bound(v, y)
+    source = table.ratio_with_bound(v, y)[2]
+    noise = power_noise(v, y, solved["power"], REGIME_OF_SOURCE[source])
+    assert np.all(np.abs(power - solved["power"]) <= of_power + noise)
+    assert np.all(np.abs(stick - solved["stick_fraction"]) <= of_stick + STICK_NOISE)
+    return of_power / power, of_stick
+
+
+@pytest.mark.parametrize("case", [name for name, _, _ in CASES])
+def test_fresh_solves_lie_within_the_bounds_of_power_and_stick_fraction(table, sweep, case):
+    v, y = draw(case, 4000, table, seed=78)
+    at = (v > 0.0) & (y > 0.0)
+    inside(table, sweep, v[at], y[at])
+
+
+def test_bounds_of_power_and_stick_fraction_hold_on_the_border(table, sweep):
+    y = np.geomspace(1e-4, 1e12, 120)
+    crit = table.v_tilde_crit(y)
+    for distance in (0.0, 1e-15, 1e-14, 1e-13, 1e-12, 1e-10, 1e-8, 1e-7, 1e-6, 1e-4, 1e-2):
+        for side in (-1.0, 1.0):
+            _, of_stick = inside(table, sweep, crit * (1.0 + side * distance), y)
+            assert of_stick.max() <= 0.7 * math.sqrt(table.border.max_rel_error + 2e-15) + 30.0 * table.tolerance
+    # and far above it nothing is uncertain
+    assert table.stick_fraction_with_bound(2.0 * crit, y)[1].max() == 0.0
+
+
+def test_bounds_of_power_and_stick_fraction_hold_in_the_corner_and_at_creeping_speeds(table, sweep):
+    v = np.geomspace(1e-12, 1e-2, 60)[:, None]
+    gaps = np.concatenate([-np.geomspace(1e-12, 0.2, 25), [0.0], np.geomspace(1e-12, 0.4, 25)])
+    inside(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, 1.0 + gaps)))
+    inside(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, np.geomspace(1e-2, 1e12, 60))))
+
+
+def test_stick_fraction_of_the_reference_lies_within_its_bound(table, reference):
+    """The independent solver, in quadruple precision."""
+    stick, bound = table.stick_fraction_with_bound(reference.v, reference.y)
+    assert np.all(np.abs(stick - reference.stick_fraction) <= bound + STICK_NOISE)
+
+
+def test_bounds_of_power_and_stick_fraction_are_no_blanket(table, sweep):
+    v, y = draw("random", 30_000, table, seed=6)
+    solved = sweep.solve("full", v, y)
+    power, of_power = table.power_with_bound(v, y)
+    stick, of_stick = table.stick_fraction_with_bound(v, y)
+    source = table.ratio_with_bound(v, y)[2]
+    of_both = {"power": [], "stick": []}
+    for code in np.unique(source):
+        at = source == code
+        if at.sum() < 100 or SOURCES[code] == "tail_fast":
+            continue
+        worst = (np.abs(power - solved["power"]) / power)[at].max()
+        of_both["power"].append(np.median((of_power / power)[at]) / max(worst, 1e-15))
+        worst = np.abs(stick - solved["stick_fraction"])[at].max()
+        if worst > 0.0:
+            of_both["stick"].append(np.median(of_stick[at]) / max(worst, 1e-15))
+    assert np.median(of_both["power"]) <= 30.0
+    assert np.median(of_both["stick"]) <= 30.0
 
 
 def test_known_answers_are_the_models(sweep):

@@ -1,8 +1,14 @@
 """Gradient, standard deviation, power and stick fraction: what they say, in every form, and how they are refused."""
 
+import json
 import math
 
 import pytest
+from starlette.testclient import TestClient
+
+from friction.table import read_table, write_table
+from service.app import create_app
+from service.settings import Settings
 
 PATH = "/v1/mu-macro"
 STD = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "y0": 1e-7, "omega": 1e3, "v0": 1e-3}
@@ -104,6 +110,11 @@ def test_power_and_stick_fraction_are_the_surrogates(client, case, surrogate, v0
     assert answer["power"]["saved"] == pytest.approx((case["mu0"] - answer["mu_macro"]) * case["Fz"] * v0, rel=1e-12)
     assert answer["stick_fraction"] == pytest.approx(surrogate.stick_fraction(v, y), rel=1e-12)
     assert (answer["stick_fraction"] > 0) == (v0 < answer["limits"]["v0_crit"])
+    assert answer["stick_fraction_bound"] == pytest.approx(surrogate.stick_fraction_with_bound(v, y)[1], rel=1e-9)
+    bounds = answer["power"]["oscillation_bound"], answer["power"]["saved_bound"]
+    assert bounds[0] == pytest.approx(surrogate.power_with_bound(v, y)[1] * unit, rel=1e-9)
+    assert bounds[1] == pytest.approx(answer["error_bound"] * case["Fz"] * v0, rel=1e-2, abs=1e-14)
+    assert all(0.0 <= bound < 1e-6 for bound in bounds)
     # what both drives put in is lost where the contact slips, so neither is more than the friction force can take
     speed = v0 + y0 * case["omega"]
     assert 0 <= shaker + v0 * answer["mu_macro"] * case["Fz"] <= case["mu0"] * case["Fz"] * speed * (1 + 1e-9)
@@ -114,6 +125,36 @@ def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, p
     answer = ask(client, {**case, **change}, include=["power", "stick_fraction"])
     assert (answer["power"]["oscillation"], answer["stick_fraction"]) == (power, 0.0)
     assert answer["power"]["saved"] == pytest.approx((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
+    assert (answer["power"]["oscillation_bound"], answer["stick_fraction_bound"]) == (power, 0.0)
+    assert 0.0 <= answer["power"]["saved_bound"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
+
+
+def test_an_amplitude_below_double_range_leaves_the_stick_fraction_open(client, case):
+    answer = ask(client, {**case, "Fz": 1e300, "k": 1e-20, "y0": 1e-200}, include=["groups", "stick_fraction"])
+    assert answer["groups"]["y_tilde"] == 0.0
+    assert answer["stick_fraction_bound"] == 1.0
+
+
+def test_what_comes_with_the_companions_comes_only_if_asked_for(client, case):
+    assert not {"stick_fraction", "stick_fraction_bound", "power"} & ask(client, case).keys()
+    assert {"stick_fraction", "stick_fraction_bound"} <= ask(client, case, include=["stick_fraction"]).keys()
+
+
+def test_a_table_without_bounds_says_null(tables_dir, tmp_path, case):
+    table = read_table(tables_dir / "mumacro-1e-7.nc")
+    for block in table.blocks:
+        block.power_error = block.stick_error = None
+    write_table(table, tmp_path / "old.nc")
+    with TestClient(create_app(Settings(tables=(tmp_path,)))) as old:
+        answer = ask(old, case, include=["stick_fraction", "power"])
+        assert answer["stick_fraction"] > 0.0
+        assert answer["stick_fraction_bound"] is None
+        assert answer["power"]["oscillation"] > 0.0
+        assert answer["power"]["oscillation_bound"] is None
+        assert answer["power"]["saved_bound"] > 0.0
+        body = {**case, "v0": [0.01, 0.1], "include": ["stick_fraction", "power"]}
+        columns = old.post(f"{PATH}/batch", json=body).json()
+        assert columns["stick_fraction_bound"] == columns["power"]["oscillation_bound"] == [None, None]
 
 
 def test_power_and_stick_fraction_come_in_batches(client, case):
@@ -123,6 +164,33 @@ def test_power_and_stick_fraction_come_in_batches(client, case):
     for row, result in zip(rows[:-1], results, strict=False):
         single = ask(client, row, include=["stick_fraction", "power"])
         assert result["stick_fraction"] == pytest.approx(single["stick_fraction"], rel=1e-12)
+        assert result["stick_fraction_bound"] == pytest.approx(single["stick_fraction_bound"], rel=1e-12)
         for name, power in single["power"].items():
             assert result["power"][name] == (None if power is None else pytest.approx(power, rel=1e-12))
     assert results[-1] is None
+
+
+def test_bounds_of_power_and_stick_fraction_come_as_columns_lines_and_arrow(client, case):
+    v0 = [1e-3, 0.01, 0.3]
+    query = {"include": "stick_fraction,power"}
+    rows = client.post(f"{PATH}/batch", params=query, json=[{**case, "v0": v} for v in v0]).json()["results"]
+    columns = client.post(f"{PATH}/batch", params=query, json={**case, "v0": v0}).json()
+    text = "".join(json.dumps({**case, "v0": v}) + "\n" for v in v0)
+    headers = {"content-type": "application/x-ndjson"}
+    lines = client.post(f"{PATH}/batch", params=query, content=text, headers=headers).text.splitlines()
+    assert columns["stick_fraction_bound"] == [row["stick_fraction_bound"] for row in rows]
+    assert columns["power"].keys() == rows[0]["power"].keys()
+    for row, line in zip(rows, map(json.loads, lines), strict=True):
+        assert line["stick_fraction_bound"] == row["stick_fraction_bound"] > 0.0 or row["stick_fraction"] == 0.0
+        assert line["power"] == row["power"]
+    pa = pytest.importorskip("pyarrow")
+    given = pa.record_batch({name: v0 if name == "v0" else [value] * len(v0) for name, value in case.items()})
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, given.schema) as writer:
+        writer.write_batch(given)
+    headers = {"content-type": "application/vnd.apache.arrow.stream"}
+    answer = client.post(f"{PATH}/batch", params=query, content=sink.getvalue().to_pybytes(), headers=headers)
+    found = pa.ipc.open_stream(answer.content).read_all().to_pydict()
+    assert found["stick_fraction_bound"] == columns["stick_fraction_bound"]
+    for key, values in columns["power"].items():
+        assert found[f"power.{key}"] == values

@@ -137,6 +137,47 @@ def test_companions_at_the_ends_of_the_quadrant(table: Surrogate) -> None:
     assert table.power(np.array([0.1, 0.2]), 0.5).shape == (2,)
 
 
+def test_bounds_of_the_companions_at_the_ends_of_the_quadrant(table: Surrogate) -> None:
+    for v, y in ((0.3, 0.0), (math.inf, 2.0), (0.0, 0.5)):
+        assert table.power_with_bound(v, y)[1] == 0.0
+    for v, y in ((0.3, 0.0), (50.0, 1.0), (0.0, 0.5), (math.inf, 2.0), (1e5, 1e3)):
+        assert table.stick_fraction_with_bound(v, y)[1] == 0.0
+    # y~ = 1 at v~ = 0 is a corner: the last digit of y~ moves both
+    assert 0.0 < table.power_with_bound(0.0, 1.0)[1] < 1e-14
+    assert 0.0 < table.stick_fraction_with_bound(0.0, 1.0)[1] < 1e-6
+    assert table.power_with_bound(1.0, math.inf) == (math.inf, math.inf)
+
+
+def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: Surrogate) -> None:
+    rng = np.random.default_rng(8)
+    v, y = log_uniform(rng, 1e-100, 1e100, 50_000), log_uniform(rng, 1e-100, 1e100, 50_000)
+    power, of_power = table.power_with_bound(v, y)
+    stick, of_stick = table.stick_fraction_with_bound(v, y)
+    assert np.array_equal(power, table.power(v, y))
+    assert np.array_equal(stick, table.stick_fraction(v, y))
+    assert np.all(np.isfinite(of_power) & (of_power > 0.0))
+    assert np.all((of_stick >= 0.0) & (of_stick <= math.sqrt(table.border.max_rel_error) + 20.0 * table.tolerance))
+    # for small amplitudes next to the power itself only what doubles cannot hold
+    ordinary = power > 1e-280
+    assert np.all(of_power[ordinary] <= 1e-3 * power[ordinary])
+    one = table.power_with_bound(float(v[0]), float(y[0]))
+    assert one == (power[0], of_power[0])
+    assert type(one[1]) is float
+    assert table.stick_fraction_with_bound(v[:6].reshape(2, 3), 0.5)[1].shape == (2, 3)
+
+
+@pytest.mark.parametrize("y", [1.5, 2.0, 1e2, 1e5])
+@pytest.mark.parametrize("v", [1e4, 1e8, 1e50, 1e140, 1e160, 1e250])
+def test_power_at_large_speed_is_that_of_the_shaker_against_friction(table: Surrogate, v: float, y: float) -> None:
+    """p = y~^2/(2 v~) for y~ << v~, whatever digits a closed form would lose."""
+    if y > 1e-3 * v:
+        pytest.skip("not small beside the speed")
+    expected = 0.5 * y * (y / v)
+    power, bound = table.power_with_bound(v, y)
+    assert abs(power - expected) <= bound + expected * (1.0 / v**2 if v < 1e100 else 0.0) + expected * (y / v) ** 2
+    assert bound <= 2.0 * max(1e-13, table.tolerance) * expected
+
+
 def test_powers_and_friction_balance(fine: Surrogate, sweep: Sweep) -> None:
     # v~ mu~ + power is the slip path, which the exact solver knows to be at least v~ mu~ (the shaker never gains)
     rng = np.random.default_rng(12)
@@ -314,7 +355,7 @@ def test_pickle_refuses_another_table_in_its_place(tmp_path: Path) -> None:
     shutil.copy(TABLES[1], path)
     with pytest.raises(TableError, match="the pickled surrogate was made from") as caught:
         pickle.loads(data)  # noqa: S301
-    assert opened.checksum[:12] in str(caught.value)
+    assert opened.seal[:12] in str(caught.value)
     path.unlink()
     with pytest.raises(TableError, match="no such file"):
         pickle.loads(data)  # noqa: S301

@@ -70,7 +70,7 @@ def _same_numbers(one: Table, two: Table) -> None:
     for left, right in zip(one.blocks, two.blocks, strict=True):
         for name in ("a", "b", "values", "power", "stick"):
             assert np.array_equal(getattr(left, name), getattr(right, name))
-        for name in ("cells", "quantity_error", "max_abs_error", "max_rel_error"):
+        for name in ("cells", "quantity_error", "max_abs_error", "max_rel_error", "power_error", "stick_error"):
             assert getattr(left, name) == getattr(right, name)
 
 
@@ -119,6 +119,42 @@ def test_attributes_of_a_block_are_needed_and_covered_by_the_checksum(copy: Path
         root["border/blocks/corner"].delncattr(attribute)
     with pytest.raises(TableError, match="not a readable netCDF-4 table"):
         Surrogate.open(copy)
+
+
+@pytest.mark.parametrize("attribute", ["power_error", "stick_error"])
+def test_errors_of_the_companions_have_a_checksum_of_their_own(copy: Path, attribute: str) -> None:
+    with netCDF4.Dataset(str(copy), "a") as root:
+        block = root["border/blocks/corner"]
+        block.setncattr(attribute, 2.0 * block.getncattr(attribute))
+    with pytest.raises(TableError, match="checksum does not match the bounds"):
+        Surrogate.open(copy)
+    with netCDF4.Dataset(str(copy), "a") as root:
+        root["border/blocks/corner"].delncattr(attribute)
+    with pytest.raises(TableError, match="checksum does not match the bounds"):
+        Surrogate.open(copy)
+
+
+def test_a_table_without_bounds_of_power_and_stick_fraction_loads_and_has_none(tmp_path: Path) -> None:
+    """As the builder wrote them before it measured these errors: the content and its checksum are the same."""
+    old = read_table(TABLE)
+    for block in old.blocks:
+        block.power_error = block.stick_error = None
+    for name in ("verified_max_stick_error", "verified_max_rel_power_error"):
+        del old.attributes[name]
+    path = tmp_path / TABLE.name
+    write_table(old, path)
+    with netCDF4.Dataset(str(path)) as root:
+        assert "bounds_sha256" not in root.ncattrs()
+        assert "power_error" not in root["border/blocks/corner"].ncattrs()
+    one, two = Surrogate.open(path), Surrogate.open(TABLE)
+    assert one.checksum == two.checksum == one.seal != two.seal
+    assert one.power_with_bound(0.1, 0.5) == (two.power(0.1, 0.5), None)
+    assert one.stick_fraction_with_bound(0.1, 0.5) == (two.stick_fraction(0.1, 0.5), None)
+    values, bounds = one.power_with_bound(np.array([0.1, 2.0]), 0.5)
+    assert values.shape == (2,)
+    assert bounds is None
+    one.warm_up()
+    assert one.blocks[0]["power_error"] is None
 
 
 def test_cells_must_be_there(tmp_path: Path) -> None:
@@ -212,7 +248,7 @@ def test_every_variable_in_every_group_says_what_it_is() -> None:
         assert tree.attrs.keys() >= {
             "title", "summary", "history", "source", "references", "license", "product_version", "format_version",
             "tolerance", "verified_max_abs_error", "verified_max_rel_error", "n_solves", "builder_options",
-            "content_sha256",
+            "content_sha256", "bounds_sha256", "verified_max_stick_error", "verified_max_rel_power_error",
         }  # fmt: skip
         seen = 0
         for node in tree.subtree:

@@ -28,10 +28,12 @@ def test_page_names_every_committed_table_and_no_other(tables_dir: Path, lines: 
 @pytest.mark.parametrize("name", NAMES)
 def test_page_repeats_what_the_file_holds(tables_dir: Path, lines: dict[str, list[list[str]]], name: str) -> None:
     s = Surrogate.open(tables_dir / name)
-    (tolerance, solves, size, memory, absolute, relative), (_, _, same, checksum) = lines[name]
+    (tolerance, solves, size, memory, absolute, relative, stick, power), (_, _, same, checksum) = lines[name]
     assert checksum == s.checksum
     assert float(tolerance) == s.tolerance
     assert (absolute, relative) == (f"{s.max_abs_error:.2e}", f"{s.max_rel_error:.2e}")
+    said = (s.attributes["verified_max_stick_error"], s.attributes["verified_max_rel_power_error"])
+    assert (stick, power) == tuple(f"{error:.2e}" for error in said)
     assert int(solves.replace(",", "")) == s.attributes["n_solves"]
     assert int(size.replace(",", "")) == (tables_dir / name).stat().st_size
     assert int(memory.replace(",", "")) == s.memory

@@ -96,10 +96,53 @@ def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
 def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None:
     found = block_errors(sound, sweep, 200, seed=1)
     assert len(found) == len(BLOCKS)
-    for spec, block, (quantity, absolute, relative) in zip(BLOCKS, sound.table.blocks, found, strict=True):
-        assert 0.0 <= quantity <= block.quantity_error, spec.name
-        assert absolute <= sound.tolerance
-        assert relative <= 10.0 * sound.tolerance
+    for spec, block, errors in zip(BLOCKS, sound.table.blocks, found, strict=True):
+        assert 0.0 <= errors.quantity <= block.quantity_error, spec.name
+        assert errors.absolute <= sound.tolerance
+        assert errors.relative <= 10.0 * sound.tolerance
+        assert 0.0 <= errors.power <= block.power_error, spec.name
+        assert 0.0 <= errors.stick <= (block.stick_error or 0.0), spec.name
     wrong = damaged("corner", 1.0 + 1e-5)
-    quantity = block_errors(wrong, sweep, 200, seed=1)[BLOCK_INDEX["corner"]][0]
+    quantity = block_errors(wrong, sweep, 200, seed=1)[BLOCK_INDEX["corner"]].quantity
     assert quantity == pytest.approx(1e-5, rel=0.3)
+
+
+def test_report_of_power_and_stick_fraction(sound: Surrogate, sweep: Sweep) -> None:
+    report = verify(sound, sweep, 1000, seed=3)
+    for key, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error")):
+        part = report[key]
+        assert part["not_covered"] == 0
+        assert 0.0 < part[error] < 1e-5
+        assert part[error] == max(source[error] for source in part["sources"].values())
+        assert set(part["sources"]) == set(report["sources"])
+
+
+@pytest.mark.parametrize(
+    ("key", "nodes", "block"),
+    [
+        ("power", "power", "continuous_mid_2"),
+        ("power", "power", "stick_slip_low"),
+        ("stick_fraction", "stick", "corner"),
+        ("stick_fraction", "stick", "stick_slip_high"),
+    ],
+)
+def test_companions_off_by_a_hundred_thousandth_are_found(sweep: Sweep, key: str, nodes: str, block: str) -> None:
+    table: Table = copy.deepcopy(read_table(TABLE))
+    values = getattr(table.blocks[BLOCK_INDEX[block]], nodes)
+    values *= 1.0 + 1e-5
+    wrong = Surrogate(table, TABLE)
+    report = verify(wrong, sweep, 1000, seed=3)
+    assert report["not_covered"] == 0
+    assert report[key]["not_covered"] > 0
+    assert [name for name, part in report[key]["sources"].items() if part["not_covered"]] == [block]
+    found = block_errors(wrong, sweep, 200, seed=1)[BLOCK_INDEX[block]]
+    assert (found.power if key == "power" else found.stick) > 1e-6
+
+
+def test_a_table_without_bounds_is_not_blamed_for_it(sweep: Sweep) -> None:
+    table: Table = copy.deepcopy(read_table(TABLE))
+    for block in table.blocks:
+        block.power_error = block.stick_error = None
+    report = verify(Surrogate(table, TABLE), sweep, 300, seed=3)
+    assert report["power"]["not_covered"] is report["stick_fraction"]["not_covered"] is None
+    assert report["power"]["max_rel_error"] > 0.0

@@ -76,7 +76,7 @@ async def get_table_file(request: Request) -> Response:
     # A file that was replaced after loading would be another table under this one's name.
     table.check()
     path = table.surrogate.path
-    etag = f'"{table.surrogate.checksum}"'
+    etag = f'"{table.surrogate.seal}"'
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
