@@ -487,7 +487,7 @@ def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
             script = post(**options).script(folder)
             load(server, script, 1)
             single = statistics.median(load(server, script, 2)[0] for _ in range(rounds))
-            rate = _rate(server, BATCH, orjson.dumps({**table, **options}), "application/json", n, rounds)
+            rate = _rate(server, orjson.dumps({**table, **options}), "application/json", n, rounds, folder)
             rows.append([name, quantity(single, 3), quantity(1e3 / rate, 3)])
     return rows
 
