@@ -12,6 +12,7 @@ import threading
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -26,6 +27,7 @@ from service.connection import sweep
 from service.drain import draining
 from service.errors import answer_problem
 from service.logs import AccessLog
+from service.memory import keep_lean
 from service.metrics import Metrics
 from service.middleware import HEALTH_PATHS, ApiKeyGate, BodyLimit, Compression, RequestRecord
 from service.openapi import install
@@ -69,7 +71,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         state.access_log.start()
         state.batches.start(threads)
         settle_memory()
-        tasks = [asyncio.create_task(sweep(settings.client_timeout_s)), asyncio.create_task(state.metrics.share())]
+        always = [sweep(settings.client_timeout_s), state.metrics.share()]
+        if threading.current_thread() is threading.main_thread():  # as settle_memory
+            always.append(keep_lean(partial(asyncio.get_running_loop().run_in_executor, threads)))
+        tasks = [asyncio.create_task(work) for work in always]
         with draining(state.shelf, settings.drain_s):
             yield
         for task in tasks:

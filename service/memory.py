@@ -3,15 +3,16 @@
 On Linux; elsewhere, and wherever anything looks unusual, nothing happens.
 """
 
+import asyncio
 import ctypes
 import mmap
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from functools import cache
 from pathlib import Path
 
-__all__ = ["Mapped", "clean_mappings", "give_back", "trim"]
+__all__ = ["Mapped", "clean_mappings", "give_back", "keep_lean", "trim"]
 
 # Libraries that load compiled code and read tables, but take no part in answering; mapped, and not to be written to.
 _ONLY_TO_START = re.compile(
@@ -21,6 +22,8 @@ _ONLY_TO_START = re.compile(
 )
 _NONE_OF = ("Shared_Dirty", "Private_Dirty", "Anonymous", "Swap", "Locked")
 _MADV_DONTNEED = 4
+_LOOK_EVERY_S = 5.0
+_MANY_PAGES = 4096  # worth looking for what to give back, which takes some milliseconds
 
 
 class Mapped(mmap.mmap):
@@ -58,6 +61,24 @@ def give_back() -> None:
     except (OSError, ValueError, AttributeError):
         pass  # memory is all that it was about
     trim()
+
+
+async def keep_lean(run: Callable[[Callable[[], None]], Awaitable[None]]) -> None:
+    """Give back again, for ever, what kernels that are loaded later bring in; ``run`` does it in another thread."""
+    known = _file_pages()
+    while True:
+        await asyncio.sleep(_LOOK_EVERY_S)
+        if _file_pages() > known + _MANY_PAGES:
+            await run(give_back)
+            known = _file_pages()
+
+
+def _file_pages() -> int:
+    """Resident pages that are mapped from files; 0 where nobody tells."""
+    try:
+        return int(Path("/proc/self/statm").read_bytes().split()[2])
+    except (OSError, ValueError, IndexError):
+        return 0
 
 
 def trim() -> None:

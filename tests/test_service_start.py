@@ -1,5 +1,6 @@
 """What is left out at a start, and given back after it: nothing that is missed."""
 
+import asyncio
 import os
 import re
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from service import memory
 from service.memory import Mapped, clean_mappings, trim
 
 _GIVEN_BACK = """
@@ -98,6 +100,25 @@ def test_a_service_does_not_hold_what_loaded_its_code(serving, surrogate):
         assert sizes
         assert all(resident < size / 4 for size, resident in sizes)
         assert server.ask("GET", "/readyz")[0] == 200
+
+
+def test_what_comes_later_is_given_back_again(monkeypatch):
+    pages = iter([1000, 1010, 9000, 1200, 5200, 5297, 1300])
+    seen, given = [], []
+
+    def look():
+        seen.append(next(pages))
+        return seen[-1]
+
+    async def run(work):
+        assert work is memory.give_back
+        given.append(len(seen))
+
+    monkeypatch.setattr(memory, "_file_pages", look)
+    monkeypatch.setattr(memory, "_LOOK_EVERY_S", 0.0)
+    with pytest.raises(RuntimeError, match="StopIteration"):  # no more numbers
+        asyncio.run(memory.keep_lean(run))
+    assert given == [3, 6]  # when there were 9000, and again at 5297, 1200 having been left
 
 
 def test_a_room_is_given_back_with_the_last_who_looks_into_it():
