@@ -20,7 +20,9 @@ _ONLY_TO_START = re.compile(
     r"/(?:llvmlite|netCDF4|netcdf4\.libs)/[^\n]*\.so[^\n/ ]*$",
     re.MULTILINE,
 )
-_NONE_OF = ("Shared_Dirty", "Private_Dirty", "Anonymous", "Swap", "Locked")
+# What a process writes to a page of a file that it maps for itself becomes a page of its own: Anonymous, or Swap.
+# Dirty alone says that the file has not reached the disk yet, as in an image that has just been unpacked.
+_NONE_OF = ("Anonymous", "Swap", "Locked")
 _MADV_DONTNEED = 4
 _LOOK_EVERY_S = 5.0
 _MANY_PAGES = 4096  # worth looking for what to give back, which takes some milliseconds
