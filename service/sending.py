@@ -6,8 +6,6 @@ import zlib
 from collections.abc import Awaitable, Iterator
 from typing import TypeVar
 
-from starlette.requests import Request
-
 from service.errors import SlowClientError, TookTooLongError
 from service.settings import Settings
 
@@ -99,8 +97,9 @@ class Packer:
         return packed
 
 
-def wants_gzip(request: Request) -> bool:
-    for offer in request.headers.get("accept-encoding", "").lower().split(","):
+def wants_gzip(offers: str) -> bool:
+    """Whether who sent these words as Accept-Encoding takes gzip."""
+    for offer in offers.lower().split(","):
         name, _, parameters = offer.partition(";")
         if name.strip() in ("gzip", "*"):
             return parameters.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
@@ -108,15 +107,14 @@ def wants_gzip(request: Request) -> bool:
 
 
 def gather(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes in pieces of a size that is worth a message."""
-    gathered = bytearray()
+    """The same bytes in pieces of a size that is worth a message; what is one already is not copied."""
+    gathered: list[bytes] = []
+    size = 0
     for piece in pieces:
-        if len(piece) >= _PIECE and not gathered:
-            yield piece
-            continue
-        gathered += piece
-        if len(gathered) >= _PIECE:
-            yield bytes(gathered)
-            gathered.clear()
-    if gathered:
-        yield bytes(gathered)
+        gathered.append(piece)
+        size += len(piece)
+        if size >= _PIECE:
+            yield b"".join(gathered)
+            gathered, size = [], 0
+    if size:
+        yield b"".join(gathered)

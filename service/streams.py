@@ -131,9 +131,8 @@ class LineAnswers:
         if cases is not None:
             yield from cases
             return
-        blocks = [
-            0
-        ]  # where the lines that are read and not yet answered begin among the cases; where the last one ends
+        # Where the lines that are read and not yet answered begin among the cases, and where the last one ends.
+        blocks = [0]
         for index, (start, end) in enumerate(spans):
             size = self._read(lines.text, start, end, blocks[-1])
             if size < 0 and len(blocks) > 1:

@@ -22,6 +22,7 @@ from service.logs import AccessLog, accept_request_id, new_request_id
 from service.metrics import Metrics
 from service.middleware import BATCH_PATH, COMPRESS_FROM
 from service.schemas import CaseRequest
+from service.sending import wants_gzip
 from service.settings import Settings, cache_fields
 from service.shelf import LoadedTable, Shelf
 
@@ -152,8 +153,7 @@ class ShortWay:
         if self._key is not None and not secrets.compare_digest(headers.get(b"x-api-key", b""), self._key):
             return None
         if scope["path"] == BATCH_PATH:
-            offers = headers.get(b"accept-encoding", b"")
-            packed = b"gzip" in offers.lower() or b"*" in offers
+            packed = wants_gzip(headers.get(b"accept-encoding", b"").decode("latin-1"))
             content = self._batch(body, COMPRESS_FROM - 1 if packed else _UNLIMITED)
             return None if content is None else (self._identity(headers), None, content)
         if scope["method"] == "GET":

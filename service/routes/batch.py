@@ -279,7 +279,7 @@ class BatchEndpoint:
             if not started:
                 started = True
                 headers = [(b"content-type", kind.encode("ascii"))]
-                if len(piece) >= COMPRESS_FROM and wants_gzip(request):
+                if len(piece) >= COMPRESS_FROM and wants_gzip(request.headers.get("accept-encoding", "")):
                     packer = Packer()
                     headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
                 elif last:
@@ -306,7 +306,7 @@ class BatchEndpoint:
         answer = partial(self._answer, query=query, line=True)
         answers = LineAnswers(self._shelf, query, self._settings.max_batch, answer, self._count)  # or an error, by now
         headers = [(b"content-type", NDJSON.encode("ascii"))]
-        packer = Packer() if wants_gzip(request) else None
+        packer = Packer() if wants_gzip(request.headers.get("accept-encoding", "")) else None
         if packer is not None:
             headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
         # Who asks whether to go on sends nothing until the server says so, which it does when it is to receive; others
