@@ -22,13 +22,8 @@ RUN --mount=type=secret,id=pip.conf,target=/etc/pip.conf \
 # Other projects' tests are a tenth of the environment, and pip has no business in a running image.
 RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' -prune -exec rm -rf {} + \
     && venv/bin/python -m pip uninstall --quiet --yes pip setuptools
-COPY LICENSE pyproject.toml deploy/read_only_cache.py ./
-# The project is copied, not installed (a wheel would bring the solver), so its version is written down here.
-RUN venv/bin/python -c "import pathlib, tomllib; \
-project = tomllib.loads(pathlib.Path('pyproject.toml').read_text())['project']; \
-folder = pathlib.Path('{name}-{version}.dist-info'.format(**project)); folder.mkdir(); \
-(folder / 'METADATA').write_text('Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n'.format(**project))"
-COPY friction friction
+COPY LICENSE deploy/read_only_cache.py ./
+COPY mumacro mumacro
 COPY service service
 COPY tables tables
 # The kernels are compiled here, once.  The key under which numba keeps them holds the processor, so they are
@@ -39,8 +34,8 @@ ENV NUMBA_CPU_NAME=generic \
     NUMBA_CACHE_DIR=/app/cache \
     NUMBA_CACHE_LOCATOR_CLASSES=read_only_cache.ReadOnlyCacheLocator \
     PYTHONPATH=/app
-RUN venv/bin/python -m compileall -q friction service read_only_cache.py \
-    && venv/bin/python -m service.warm tables \
+RUN venv/bin/python -m compileall -q mumacro service read_only_cache.py \
+    && venv/bin/python -m service warm --tables tables \
     && find cache -name '*.nbc' | grep .
 
 FROM ${BASE}

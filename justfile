@@ -10,7 +10,7 @@ default:
 demo:
     {{python}} dev.py demo
 
-# Every check, then pytest
+# Every check, then every test; `just test --quick` leaves the slow ones out
 test *ARGS:
     {{python}} dev.py test {{ARGS}}
 

@@ -13,30 +13,32 @@ from measuring import ROOT, markdown, quantity  # isort: skip
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from friction import Surrogate, tails
-from friction.law import APPROXIMATIONS, approximations, friction_law
+from mumacro import Surrogate, closed_forms
+from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law
 
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 RANGES = ((1e-4, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 10.0), (10.0, 1e3), (1e3, 1e6))
 
 
 def border(surrogate: Surrogate) -> str:
-    """Relative errors of the border's formulas, by range of y~."""
+    """Largest relative errors of the border's formulas, by range of y~; of each where a law gives it."""
+    names = [name for name in BORDERS if name != "exact"]
     rows = []
     for low, high in (*RANGES, (1e-4, 1e6)):
         y = np.geomspace(low, high, 2001)
-        exact = surrogate.v_tilde_crit(y)
-        formulas = (tails.border_small_amplitude, tails.border_large_amplitude, tails.border_blend)
-        worst = [quantity(float(np.abs(formula(y) / exact - 1.0).max())) for formula in formulas]
-        rows.append([f"{low:g} to {high:g}", *worst])
-    return markdown(["y~", "small amplitude", "large amplitude", "blend"], rows)
+        case: dict[str, float | None] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 1.0}
+        found = border_speeds(surrogate, friction_law(surrogate, "y0", y, case), case)
+        miss = [np.abs(found[name] / found["exact"] - 1.0) for name in names]
+        cells = ["-" if np.isnan(x).all() else quantity(float(np.nanmax(x))) for x in miss]
+        rows.append([f"{low:g} to {high:g}", *cells])
+    return markdown(["y~", *names], rows)
 
 
 def best_blend(surrogate: Surrogate) -> tuple[float, float]:
     """The number that makes the blend's largest relative error smallest, and that error."""
     y = np.geomspace(1e-4, 1e8, 4001)
     exact = surrogate.v_tilde_crit(y)
-    c = (tails.BORDER_CONSTANT / 4.0) ** (2.0 / 3.0)
+    c = (closed_forms.BORDER_CONSTANT / 4.0) ** (2.0 / 3.0)
 
     def worst(d: float) -> float:
         w = y * y

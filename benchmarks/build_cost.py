@@ -24,7 +24,7 @@ from scipy.interpolate import RectBivariateSpline
 
 from builder.assemble import MAX_TOLERANCE, build_table
 from builder.sweep import Sweep
-from friction import regions
+from mumacro import charts
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -73,7 +73,7 @@ class Plain:
 
 def build(tolerance: float, workers: int, folder: Path) -> Built:
     """Build one table from nothing and measure it."""
-    names = {spec.name for spec in regions.BLOCKS}
+    names = {chart.name for chart in charts.CHARTS}
     nodes = 0
     path = folder / f"{tolerance:.0e}.nc"
     start = perf_counter()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from friction import Surrogate
+from mumacro import Surrogate
 
 TABLE = Path(__file__).resolve().parent.parent / "tables" / "mumacro-1e-12.nc"
 y = np.geomspace(1e-6, 1e18, 240_001)

@@ -27,11 +27,13 @@ from measuring import ROOT, markdown, progress, quantity
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from builder.model import NO_SLIP, NO_STICK, OK, slip
-from builder.steady import _section, border, continuous, solve, stick_excess, stick_slip, workspace
-from friction import Surrogate, tails
-from friction.nondim import groups
-from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes
+from builder.model import ANGLE, CHART, FALL, MIN_SPEED, NO_SLIP, NO_STICK, OK, SIGMA, STEPS, SUM_UX, slip
+from builder.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, section, stick_slip
+from builder.steady import border, continuous, solve, workspace
+from builder.stick import stick_excess
+from mumacro import Surrogate, closed_forms
+from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.dimensional import groups
 
 Array = NDArray[np.float64]
 PAGE = ROOT / "docs" / "hard-cases.md"
@@ -66,14 +68,14 @@ def _lam_samples(v: float, y: float, n: int) -> tuple[Array, float]:
     w, out, _, _ = workspace()
     if continuous(v, y, w, out) != OK:
         raise ArithmeticError(f"no continuous orbit at v~ = {v!r}, y~ = {y!r}")
-    start, least = -(out[1] + out[2] * HALF), float(out[8])
+    start, least = -(out[ANGLE] + out[CHART] * HALF), float(out[MIN_SPEED])
     samples = np.empty(n + 1)
     for i, sigma in enumerate(np.linspace(-HALF, HALF, n + 1)):
         th = start
         if i:
             chart = 1 if start > 0.75 else 0
             slip(v, y, -HALF, 0, start - chart * HALF, chart, float(sigma), False, w, out)
-            th = out[1] + out[2] * HALF
+            th = out[ANGLE] + out[CHART] * HALF
         samples[i] = v * math.cos(th) - y * math.sin(sigma) * math.sin(th)
     return samples, least
 
@@ -104,10 +106,10 @@ def surplus() -> str:
         count += 1
         hint = math.nan
         if continuous(v, y, w, out) == OK:
-            hint = out[9]
+            hint = out[FALL]
         stick_slip(v, y, y - 1.0, hint, w, out, orbit)
-        naive = (orbit[0] * (orbit[1] + 0.5 * v * orbit[0]) + out[4]) / math.pi
-        spread = max(spread, abs(out[0] - orbit[4]))
+        naive = (orbit[DURATION] * (orbit[COS_0] + 0.5 * v * orbit[DURATION]) + out[SUM_UX]) / math.pi
+        spread = max(spread, abs(out[SIGMA] - orbit[SIGMA_0]))
         lost = max(lost, abs(naive - mu) / mu)
         kept = max(kept, abs(full.mu_ratio - mu) / mu)
     rows = [["as it comes", g(lost)], ["surplus taken out", g(kept)]]
@@ -125,7 +127,7 @@ def double_root() -> str:
     v, y = 0.1, 0.5
     w, out, orbit, _ = workspace()
     stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)
-    x0 = math.atan2(orbit[3], orbit[1])
+    x0 = math.atan2(orbit[SIN_0], orbit[COS_0])
     s0 = math.asin(v * math.cos(x0) / (y * math.sin(x0)))
     rows = []
     for d in (1e-1, 1e-3, 1e-5, 1e-7, 1e-8):
@@ -275,20 +277,20 @@ def short_stick() -> str:
     w, out, orbit, _ = workspace()
     rows = []
     for y in (1e4, 1e6, 1e8, 1e10, 1e12):
-        v = 0.9 * tails.border_large_amplitude(y)
+        v = 0.9 * closed_forms.border_large_amplitude(y)
         full = solve(v, y)
         hint = math.nan
         if continuous(v, y, w, out) == OK:
-            hint = out[9]
+            hint = out[FALL]
         stick_slip(v, y, y - 1.0, hint, w, out, orbit)
-        d, cth, sth, s0, s1 = orbit[0], orbit[1], orbit[3], orbit[4], orbit[5]
+        d, cth, sth, s0, s1 = (orbit[i] for i in (DURATION, COS_0, SIN_0, SIGMA_0, SIGMA_1))
         ux, uy = cth + v * d, 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth
         x, chart = (-math.asin(min(ux, 1.0)), 1) if uy > 0.0 else (math.atan2(uy, ux), 0)
         slid = []
         for sigma in (s0 + d, s1 + math.pi):  # s1 = s0 + d - pi counts from the far turn and is rounded there
             slip(v, y, sigma, -1, x, chart, HALF, True, w, out)
-            slid.append(float(out[4]))
-        layer = (full.mu_ratio - float(tails.outer(y / v))) * y / v
+            slid.append(float(out[SUM_UX]))
+        layer = (full.mu_ratio - float(closed_forms.outer(y / v))) * y / v
         rows.append([f"{y:.0e}", f"{d:.2e}", g(abs(slid[1] / slid[0] - 1)), f"{layer:.10f}"])
     header = ("y~", "length of stick", "rel change of the slip's share of mu~, far turn", "(mu~ - outer) y~/v~, solved")
     return (
@@ -312,8 +314,8 @@ def stiffness() -> str:
             run = solve_ivp(rate, (-HALF, HALF), [math.atan(v * y / (1 + v * v))], method="DOP853", rtol=1e-9)
             explicit = f"{run.t.size - 1:,}"
         continuous(v, y, w, out)
-        steps = int(out[10])
-        closed = float(tails.outer(y / v) + tails.second_order(y / v) / (v * v))
+        steps = int(out[STEPS])
+        closed = float(closed_forms.outer(y / v) + closed_forms.second_order(y / v) / (v * v))
         rows.append([f"{v:.0e}", explicit, f"{steps}", g(abs(solve(v, y).mu_ratio / closed - 1))])
     header = ("v~ = y~", "explicit steps (DOP853, rtol 1e-9)", "steps here", "rel distance to two terms of v~ -> inf")
     return f"{markdown(header, rows, 0)}\n\nAt the reference points of large speed: max rel error {worst('tail_vinf')}."
@@ -359,8 +361,8 @@ def denormals() -> str:
     w, out, orbit, _ = workspace()
     for y in (1e-9, 1e-30, 1e-100, 1e-150):
         v = 0.3 * y * y
-        status, _ = stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)
-        plain = orbit[0] / math.pi if status == OK else math.nan
+        status = stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)
+        plain = orbit[DURATION] / math.pi if status == OK else math.nan
         full = solve(v, y)
         rows.append([f"{y:.0e}", f"{v:.0e}", f"status {status}, {plain:.12f}", f"{full.stick_fraction:.12f}"])
     header = ("y~", "v~", "stick fraction, solved at this amplitude", "solved at y~ = 1e-9 and scaled")
@@ -380,7 +382,7 @@ def _secant(v: float, y: float, kind: int, chart: int, z: float, rule: str, smal
     w, out, orbit, _ = workspace()
     z_old, f_old, before = math.nan, math.inf, math.inf
     for _ in range(60):
-        f, status = _section(kind, v, y, y - 1.0, z, chart, w, out, orbit)
+        f, status = section(kind, v, y, y - 1.0, z, chart, w, out, orbit)
         if status in (NO_SLIP, NO_STICK) or status != OK or not math.isfinite(f):
             return math.nan
         new = z - f * (z - z_old) / (f - f_old) if math.isfinite(f_old) and f != f_old else z * (1.0 - 1e-2)
@@ -404,9 +406,10 @@ def stop_rule() -> str:
         v = border(y)[0] * 10.0 ** rng.uniform(-4, -0.05)
         chart = 0 if y < 0.7 else 1
         w, out, orbit, _ = workspace()
-        if stick_slip(v, y, y - 1.0, math.nan, w, out, orbit)[0] != OK:
+        if stick_slip(v, y, y - 1.0, math.nan, w, out, orbit) != OK:
             continue
-        true = math.atan2(orbit[3], orbit[1]) if chart == 0 else math.atan2(orbit[1], orbit[3])
+        sine, cosine = orbit[SIN_0], orbit[COS_0]
+        true = math.atan2(sine, cosine) if chart == 0 else math.atan2(cosine, sine)
         for name in found:
             rule, _, small = name.partition(" ")
             z = _secant(v, y, 0, chart, true * (1.0 + 10.0 ** rng.uniform(-6, -2)), rule, float(small or 0.0))

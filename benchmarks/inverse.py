@@ -20,14 +20,13 @@ from measuring import ROOT, best_of, machine, markdown, quantity, write_section 
 import math
 from pathlib import Path
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, newton
 
-from friction import Surrogate
-from friction.crossings import Sweep, last_double
-from friction.inverse import HUGE, solve_for
+from mumacro import Surrogate
+from mumacro.inverse import solve_for
+from mumacro.inverse.rootfinding import Sweep, last_double
 
 CASE: dict[str, float] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 COUNTS = (1, 100, 10_000)
@@ -37,7 +36,7 @@ def by_bits(surrogate: Surrogate, unknown: str, targets: NDArray[np.float64], ri
     """Root, lower and upper end (3, n) by bisection of the bits, as ``solve_for`` once did for v0, y0 and omega."""
     sweep = Sweep(surrogate, {name: value for name, value in CASE.items() if name != unknown}, unknown)
     sign = 1.0 if rising else -1.0
-    low, high = np.zeros(targets.size), np.full(targets.size, HUGE)
+    low, high = np.zeros(targets.size), np.full(targets.size, np.finfo(float).max)
 
     def reach(level: NDArray[np.float64]) -> NDArray[np.float64]:
         def below(x: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -106,9 +105,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="leave out the many targets")
     parser.add_argument("--write", action="store_true")
     chosen = parser.parse_args()
-    surrogate = Surrogate.open(chosen.table)
+    surrogate = Surrogate.open(chosen.table, threads=1)
     surrogate.warm_up()
-    numba.set_num_threads(1)
     found, note = rows(surrogate, chosen.rounds, COUNTS[:2] if chosen.quick else COUNTS)
     header = [
         "unknown", "targets", "solve_for [ms]", "bits [ms]", "times", "brentq [ms]", "times", "scipy newton [ms]",

@@ -16,13 +16,17 @@ from collections.abc import Callable
 import numpy as np
 from measuring import ROOT, markdown, progress, quantity
 from numpy.typing import NDArray
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from validation import orbit
 
-from builder.blocks import points_of, quantity_of
-from builder.steady import border, solve
+from builder.blocks import tabulated
+from builder.steady import border, solve, solve_raw, workspace
 from builder.sweep import Sweep
-from friction import Surrogate, tails
-from friction.patches import chebyshev_coefficients, interpolation_matrix, nodes
-from friction.regions import BLOCKS, CONTINUOUS, SOURCES, BlockSpec
+from mumacro import Surrogate, closed_forms
+from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.charts import CHARTS, CONTINUOUS, NAMES, SOURCES, point
+from mumacro.settling import settling
 
 Array = NDArray[np.float64]
 PAGE = ROOT / "docs" / "model.md"
@@ -35,24 +39,26 @@ def g(x: float) -> str:
     return quantity(float(x), 2)
 
 
-def _block_error(spec: BlockSpec, n: int, s: Surrogate, sweep: Sweep) -> float:
+def _block_error(index: int, n: int, s: Surrogate, sweep: Sweep) -> float:
     """Largest error of the n x n interpolant of what the block tabulates, on random points of its rectangle."""
-    kind = "continuous" if spec.regime == CONTINUOUS else "full"
+    chart = CHARTS[index]
+    kind = "continuous" if chart.regime == CONTINUOUS else "full"
 
-    def tabulated(a: Array, b: Array) -> Array:
-        p = points_of(spec, a, b, s.border)
-        solved = sweep.solve(kind, p.v, p.y, p.eta)
-        return quantity_of(spec, p, solved["mu_ratio"], solved["deficit"])
+    def values(a: Array, b: Array) -> Array:
+        v, y, eta = point(chart, a, b, s.border)
+        return tabulated(index, v, y, eta, sweep.solve(kind, v, y, eta))[0]
 
     rng = np.random.default_rng(3)
-    a, b = (rng.uniform(low + 1e-3 * (high - low), high, POINTS) for low, high in (spec.a, spec.b))
-    b = np.minimum(b, spec.b[1] - 1e-3 * (spec.b[1] - spec.b[0]))
-    grid = nodes(n, *spec.a), nodes(n, *spec.b)
-    c = chebyshev_coefficients(tabulated(grid[0][:, None], grid[1][None, :]))
+    axes = (chart.a, chart.b)
+    a, b = (rng.uniform(axis.low + 1e-3 * (axis.high - axis.low), axis.high, POINTS) for axis in axes)
+    b = np.minimum(b, chart.b.high - 1e-3 * (chart.b.high - chart.b.low))
+    grid = [nodes(n, axis.low, axis.high) for axis in axes]
+    c = chebyshev_coefficients(values(grid[0][:, None], grid[1][None, :]))
     left, right = (
-        interpolation_matrix(n, (2.0 * x - low - high) / (high - low)) for x, (low, high) in ((a, spec.a), (b, spec.b))
+        interpolation_matrix(n, (2.0 * x - axis.low - axis.high) / (axis.high - axis.low))
+        for x, axis in zip((a, b), axes, strict=True)
     )
-    return float(np.abs(np.einsum("pi,ij,pj->p", left, c, right) - tabulated(a, b)).max())
+    return float(np.abs(np.einsum("pi,ij,pj->p", left, c, right) - values(a, b)).max())
 
 
 def blocks() -> str:
@@ -60,9 +66,9 @@ def blocks() -> str:
     s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
     rows = []
     with Sweep(1) as sweep:
-        for spec in BLOCKS:
-            progress(spec.name)
-            rows.append([spec.name, *(g(_block_error(spec, n, s, sweep)) for n in SIZES)])
+        for index, name in enumerate(NAMES):
+            progress(name)
+            rows.append([name, *(g(_block_error(index, n, s, sweep)) for n in SIZES)])
     return markdown(("block", *(f"{n} x {n}" for n in SIZES)), rows)
 
 
@@ -71,8 +77,8 @@ def limits() -> str:
     rows = []
     for y in (1e-3, 1e-2, 0.1, 0.3, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5):
         crit, mu = border(y)
-        small = abs(float(tails.border_small_amplitude(y)) / crit - 1.0)
-        large = abs(float(tails.border_large_amplitude(y)) / crit - 1.0)
+        small = abs(float(closed_forms.border_small_amplitude(y)) / crit - 1.0)
+        large = abs(float(closed_forms.border_large_amplitude(y)) / crit - 1.0)
         ends = [g(x) if x < 0.5 else "-" for x in (small, large)]
         rows.append([f"{y:g}", f"{crit:.9e}", f"{mu:.9f}", *ends, f"{y / crit**2:.6f}" if y >= 1.0 else "-"])
     header = ("y~", "v~crit", "mu~ there", "rel error, small y~", "rel error, large y~", "y~/v~crit^2")
@@ -85,13 +91,29 @@ def outer() -> str:
     rows = []
     for v, y in ((100.0, 0.1), (100.0, 2.0), (100.0, 3.0), (1000.0, 30.0), (1000.0, 300.0), (1e4, 1e4), (1e5, 1e6)):
         mu = solve(v, y).mu_ratio
-        first = float(tails.outer(y / v))
-        both = first + float(tails.second_order(y / v)) / (v * v)
+        first = float(closed_forms.outer(y / v))
+        both = first + float(closed_forms.second_order(y / v)) / (v * v)
         here, _, source = s.ratio_with_bound(np.array([v]), np.array([y]))
         cells = [f"{v:g}", f"{y:g}", SOURCES[int(source[0])]]
         rows.append([*cells, *(g(abs(x - mu)) for x in (first, both, float(here[0])))])
     header = ("v~", "y~", "who answers", "eq. (35)", "with the second term", "the answer")
     return f"Absolute errors against the solver:\n\n{markdown(header, rows, 3)}"
+
+
+def _turn(kappa: float) -> tuple[float, float]:
+    """The turn of eq. (25) in s = (tau - pi/2) sqrt(y~): integral of u_x less its slow value, least slip speed."""
+    far = 60.0 + 30.0 * kappa
+
+    def rates(s: float, state: Array) -> list[float]:
+        theta = state[0]
+        return [-kappa * math.sin(theta) - s * math.cos(theta), math.cos(theta) - kappa / math.hypot(kappa, s)]
+
+    # the slow angle and its first correction, from where the start is forgotten at once
+    start = math.atan2(far, kappa) + kappa / math.hypot(kappa, far) ** 3
+    run = solve_ivp(rates, (-far, far), [start, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
+    s = np.linspace(0.0, 4.0, 40_001)
+    theta = run.sol(s)[0]
+    return float(run.y[1, -1]), float((kappa * np.cos(theta) - s * np.sin(theta)).min())
 
 
 def layer() -> str:
@@ -101,14 +123,137 @@ def layer() -> str:
         found = []
         for y in (1e4, 1e5, 2e5, 4e5, 1e14):
             v = kappa * math.sqrt(y)
-            found.append((solve(v, y).mu_ratio - float(tails.outer(y / v))) * y / v)
+            found.append((solve(v, y).mu_ratio - float(closed_forms.outer(y / v))) * y / v)
         end = found[-1]
         slopes = [(t - end) * y for t, y in zip(found, (1e4, 1e5, 2e5), strict=False)]
         # a line through 1/y~ = 0 and 1e-5, at half and a quarter of the way
         off = max(abs(found[i] - end - (found[1] - end) * share) for i, share in ((2, 0.5), (3, 0.25)))
-        rows.append([f"{kappa:g}", f"{end:.9f}", *(f"{x:.4g}" for x in slopes[:2]), g(off)])
-    header = ("v~/sqrt(y~)", "T at y~ = 1e14", "(T - that) y~ at 1e4", "at 1e5", "off the line, y~ >= 1e5")
+        turn = f"{_turn(kappa)[0] / (math.pi * kappa):.4g}" if kappa > 0.4766 else "-"
+        rows.append([f"{kappa:g}", f"{end:.9f}", turn, *(f"{x:.4g}" for x in slopes[:2]), g(off)])
+    header = (
+        "v~/sqrt(y~)", "T at y~ = 1e14", "T by (25)", "(T - that) y~ at 1e4", "at 1e5", "off the line, y~ >= 1e5",
+    )  # fmt: skip
+    edge = float(brentq(lambda kappa: _turn(kappa)[1], 0.45, 0.5, xtol=1e-10))
+    text = f"The turn alone slides all the time for v~/sqrt(y~) >= {edge:.6f}: y~/v~crit^2 = {1.0 / edge**2:.5f}."
+    return f"{markdown(header, rows, 0)}\n\n{text}"
+
+
+def _creep_factor(y: float) -> float:
+    """C(y~) = lim mu~/v~ for y~ > 1, from X' = 1 in stick and X' = 1 - y~ sin(sigma) X in slip, by quadrature."""
+    stick = math.acos(1.0 - 2.0 / y)
+
+    def path(sigma: float) -> float:
+        return y * (math.cos(stick) - math.cos(sigma))
+
+    total = path(math.pi)
+    pushed = quad(lambda s: math.exp(path(s) - total), stick, math.pi, epsabs=1e-13)[0]
+    start = (math.exp(-total) * stick + pushed) / -math.expm1(-total)
+    sliding = quad(lambda s: (start + stick) * math.exp(-path(s)), stick, math.pi, epsabs=1e-13)[0]
+    # the part driven since slip began: the integrals exchanged
+    driven = quad(
+        lambda s: quad(lambda t: math.exp(path(s) - path(t)), s, math.pi, epsabs=1e-12)[0], stick, math.pi, epsabs=1e-11
+    )[0]
+    return (stick * (start + 0.5 * stick) + sliding + driven) / math.pi
+
+
+def creep() -> str:
+    """The slope of mu~ in v~ at v~ = 0."""
+    rows = []
+    for y in (0.1, 0.5, 0.9):
+        slopes = [(solve(v, y).mu_ratio - float(closed_forms.static_limit(y))) / v for v in (4e-8, 1e-8)]
+        measured = 2.0 * slopes[1] - slopes[0]  # free of the next term, which goes with sqrt(v~)
+        rows.append([f"{y:g}", f"{math.pi / (2.0 * (1.0 - y * y)):.6f}", f"{measured:.4f}"])
+    rows += [[f"{y:g}", f"{_creep_factor(y):.6f}", f"{solve(1e-13, y).mu_ratio / 1e-13:.4f}"] for y in (1.1, 2.0, 10.0)]
+    return markdown(("y~", "slope derived", "slope solved"), rows, 0)
+
+
+def contact() -> str:
+    """How stick-slip meets the continuous orbit, which goes on below the border."""
+    y = 1.0
+    crit = border(y)[0]
+    rows = []
+    for gap in (1e-2, 1e-3, 1e-4, 1e-5):
+        v = crit * (1.0 - gap)
+        tau, theta, lam = orbit(v, y)
+        k = np.fft.fftfreq(tau.size, 1.0 / tau.size)
+        waves = np.fft.fft(lam) / tau.size
+
+        def at(t: float, order: int, k: Array = k, waves: Array = waves) -> float:
+            return float((waves * (1j * k) ** order * np.exp(1j * k * t)).sum().real)
+
+        i = int(np.argmin(lam))
+        low = float(brentq(at, tau[i] - 0.05, tau[i] + 0.05, args=(1,), xtol=1e-14))
+        predicted = 3.0 * math.sqrt(-2.0 * at(low, 0) / at(low, 2)) / math.pi
+        full = solve(v, y)
+        more = (full.mu_ratio - float(np.cos(theta).mean())) / gap**2
+        rows.append(
+            [f"{gap:.0e}", f"{full.stick_fraction:.6f}", f"{full.stick_fraction / predicted:.5f}", f"{more:.3f}"]
+        )
+    header = ("1 - v~/v~crit", "stick fraction", "over (3/pi) sqrt(2 e/lam'')", "(mu~ - continued)/(1 - v~/v~crit)^2")
     return markdown(header, rows, 0)
+
+
+def next_terms() -> str:
+    """Eqs. (31) and (35) with one term more, and E."""
+    rows = []
+    for v in (0.1, 0.5, 1.0, 3.0):
+        y = 0.1
+        deficit = solve(v, y).deficit
+        first = y * y / (4.0 * (1.0 + v * v))
+        second = (5.0 + 9.0 * v * v) / (64.0 * (1.0 + v * v) ** 3)
+        blend = -(float(closed_forms.continuous(v, y)) - 1.0) - deficit
+        cells = [f"{(first - deficit) / y**4:.6f}", f"{second:.6f}", f"{-blend / y**4:.6f}"]
+        rows.append([f"{v:g}", *cells, f"{1.0 / (16.0 * (1.0 + v * v) ** 3):.6f}"])
+    header = ("v~", "(mu~ - (31))/y~^4", "derived", "(E - mu~)/y~^4", "derived")
+    return f"y~ = 0.1, solved; both differ from the derived terms by O(y~^2):\n\n{markdown(header, rows, 0)}"
+
+
+def _forgotten(v: float, y: float, starts: Array, share: float = 0.01, steps: int = 1000) -> float:
+    """Periods until the last of the ``starts`` (2, n) has come within ``share`` of its first distance to the cycle."""
+    phase = 2.0 * math.pi * np.arange(steps + 1) / steps
+    ahead, across = 2.0 * math.pi * v / steps, y * np.diff(np.sin(phase))
+    u = np.concatenate([starts, np.zeros((2, 1))], axis=1)
+    for _ in range(math.ceil(4.0 / v)):  # the last column becomes the steady cycle
+        u[:, -1:] = _period(u[:, -1:], ahead, across)
+    first = np.hypot(*(u[:, :-1] - u[:, -1:]))
+    for period in range(1, 100_000):
+        u = _period(u, ahead, across)
+        if np.all(np.hypot(*(u[:, :-1] - u[:, -1:])) <= share * first):
+            return float(period)
+    return math.inf
+
+
+def _period(u: Array, ahead: float, across: Array) -> Array:
+    u = u.copy()
+    for step in across:
+        u[0] += ahead
+        u[1] += step
+        u /= np.maximum(np.hypot(u[0], u[1]), 1.0)
+    return u
+
+
+def settle() -> str:
+    """Periods to 1 % by the table and by marching 40 random starts."""
+    s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    rng = np.random.default_rng(1)
+    angle, radius = rng.uniform(0.0, 2.0 * math.pi, 40), np.sqrt(rng.uniform(0.0, 1.0, 40))
+    starts = radius * np.array([np.cos(angle), np.sin(angle)])
+    rows = []
+    for v, y in ((0.5, 0.3), (0.1, 0.2), (0.05, 0.1), (0.1, 0.6), (0.02, 0.5), (0.05, 1.0), (0.05, 1.5), (0.3, 3.0)):
+        found = settling(s, mu0=1.0, Fz=1.0, k=1.0, y0=y, omega=1.0, v0=v)
+        w, out, orbit_, res = workspace()
+        solve_raw(v, y, y - 1.0, w, out, orbit_, res)
+        sticks = res[2] == 1.0
+        turned = "1"
+        if sticks:
+            moved = y * (math.cos(orbit_[4] + orbit_[0]) - math.cos(orbit_[4]))
+            turned = f"{(1.0 - 0.5 * ((v * orbit_[0]) ** 2 + moved * moved)) ** 2:.4f}"
+        cells = [f"{found.slip_path:.4f}", turned, f"{found.periods:.2f}", f"{found.periods_any:.2f}"]
+        rows.append(
+            [f"{v:g}", f"{y:g}", "stick-slip" if sticks else "continuous", *cells, f"{_forgotten(v, y, starts):g}"]
+        )
+    header = ("v~", "y~", "regime", "S", "cos^2(th1 - th0)", "periods, small", "any", "marched, slowest of 40")
+    return markdown(header, rows, 3)
 
 
 def corner() -> str:
@@ -132,6 +277,10 @@ CASES: dict[str, Callable[[], str]] = {
     "outer": outer,
     "layer": layer,
     "corner": corner,
+    "creep": creep,
+    "contact": contact,
+    "next_terms": next_terms,
+    "settle": settle,
 }
 
 

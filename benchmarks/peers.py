@@ -53,7 +53,12 @@ class Contender:
 def cache() -> Path:
     """Folder outside the source tree for solved grids; its name changes with the solver's source."""
     folder = Path(builder.__file__).parent
-    digest = sha256(b"".join((folder / f"{name}.py").read_bytes() for name in ("model", "radau", "steady", "sweep")))
+    digest = sha256(
+        b"".join(
+            (folder / f"{name}.py").read_bytes()
+            for name in ("model", "radau", "sections", "series", "steady", "stick", "sweep")
+        )
+    )
     path = Path(tempfile.gettempdir()) / f"mumacro-benchmarks-{digest.hexdigest()[:16]}"
     path.mkdir(exist_ok=True)
     return path
@@ -193,7 +198,7 @@ def adaptive(order: int, tolerance: float) -> Contender | None:
             solves += 1
             v, y = math.exp(at[0]), math.exp(at[1])
             steady.solve_raw(v, y, y - 1.0, w, out, orbit, res)
-            return float(res[0])
+            return float(res[steady.MU_RATIO])
 
         low, high = math.log(SQUARE[0]), math.log(SQUARE[1])
         centre, half = np.full(2, 0.5 * (low + high)), np.full(2, 0.5 * (high - low))

@@ -26,7 +26,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +37,11 @@ import numpy as np
 import orjson
 from measuring import IMAGES, ROOT, machine, markdown, progress, quantity, write_section
 
-from friction.nondim import FIELDS
-from service.answers import answer_cases
-from service.codecs import columns_text, read_batch, rows_text, terminated
-from service.shelf import LoadedTable
+from mumacro.dimensional import FIELDS
+from service.evaluation import answer_batch
+from service.formats import choose
+from service.formats.columns import numbers_ready
+from service.tables import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
 DECISION = ROOT / "docs" / "decisions" / "0011-wire.md"
@@ -386,12 +387,14 @@ def parts(rounds: int) -> dict[str, float]:
     n = 100_000
     table = LoadedTable.open(TABLE)
     bodies = {form: body_of(form, n) for form in ("columns", "rows")}
-    batch, _ = read_batch(terminated(bodies["columns"]), n)
-    answers = answer_cases(table, batch, ())
+    numbers_ready(now=True)
+    forms = {form: choose("application/json", memoryview(body)) for form, body in bodies.items()}
+    batch, _ = forms["columns"].read(bytearray(bodies["columns"]), n)
+    answers = answer_batch(table, batch, (), {})
     work: dict[str, Callable[[], object]] = {
-        "evaluation": lambda: answer_cases(table, batch, ()),
-        "writing columns": lambda: sum(map(len, columns_text(replace(answers), {}))),
-        "writing rows": lambda: sum(map(len, rows_text(replace(answers), {}))),
+        "evaluation": lambda: answer_batch(table, batch, (), {}),
+        "writing columns": lambda: sum(map(len, forms["columns"].write(answers, {}))),
+        "writing rows": lambda: sum(map(len, forms["rows"].write(answers, {}))),
     }
     for form, body in bodies.items():
         for name, read in readers(form, body, n).items():
@@ -442,7 +445,7 @@ def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
     item: Callable[[Any, str], Any] = lambda value, name: value[name]  # noqa: E731
     adapter: TypeAdapter[Any] = TypeAdapter(list[Row] if form == "rows" else Columns)
     found: dict[str, Callable[[], object]] = {
-        "our scanner": lambda: read_batch(terminated(body), n),
+        "this service": lambda: choose("application/json", memoryview(body)).read(bytearray(body), n),
         "orjson, objects only": lambda: orjson.loads(body),
         "orjson and numpy": lambda: arrays(orjson.loads(body), item),
         "json and numpy": lambda: arrays(json.loads(body), item),

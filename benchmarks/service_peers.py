@@ -54,7 +54,7 @@ def fastapi(sync: bool) -> Any:
     """Models in and out, around the same table."""
     from fastapi import FastAPI
 
-    from friction import Surrogate
+    from mumacro import Surrogate
     from service.schemas import Case, CaseAnswer
 
     surrogate = Surrogate.open(_table())

@@ -21,7 +21,7 @@ from measuring import best_of, markdown, progress, quantity
 from numpy.typing import NDArray
 
 from builder.steady import REGIMES
-from builder.sweep import solve_chunk
+from builder.sweep import COLUMNS, solve_chunk
 
 Array = NDArray[np.float64]
 SLOWING = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # v~ at which the cost of marching is shown
@@ -71,14 +71,14 @@ def accuracy() -> str:
     with open(measuring.ROOT / "tests" / "data" / "points.csv", newline="") as stream:
         cases = list(csv.DictReader(stream))
     v, y, truth = (np.array([float(c[name]) for c in cases]) for name in ("v", "y", "mu_ratio"))
-    out = solve_chunk("full", np.stack([v, y, y - 1.0], axis=1))
-    error = np.abs(out[:, 0] - truth)
+    solved = dict(zip(COLUMNS, solve_chunk("full", np.stack([v, y, y - 1.0], axis=1)).T, strict=True))
+    error = np.abs(solved["mu_ratio"] - truth)
     kind = np.array([c["case"] for c in cases])
     rows = []
     for name in (*sorted(set(kind)), "all"):
         at = (kind == name) | (name == "all")
         relative = (error[at] / truth[at]).max()
-        failed = int(np.count_nonzero(out[at, 5]))
+        failed = int(np.count_nonzero(solved["status"][at]))
         rows.append(
             [name, str(int(at.sum())), quantity(float(error[at].max())), quantity(float(relative)), str(failed)]
         )

@@ -13,6 +13,7 @@ import measuring  # isort: split
 import argparse
 import csv
 import math
+import os
 import timeit
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,12 +28,15 @@ from numpy.typing import NDArray
 from peers import Contender
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
+from builder.measure import differences
 from builder.sweep import Sweep, solve_chunk
-from friction import Surrogate, tails
+from mumacro import Surrogate, closed_forms
+from mumacro.charts import MU
+from mumacro.inverse import solve_for
 
 Array = NDArray[np.float64]
 OURS, PEER, EXACT = "ours", "peer", "exact"
-CORES = numba.get_num_threads()
+CORES = os.cpu_count() or 1
 TRIAL = 2000  # points of the trial that decides how many one round takes
 BUDGET = 2.0  # seconds that one round may take one contender; slower ones are timed on fewer points
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
@@ -69,22 +73,9 @@ def draw(n: int, seed: int, low: float = peers.SQUARE[0]) -> tuple[Array, Array]
     return v, np.exp(rng.uniform(np.log(peers.SQUARE[0]), np.log(high), n))
 
 
-def threads(n: int, call: Callable[[], object]) -> Callable[[], object]:
-    """``call`` on ``n`` numba threads."""
-
-    def run() -> object:
-        numba.set_num_threads(n)
-        try:
-            return call()
-        finally:
-            numba.set_num_threads(1)
-
-    return run
-
-
-def tables() -> list[Surrogate]:
+def tables(threads: int = 1) -> list[Surrogate]:
     """The committed tables, coarse to fine."""
-    opened = [Surrogate.open(path) for path in (measuring.ROOT / "tables").glob("*.nc")]
+    opened = [Surrogate.open(path, threads) for path in (measuring.ROOT / "tables").glob("*.nc")]
     return sorted(opened, key=lambda s: -s.tolerance)
 
 
@@ -127,7 +118,7 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
         tree = peers.adaptive(order, tolerance)
         if tree is not None:
             found.append((PEER, tree))
-    found.append((PEER, Contender("eq. (35), rigid contact", "formula", lambda v, y: tails.outer(y / v), 0, 0)))
+    found.append((PEER, Contender("eq. (35), rigid contact", "formula", lambda v, y: closed_forms.outer(y / v), 0, 0)))
     return found
 
 
@@ -150,8 +141,9 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     work: dict[str, Callable[[], object]] = {
         str(i): partial(c.evaluate, v[: used[str(i)]], y[: used[str(i)]]) for i, (_, c) in enumerate(entries)
     }
-    parallel = {
-        str(i): threads(CORES, partial(c.evaluate, v, y)) for i, (kind, c) in enumerate(entries) if kind == OURS
+    on_all_cores = {s.id: s for s in tables(CORES)}
+    parallel: dict[str, Callable[[], object]] = {
+        str(i): partial(on_all_cores[c.name].mu_ratio, v, y) for i, (kind, c) in enumerate(entries) if kind == OURS
     }
     logs = np.empty((points, 2))
     work["logs"] = lambda: (np.log(v, out=logs[:, 0]), np.log(y, out=logs[:, 1]))
@@ -189,7 +181,7 @@ def one_at_a_time(surrogate: Surrogate, number: int) -> str:
     calls: dict[str, Callable[[], object]] = {
         f"**{surrogate.id}** `s.mu_ratio(v, y)`": lambda: surrogate.mu_ratio(0.1, 0.5),
         f"**{surrogate.id}** `s.evaluate(mu0, Fz, k, y0, omega, v0)`": partial(
-            surrogate.evaluate, 0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01
+            surrogate.evaluate, mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01
         ),
         "scipy RectBivariateSpline.ev k=3": lambda: spline.ev(log(0.1), log(0.5)),
         "scipy RegularGridInterpolator linear": lambda: regular((log(0.1), log(0.5))),
@@ -202,7 +194,7 @@ def one_at_a_time(surrogate: Surrogate, number: int) -> str:
     return markdown(("one case a call", "microseconds"), rows)
 
 
-def six_columns(surrogates: list[Surrogate], points: int, rounds: int, clock: str) -> str:
+def six_columns(points: int, rounds: int, clock: str) -> str:
     """ns a point of ``evaluate`` on six columns, and with four of them scalars."""
     v, y = draw(points, seed=3)
     rng = np.random.default_rng(6)
@@ -212,18 +204,62 @@ def six_columns(surrogates: list[Surrogate], points: int, rounds: int, clock: st
     y0, v0 = y * length, v * length * omega
     scale = 0.3 * 10.0 / 1e6
     y0_fixed, v0_fixed = y * scale, v * scale * 1.3e5
-    calls: dict[str, Callable[[], object]] = {}
-    for s in surrogates:
-        six, two = f"**{s.id}** `s.evaluate`, six columns", f"**{s.id}** `s.evaluate`, two columns, four scalars"
-        calls[six] = partial(s.evaluate, mu0, Fz, k, y0, omega, v0)
-        calls[f"{six}, with v~, y~ and l0"] = partial(s.evaluate, mu0, Fz, k, y0, omega, v0, groups=True)
-        calls[two] = partial(s.evaluate, 0.3, 10.0, 1e6, y0_fixed, 1.3e5, v0_fixed)
-    one = best_of(rounds, calls, clock).best
-    many = best_of(rounds, {name: threads(CORES, call) for name, call in calls.items()}).best
-    best = {f"{name}, 1 thread": s for name, s in one.items()}
-    best |= {f"{name}, {CORES} threads": s for name, s in many.items()}
+    columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
+    fixed = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": y0_fixed, "omega": 1.3e5, "v0": v0_fixed}
+    best = {}
+    for threads in (1, CORES):
+        calls: dict[str, Callable[[], object]] = {}
+        for s in tables(threads)[-2:]:
+            six, two = f"**{s.id}** `s.evaluate`, six columns", f"**{s.id}** `s.evaluate`, two columns, four scalars"
+            calls[six] = partial(s.evaluate, **columns)
+            calls[f"{six}, with v~, y~ and l0"] = partial(s.evaluate, **columns, groups=True)
+            calls[two] = partial(s.evaluate, **fixed)
+        found = best_of(rounds, calls, clock if threads == 1 else "wall").best
+        best |= {f"{name}, {threads} thread{'s' * (threads > 1)}": seconds for name, seconds in found.items()}
     rows = [[name, quantity(s / points * 1e9)] for name, s in best.items()]
     return markdown(("dimensional batch", "ns/point"), rows)
+
+
+def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
+    """Gradient, power, stick fraction and the inverse question: time, largest error, largest bound of every table."""
+    v, y = draw(points, seed=4)
+    few = 200 if quick else 5_000
+    v_few, y_few = draw(few, seed=5)
+    case = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0}
+    rows = []
+    with Sweep(1, checkpoint=peers.cache()) as sweep:
+        truth = sweep.solve("full", v_few, y_few)
+        for s in tables():
+            progress(f"other quantities of {s.id}")
+            slopes, noise = differences(s, sweep, MU, v_few, y_few)
+            calls: dict[str, Callable[[], object]] = {
+                "gradient": partial(s.evaluate, y0=y, v0=v, **case, gradient=True),
+                "power": partial(s.power_with_bound, v, y),
+                "stick fraction": partial(s.stick_fraction_with_bound, v, y),
+            }
+            timed = best_of(rounds, calls, clock).best
+            _, along_v, along_y, *bounds = s.slopes(v_few, y_few, bounds=True)
+            off = np.maximum(np.abs(np.stack((along_v, along_y)) - slopes) - noise, 0.0)
+            power, of_power = s.power_with_bound(v_few, y_few)
+            stick, of_stick = s.stick_fraction_with_bound(v_few, y_few)
+            found = {
+                "gradient": ("slopes along ln v~, ln y~, absolute", off, np.stack(bounds)),
+                "power": ("relative", np.abs(power / truth["power"] - 1.0), of_power / truth["power"]),
+                "stick fraction": ("absolute", np.abs(stick - truth["stick_fraction"]), of_stick),
+            }
+            for name, (kind, error, bound) in found.items():
+                ns = quantity(timed[name] / points * 1e9)
+                rows.append([f"**{s.id}** {name}", kind, ns, quantity(error.max()), quantity(float(bound.max()))])
+            targets = np.linspace(0.05, 0.95, 19 if quick else 1_000)
+            inverse = partial(solve_for, s, "v0", targets, {**case, "y0": 2.0})
+            seconds = best_of(rounds, {"": inverse}, clock).best[""]
+            roots = np.array([root[0].value for root in inverse().roots])
+            error = np.abs(sweep.solve("full", roots, np.full(roots.size, 2.0))["mu_ratio"] - targets)
+            ns = quantity(seconds / targets.size * 1e9)
+            rows.append(
+                [f"**{s.id}** v0 for a wanted mu_macro", "mu~ at the root, absolute", ns, quantity(error.max()), "-"]
+            )
+    return markdown(("quantity", "error", "ns/point", "max error", "max bound"), rows, 2)
 
 
 def verdict(rows: list[Row]) -> str:
@@ -313,7 +349,8 @@ def main() -> None:
     finest = tables()[-1]
     extra = [
         one_at_a_time(finest, 200 if given.quick else 20_000),
-        six_columns(tables()[-2:], points, given.rounds, given.clock),
+        six_columns(points, given.rounds, given.clock),
+        other_quantities(points, given.rounds, given.clock, given.quick),
     ]
     text = report(rows, note, extra, points, given.rounds)
     print(text)

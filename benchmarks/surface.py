@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from friction import Surrogate
+from mumacro import Surrogate
 
 matplotlib.use("Agg")
 import matplotlib.patheffects as effects

@@ -25,7 +25,7 @@ from time import perf_counter
 
 from measuring import ROOT, markdown, progress, quantity
 
-from friction import Surrogate
+from mumacro import Surrogate
 
 PAGE = ROOT / "tables" / "README.md"
 HEADER = (

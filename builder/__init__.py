@@ -1,3 +1,3 @@
 """Offline half: solves the full model, lays the blocks, writes and verifies the table."""
 
-import friction as _friction  # noqa: F401 (first: it says where compiled kernels are cached)
+import mumacro as _mumacro  # noqa: F401 (here it says in one line what to install)

@@ -10,16 +10,22 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from mumacro import MumacroError, Surrogate
+from mumacro.extras import missing
 
-from builder.assemble import MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
-from builder.export import FORMATS, export_table
-from builder.steady import solve as solve_one
-from builder.sweep import SolveError, Sweep
-from builder.verify import verify as verify_table
-from friction import MumacroError, Surrogate
+try:
+    import typer
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from .assemble import MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
+    from .export import FORMATS, export_table
+    from .figures import FiguresError, draw_figures
+    from .steady import solve as solve_one
+    from .sweep import SolveError, Sweep
+    from .verify import verify as verify_table
+except ModuleNotFoundError as error:
+    raise SystemExit(f"python -m builder: {missing('builder', error)}") from None
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
 
@@ -79,7 +85,7 @@ def build(
             surrogate = build_table(out, tolerance, sweep, progress)
             solves = sweep.n_solves
     except ImportError as error:
-        raise _fail(f"--scheduler needs the extra 'dask': {error}", 2) from error
+        raise _fail(f"--scheduler: {missing('dask', error)}", 2) from error
     except (MumacroError, BuildError, SolveError, OSError) as error:
         raise _fail(str(error)) from error
     print(
@@ -132,6 +138,7 @@ def verify(
         and report["not_covered"] == 0
         and not report["power"]["not_covered"]
         and not report["stick_fraction"]["not_covered"]
+        and not report["slopes"]["not_covered"]
     )
     print(_json(report))
     if not report["holds"]:
@@ -158,6 +165,24 @@ def export(
         raise _fail(str(error)) from error
     shape = list(found.mu_ratio.shape)
     print(_json({"table": str(table), "format": kind, "out": str(target), "shape": shape}))
+
+
+@app.command()
+def figures(
+    out: Annotated[Path, typer.Option(help="The folder to write to.")],
+    table: Annotated[Path | None, typer.Option(help="The table that lines come from; left out: the tightest.")] = None,
+) -> None:
+    """Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG; print what was written as JSON."""
+    if not out.is_dir():
+        raise typer.BadParameter(f"folder {str(out)!r} does not exist", param_hint="--out")
+    try:
+        surrogate = Surrogate.open(table)
+        written = draw_figures(surrogate, out)
+    except FiguresError as error:
+        raise _fail(str(error), 2) from error
+    except (MumacroError, OSError) as error:
+        raise _fail(str(error)) from error
+    print(_json({"table": str(surrogate.path), "figures": [str(path) for path in written]}))
 
 
 if __name__ == "__main__":

@@ -5,20 +5,22 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from builder.blocks import build_block, build_border
-from builder.rounding import bits, round_block, to_bits
-from builder.sweep import Sweep
-from builder.verify import block_errors, verify
-from friction import Surrogate
-from friction.border import Border
-from friction.regions import BLOCKS
-from friction.table import Block, BorderPiece, Table, write_table
+from mumacro import Surrogate
+from mumacro.border import Border
+from mumacro.charts import CHARTS
+from mumacro.table import Block, BorderPiece, Table, write_table
+from mumacro.version import __version__
+
+from .blocks import build_block, build_border
+from .measure import block_errors
+from .rounding import bits, round_block, to_bits
+from .sweep import Sweep
+from .verify import verify
 
 __all__ = ["ABS_TO_REL", "MAX_TOLERANCE", "MIN_TOLERANCE", "BuildError", "build_table", "stages"]
 
@@ -38,17 +40,9 @@ class BuildError(RuntimeError):
     """The tolerance was not reached; the message says where and by how much."""
 
 
-def product_version() -> str:
-    """Version of the installed distribution, ``0+unknown`` in a bare source tree."""
-    try:
-        return version("mumacro")
-    except PackageNotFoundError:
-        return "0+unknown"
-
-
 def stages() -> int:
     """How many times ``progress`` is told that a stage is done, at the least."""
-    return 1 + len(BLOCKS) + 3
+    return 1 + len(CHARTS) + 3
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
@@ -99,33 +93,45 @@ def build_table(
     border = Border(pieces)
     _border_errors(border, pieces, sweep)
     progress("border", True)
-    targets = [tolerance] * len(BLOCKS)
+    targets = [tolerance] * len(CHARTS)
     blocks: list[Block] = []
-    for spec, target in zip(BLOCKS, targets, strict=True):
-        block = build_block(spec, border, sweep, target, lambda text: progress(text, False))
-        blocks.append(round_block(block, target))
-        progress(spec.name, True)
+    for i, chart in enumerate(CHARTS):
+        block = build_block(i, border, sweep, targets[i], lambda text: progress(text, False))
+        blocks.append(round_block(block, targets[i]))
+        progress(chart.name, True)
     grid = plain_grid(sweep, tolerance)
     progress("plain grid", True)
     for attempt in range(ATTEMPTS):
         table = Table(pieces, blocks, **grid)
         table.attributes = {"tolerance": tolerance}
-        errors = block_errors(Surrogate(table, out), sweep, BLOCK_POINTS, seed=attempt)
-        late = []
-        for i, (quantity, absolute, relative, power, stick) in enumerate(errors):
-            blocks[i].quantity_error = SAFETY * quantity
-            blocks[i].max_abs_error, blocks[i].max_rel_error = absolute, relative
-            blocks[i].power_error = SAFETY * power
-            blocks[i].stick_error = SAFETY * stick if blocks[i].stick.size else None
-            if absolute > 0.8 * tolerance or relative > 0.8 * ABS_TO_REL * tolerance:
-                late.append(i)
+        late = _state_errors(table, out, sweep, attempt)
         if not late or attempt == ATTEMPTS - 1:
             break
         for i in late:
             targets[i] /= 3.0
-            block = build_block(BLOCKS[i], border, sweep, targets[i], lambda text: progress(text, False))
+            block = build_block(i, border, sweep, targets[i], lambda text: progress(text, False))
             blocks[i] = round_block(block, targets[i])
     progress("errors of the blocks", True)
+    return finish_table(table, out, targets, sweep, progress)
+
+
+def _state_errors(table: Table, out: Path, sweep: Sweep, seed: int) -> list[int]:
+    """Measure the errors of the blocks and write them into the table; the blocks that miss its tolerance."""
+    tolerance = float(table.attributes["tolerance"])
+    late = []
+    for i, found in enumerate(block_errors(Surrogate(table, out), sweep, BLOCK_POINTS, seed)):
+        table.blocks[i].errors = SAFETY * found.errors
+        table.blocks[i].max_abs_error, table.blocks[i].max_rel_error = found.absolute, found.relative
+        if found.absolute > 0.8 * tolerance or found.relative > 0.8 * ABS_TO_REL * tolerance:
+            late.append(i)
+    return late
+
+
+def finish_table(
+    table: Table, out: Path, targets: list[float], sweep: Sweep, progress: Callable[[str, bool], None]
+) -> Surrogate:
+    """Verify the table on fresh solves, write it to ``out`` with its provenance, and open it."""
+    tolerance = float(table.attributes["tolerance"])
     surrogate = Surrogate(table, out)
     report = verify(surrogate, sweep, FINAL_POINTS)
     progress("fresh solves", True)
@@ -135,27 +141,28 @@ def build_table(
             f"tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; {report['not_covered']} answers outside "
             "their bound; no table was written"
         )
-    power, stick = report["power"], report["stick_fraction"]
-    if power["not_covered"] or stick["not_covered"]:
+    power, stick, slopes = report["power"], report["stick_fraction"], report["slopes"]
+    if power["not_covered"] or stick["not_covered"] or slopes["not_covered"]:
         raise BuildError(
-            f"{power['not_covered']} powers and {stick['not_covered']} stick fractions outside their bound; "
-            "no table was written"
+            f"{power['not_covered']} powers, {stick['not_covered']} stick fractions and {slopes['not_covered']} slopes "
+            "outside their bound; no table was written"
         )
     table.attributes = {
         "title": "Macroscopic friction coefficient under transverse oscillation",
         "summary": "mu_macro/mu0 of a contact dragged at constant speed and shaken across, as a function of the "
         "dimensionless speed and amplitude; plain grid for reading, border-fitted Chebyshev blocks for evaluation",
-        "history": f"mumacro {product_version()}: python -m builder build --tolerance {tolerance:g}",
+        "history": f"mumacro {__version__}: python -m builder build --tolerance {tolerance:g}",
         "source": "full stick-slip model, steady cycle by root-finding on half a period",
         "references": REFERENCE,
         "license": "Apache-2.0",
-        "product_version": product_version(),
+        "product_version": __version__,
         "Conventions": "CF-1.11",
         "tolerance": tolerance,
         "verified_max_abs_error": report["max_abs_error"],
         "verified_max_rel_error": report["max_rel_error"],
         "verified_max_rel_power_error": power["max_rel_error"],
         "verified_max_stick_error": stick["max_abs_error"],
+        "verified_max_slope_error": slopes["max_abs_error"],
         "verified_points": np.int32(report["points"]),
         "n_solves": np.int32(sweep.n_solves),
         "builder_options": json.dumps({"tolerance": tolerance, "block_targets": targets}),

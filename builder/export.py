@@ -3,7 +3,7 @@
 What is exported is what stands at the root of the file: ``mu_ratio``, ``stick_fraction`` and ``error_estimate`` over
 (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all dimensionless.  It is a grid for tools that have
 an interpolation of their own; its nodes are solved, what lies between them is that tool's guess.  The tolerance of
-the table is kept by :class:`friction.Surrogate` alone.
+the table is kept by :class:`mumacro.Surrogate` alone.
 
 Every file is written beside its name and then renamed, and the same table gives the same bytes.
 """
@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from friction.errors import MumacroError
-from friction.table import Table, json_attributes, read_table
+from mumacro.errors import MumacroError
+from mumacro.table import Table, json_attributes, read_table
 
 __all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from friction.table import Block
+from mumacro.table import Block
 
 __all__ = ["STEPS", "bits", "round_block", "to_bits", "to_step"]
 

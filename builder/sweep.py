@@ -15,54 +15,64 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from builder import steady
-from builder.model import OK, ORDER
-from friction.compiled import source_digest
+from mumacro.kernel_cache import source_digest
+
+from . import steady
+from .compiled import SOURCES, solver_kernel
+from .model import OK
 
 __all__ = ["COLUMNS", "SolveError", "Sweep"]
 
 Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
 COLUMNS = ("mu_ratio", "deficit", "stick_fraction", "power", "error_estimate", "status")
+_MU, _DEFICIT, _STICK, _POWER, _ERROR, _STATUS = range(len(COLUMNS))
 
 
 class SolveError(ArithmeticError):
     """A node could not be solved; the message says which and what to do."""
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@solver_kernel
 def _full(v: Array, y: Array, eta: Array, out: Array) -> None:
-    w, orbit_out, orbit, res = np.zeros((8, ORDER + 2)), np.zeros(11), np.zeros(6), np.zeros(8)
+    """Steady states at (n,) points into rows of COLUMNS."""
+    w, end, orbit, res = steady.workspace()
     for i in range(v.size):
-        status = steady.solve_raw(v[i], y[i], eta[i], w, orbit_out, orbit, res)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4] = res[0], res[1], res[3], res[4], res[7]
-        out[i, 5] = status
+        status = steady.solve_raw(v[i], y[i], eta[i], w, end, orbit, res)
+        out[i, _MU], out[i, _DEFICIT] = res[steady.MU_RATIO], res[steady.DEFICIT]
+        out[i, _STICK], out[i, _POWER] = res[steady.STICK_FRACTION], res[steady.POWER]
+        out[i, _ERROR] = steady.error_estimate(out[i, _MU], out[i, _DEFICIT])
+        out[i, _STATUS] = status
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@solver_kernel
 def _continuous(v: Array, y: Array, _eta: Array, out: Array) -> None:
     """The continuous orbit whether or not lam stays positive: it is analytic across the border."""
-    w, orbit_out = np.zeros((8, ORDER + 2)), np.zeros(11)
+    w, end, _, res = steady.workspace()
     for i in range(v.size):
-        status = steady.continuous(v[i], y[i], w, orbit_out)
-        mu, deficit = orbit_out[4] / np.pi, orbit_out[5] / np.pi
-        out[i, 0] = 1.0 - deficit if deficit < 0.5 else mu
-        out[i, 1] = deficit if deficit < 0.5 else 1.0 - mu
-        out[i, 2], out[i, 3], out[i, 4] = 0.0, orbit_out[7] / np.pi, 4e-16
-        out[i, 5] = status
+        status = steady.continuous(v[i], y[i], w, end)
+        steady.sliding(v[i], y[i], end, res)
+        out[i, _MU], out[i, _DEFICIT], out[i, _STICK], out[i, _POWER] = (
+            res[steady.MU_RATIO],
+            res[steady.DEFICIT],
+            0.0,
+            res[steady.POWER],
+        )
+        out[i, _ERROR] = steady.error_estimate(out[i, _MU], out[i, _DEFICIT])
+        out[i, _STATUS] = status
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@solver_kernel
 def _border(_v: Array, y: Array, _eta: Array, out: Array) -> None:
-    w, orbit_out = np.zeros((8, ORDER + 2)), np.zeros(11)
+    """v~crit at (n,) amplitudes into column 1, mu~ there into column 0."""
+    w, end, _, _ = steady.workspace()
     for i in range(y.size):
-        crit, mu, status = steady.border_raw(y[i], w, orbit_out)
-        out[i, 0], out[i, 1] = mu, crit
-        out[i, 2], out[i, 3], out[i, 4] = 0.0, 0.0, 4e-16
-        out[i, 5] = status
+        crit, mu, status = steady.border_raw(y[i], w, end)
+        out[i, _MU], out[i, _DEFICIT] = mu, crit
+        out[i, _STICK], out[i, _POWER], out[i, _ERROR] = 0.0, 0.0, steady.RELATIVE_ERROR * mu
+        out[i, _STATUS] = status
 
 
 _KINDS: dict[str, Callable[[Array, Array, Array, Array], None]] = {
@@ -103,7 +113,7 @@ class Sweep:
         else:
             from distributed import Client
 
-            self._client = Client(scheduler, timeout="10s")
+            self._client = Client(scheduler, timeout="10s")  # type: ignore[no-untyped-call]
 
     def __enter__(self) -> Sweep:
         return self
@@ -132,13 +142,13 @@ class Sweep:
             out = self._run(kind, points)
             self._save(kind, points, out)
         self.n_solves += points.shape[0]
-        failed = np.flatnonzero(out[:, 5] != OK)
+        failed = np.flatnonzero(out[:, _STATUS] != OK)
         if failed.size:
             i = failed[0]
             v_bad, y_bad = points[i, :2].tolist()
             raise SolveError(
                 f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, y~={y_bad!r}: "
-                + steady.ADVICE[int(out[i, 5])]
+                + steady.ADVICE[int(out[i, _STATUS])]
             )
         return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
 
@@ -156,7 +166,7 @@ class Sweep:
             return None
         # the digest of the sources: what another state of the solver found is not taken over
         digest = hashlib.sha256(
-            (source_digest() + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
+            (source_digest(SOURCES) + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
         ).hexdigest()
         return self.checkpoint / f"{kind}-{digest[:32]}.npy"
 

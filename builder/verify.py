@@ -1,4 +1,4 @@
-"""The table against fresh solves: error off the nodes, coverage of the error bound, seams, monotony."""
+"""The table against fresh solves: error off the nodes, coverage of every bound, seams, monotony."""
 
 from __future__ import annotations
 
@@ -9,47 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from builder.blocks import points_of, slope_of
-from builder.sweep import Sweep
-from friction import Surrogate
-from friction.companions import POWER_ROUNDING, edge_uncertainty, power_scale, stick_scale
-from friction.regions import (
-    BLOCKS,
-    CONTINUOUS,
-    L_MAX,
-    RHO_MAX,
-    S_CUT,
-    SOURCES,
-    Y_CONT,
-    Y_HIGH,
-    Y_MID,
-    Y_STICK_HI,
-    Y_STICK_LO,
-    Y_TAIL,
-)  # fmt: skip
-from friction.surrogate import REGIME_OF_SOURCE
+from mumacro import Surrogate, charts
+from mumacro.charts import CONTINUOUS, QUANTITIES, REGIME_OF_SOURCE, SOURCES, Y_CONT, Y_STICK_HI, Y_STICK_LO
 
-__all__ = [
-    "CASES",
-    "BlockErrors",
-    "block_errors",
-    "draw",
-    "monotony",
-    "power_noise",
-    "seam_jumps",
-    "seam_slope_jumps",
-    "verify",
-]
+from .measure import SEAMS, SOLVER_NOISE, differences, fast_from, near_seams, solver_noise
+from .measure import log_uniform as _log
+from .sweep import Sweep
+
+__all__ = ["CASES", "draw", "monotony", "seam_jumps", "seam_slope_jumps", "verify"]
 
 Array = NDArray[np.float64]
-#: what a fresh solve itself may be wrong by, relative to mu~: rounding, and the input's last digit next to the corner
-SOLVER_NOISE = 2e-15
-STICK_NOISE = 1e-15  # the same of the stick fraction, absolute, away from the border
-SEAMS = (Y_STICK_LO, Y_CONT, Y_MID, Y_HIGH, Y_TAIL)
-
-
-def _log(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
-    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
+SLOPE_SHARE = 20  # one point in so many is also compared with differences, which take twelve solves each
 
 
 def _random(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
@@ -75,26 +45,6 @@ def _creep(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array
     return _log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n)
 
 
-def _fast_from(s: Surrogate, y: Array) -> Array:
-    """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
-    return np.where(y <= Y_TAIL, RHO_MAX * s.v_tilde_crit(y), math.exp(L_MAX) * np.sqrt(y))
-
-
-def _seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
-    """Beside the lines where two blocks or a block and a tail meet."""
-    y, v = _log(rng, 1e-3, 1e6, n), _log(rng, 1e-6, 1e4, n)
-    off = 1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 1e-3, n)
-    which = rng.integers(0, 4, n)
-    y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
-    cut = which == 2
-    y[cut] = rng.uniform(Y_STICK_LO, Y_STICK_HI, int(cut.sum()))
-    v[cut] = s.v_tilde_crit(y[cut]) * np.sin(0.5 * math.pi * S_CUT) ** 2 * off[cut]
-    fast = which == 3
-    y[fast] = _log(rng, Y_CONT, 1e6, int(fast.sum()))
-    v[fast] = _fast_from(s, y[fast]) * off[fast]
-    return v, y
-
-
 def _tails(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
     """Both tails: large amplitude at every speed, large speed at every amplitude, small amplitude."""
     which = rng.integers(0, 3, n)
@@ -110,7 +60,7 @@ CASES: tuple[tuple[str, float, Callable[[np.random.Generator, int, Surrogate], t
     ("wide", 0.20, _wide),
     ("border", 0.12, _border),
     ("corner", 0.12, _corner),
-    ("seams", 0.10, _seams),
+    ("seams", 0.10, near_seams),
     ("creep", 0.08, _creep),
     ("tails", 0.08, _tails),
 )
@@ -124,88 +74,6 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
     raise ValueError(f"case must be one of {', '.join(name for name, _, _ in CASES)}, got {case!r}")
 
 
-def power_noise(v: Array, y: Array, power: Array, regime: int | NDArray[np.int8]) -> Array:
-    """What the power of a fresh solve itself may be wrong by.
-
-    Where it is small it is the difference of larger numbers: in stick-slip what the drive puts in during stick, v~,
-    is taken out; in continuous sliding the angle swings by y~, and only v~ of that is out of phase.
-    """
-    lost = np.where(np.asarray(regime) == CONTINUOUS, 1e-15 * y * y, 4e-15 * v)
-    noise: Array = SOLVER_NOISE * power + np.where((y < 1.0) & (v < 1.0), lost, 0.0)
-    return noise
-
-
-class BlockErrors(NamedTuple):
-    """Largest errors over a block: of what it tabulates for mu~, of mu~ (absolute, relative); of what it tabulates for
-    power and for the stick fraction, the border's share of the latter apart."""
-
-    quantity: float
-    absolute: float
-    relative: float
-    power: float
-    stick: float
-
-
-def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
-    """Largest errors on fresh solves, block by block, on ``n`` points each.
-
-    Points crowd towards the edges of the block, where polynomials err most, and beside the seams that cut through it;
-    those which the dispatch sends to a neighbour are left out.
-    """
-    found = []
-    for index, spec in enumerate(BLOCKS):
-        rng = np.random.default_rng([seed, index])
-        a = _crowded(rng, spec.a, n, radial=spec.a_name == "radius")
-        b = _crowded(rng, spec.b, n, radial=False)
-        p = points_of(spec, a, b, surrogate.border)
-        v_seam, y_seam = _seams(rng, 2 * n, surrogate)
-        v_all, y_all = np.concatenate([p.v, v_seam]), np.concatenate([p.y, y_seam])
-        p = type(p)(v_all, y_all, y_all - 1.0)
-        mu, _, source = surrogate.ratio_with_bound(p.v, p.y)
-        keep = source == index
-        v, y, eta = p.v[keep], p.y[keep], p.y[keep] - 1.0
-        solved = sweep.solve("full", v, y, eta)
-        truth = solved["mu_ratio"]
-        kept = type(p)(v, y, eta)
-        error = np.abs(mu[keep] - truth)
-        # a solve's own rounding is not the table's error
-        quantity = np.maximum(error - SOLVER_NOISE * truth, 0.0) / slope_of(spec, kept)
-        scale = np.vectorize(power_scale, otypes=[np.float64])(index, v, y)
-        # nor is half of the rounding that every bound allows for: for y~ -> infinity it would swamp the block's own
-        rounding = power_noise(v, y, solved["power"], spec.regime) + 0.5 * POWER_ROUNDING * solved["power"]
-        power = np.maximum(np.abs(surrogate.power(v, y) - solved["power"]) - rounding, 0.0) / scale
-        stick = np.zeros(1)
-        if spec.regime != CONTINUOUS:
-            off = np.abs(surrogate.stick_fraction(v, y) - solved["stick_fraction"]) - STICK_NOISE
-            scale = np.vectorize(stick_scale, otypes=[np.float64])(index, y)
-            stick = np.maximum(off - _edges(surrogate, v, y, 0.5), 0.0) / scale
-        worst = (quantity, error, error / truth, power, stick)
-        found.append(BlockErrors(*(float(part.max()) for part in worst)))
-    return found
-
-
-def _edges(surrogate: Surrogate, v: Array, y: Array, share: float) -> Array:
-    """:func:`friction.companions.edge_uncertainty` where the border errs by ``share`` of its bound.
-
-    Half of the bound is what was found: a larger share would hide errors of the block below the border.
-    """
-    coef, meta = surrogate._data[2:]
-    error = share * max(piece.max_rel_error for piece in surrogate.table.border)
-    found = [edge_uncertainty(a, b, coef, meta, error) for a, b in zip(v.tolist(), y.tolist(), strict=True)]
-    return np.array(found)
-
-
-def _crowded(rng: np.random.Generator, span: tuple[float, float], n: int, radial: bool) -> Array:
-    low, high = span
-    if radial:
-        half = n // 2
-        return np.concatenate([10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)])
-    t = rng.beta(0.5, 0.5, n)
-    edge = 10.0 ** rng.uniform(-6.0, -1.0, n // 4)
-    t[: edge.size] = np.where(rng.random(edge.size) < 0.5, edge, 1.0 - edge)
-    return low + (high - low) * np.clip(t, 1e-7, 1.0 - 1e-7)
-
-
 def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of the closed form."""
     rng = np.random.default_rng(seed)
@@ -215,9 +83,9 @@ def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array
     y = _log(rng, 1e-3, 1e7, n)
     edges = [(surrogate.v_tilde_crit(y), y)]
     y = rng.uniform(Y_STICK_LO, Y_STICK_HI, n)
-    edges.append((surrogate.v_tilde_crit(y) * math.sin(0.5 * math.pi * S_CUT) ** 2, y))
+    edges.append((surrogate.v_tilde_crit(y) * charts.SIGMA_CUT**2, y))
     y = _log(rng, Y_CONT, 1e8, n)
-    edges.append((_fast_from(surrogate, y), y))
+    edges.append((fast_from(surrogate, y), y))
     for v, y in edges:
         yield v * (1 - 1e-13), v * (1 + 1e-13), y, y
 
@@ -252,43 +120,47 @@ def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 
 
 
 class _Compared(NamedTuple):
-    """Errors beyond the solver's own, bounds (None: the table has none) and sources of some answers."""
+    """Errors beyond the solver's own, the bounds, and the sources of some answers."""
 
     error: Array
-    bound: Array | None
+    bound: Array
     source: NDArray[np.int8]
 
 
-def _compare_companions(
-    surrogate: Surrogate, v: Array, y: Array, source: NDArray[np.int8], solved: dict[str, Array]
-) -> dict[str, _Compared]:
-    """Power, relative to itself, and stick fraction."""
-    power, power_bound = surrogate.power_with_bound(v, y)
-    stick, stick_bound = surrogate.stick_fraction_with_bound(v, y)
-    truth = solved["power"]
-    regime = REGIME_OF_SOURCE[source]
-    off = np.maximum(np.abs(power - truth) - power_noise(v, y, truth, regime), 0.0)
-    far = np.maximum(np.abs(stick - solved["stick_fraction"]) - STICK_NOISE, 0.0)
-    return {
-        "power": _Compared(off / truth, None if power_bound is None else power_bound / truth, source),
-        "stick_fraction": _Compared(far, stick_bound, source),
-    }
-
-
-def _companion_report(parts: list[_Compared], error_name: str, bound_name: str) -> dict[str, Any]:
-    error, source = (np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "source"))
-    bounds = [part.bound for part in parts if part.bound is not None]
-    bound = np.concatenate(bounds) if bounds else None
+def _report(parts: list[_Compared], error_name: str, bound_name: str) -> dict[str, Any]:
+    error, bound, source = (np.concatenate([part[i] for part in parts]) for i in range(3))
 
     def said(at: NDArray[np.bool_]) -> dict[str, Any]:
         return {
             error_name: float(error[at].max()),
-            bound_name: None if bound is None else float(bound[at].max()),
-            "not_covered": None if bound is None else int(np.count_nonzero(error[at] > bound[at])),
+            bound_name: float(bound[at].max()),
+            "not_covered": int(np.count_nonzero(error[at] > bound[at])),
         }
 
     by_source = {SOURCES[code]: said(source == code) for code in np.unique(source)}
     return {**said(np.ones(error.size, dtype=np.bool_)), "sources": dict(sorted(by_source.items()))}
+
+
+def _compare(
+    surrogate: Surrogate, v: Array, y: Array, source: NDArray[np.int8], solved: dict[str, Array]
+) -> dict[str, _Compared]:
+    """Power, relative to itself, and stick fraction."""
+    sliding = REGIME_OF_SOURCE[source] == CONTINUOUS
+    found = {}
+    for which, answered in ((1, surrogate.power_with_bound(v, y)), (2, surrogate.stick_fraction_with_bound(v, y))):
+        truth = solved[QUANTITIES[which]]
+        off = np.maximum(np.abs(answered[0] - truth) - solver_noise(which, v, y, solved, sliding), 0.0)
+        scale = truth if which == charts.POWER else np.ones_like(truth)
+        found[QUANTITIES[which]] = _Compared(off / scale, answered[1] / scale, source)
+    return found
+
+
+def _compare_slopes(surrogate: Surrogate, sweep: Sweep, v: Array, y: Array, source: NDArray[np.int8]) -> _Compared:
+    """The logarithmic slopes of mu~, both of each point."""
+    _, along_v, along_y, bound_v, bound_y = surrogate.slopes(v, y, bounds=True)
+    truth, noise = differences(surrogate, sweep, charts.MU, v, y)
+    off = np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0)
+    return _Compared(off.ravel(), np.concatenate((bound_v, bound_y)), np.tile(source, 2))
 
 
 def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
@@ -298,12 +170,13 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     -------
     dict
         ``points``, ``max_abs_error``, ``max_rel_error``, ``not_covered`` (answers whose error exceeds their bound),
-        ``cases`` and ``sources`` (the same, by kind of case and by block or tail), ``seam_jump``, ``seam_slope_jump``,
-        ``monotony``; ``power`` (relative errors beyond the solver's own) and ``stick_fraction`` (absolute ones):
-        largest error, ``not_covered``, and the same by source.  None where a table has no bounds of them.
+        ``cases`` and ``sources`` (the same, by kind of case and by block or closed form), ``seam_jump``,
+        ``seam_slope_jump``, ``monotony``; ``power`` (relative errors beyond the solver's own), ``stick_fraction`` and
+        ``slopes`` (absolute ones): largest error, ``not_covered``, and the same by source.  Slopes are those of mu~
+        along ln v~ and ln y~, of one point in twenty.
     """
     report: dict[str, Any] = {"points": 0, "max_abs_error": 0.0, "max_rel_error": 0.0, "not_covered": 0}
-    companions: dict[str, list[_Compared]] = {"power": [], "stick_fraction": []}
+    others: dict[str, list[_Compared]] = {"power": [], "stick_fraction": [], "slopes": []}
     cases: dict[str, dict[str, Any]] = {}
     by_source: dict[str, list[tuple[Array, Array, Array]]] = {}
     for i, (name, share, how) in enumerate(CASES):
@@ -314,8 +187,10 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         mu, bound, source = surrogate.ratio_with_bound(v, y)
         solved = sweep.solve("full", v, y)
         truth = solved["mu_ratio"]
-        for key, compared in _compare_companions(surrogate, v, y, source, solved).items():
-            companions[key].append(compared)
+        for key, compared in _compare(surrogate, v, y, source, solved).items():
+            others[key].append(compared)
+        some = slice(0, None, SLOPE_SHARE)
+        others["slopes"].append(_compare_slopes(surrogate, sweep, v[some], y[some], source[some]))
         error = np.abs(mu - truth)
         relative = error / truth
         missed = int(np.count_nonzero(error > bound + SOLVER_NOISE * truth))
@@ -340,8 +215,9 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
         }
         for name, parts in sorted(by_source.items())
     }
-    report["power"] = _companion_report(companions["power"], "max_rel_error", "max_rel_bound")
-    report["stick_fraction"] = _companion_report(companions["stick_fraction"], "max_abs_error", "max_bound")
+    report["power"] = _report(others["power"], "max_rel_error", "max_rel_bound")
+    for key in ("stick_fraction", "slopes"):
+        report[key] = _report(others[key], "max_abs_error", "max_bound")
     report["seam_jump"] = seam_jumps(surrogate)
     report["seam_slope_jump"] = seam_slope_jumps(surrogate)
     report["monotony"] = monotony(surrogate)

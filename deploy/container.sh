@@ -210,7 +210,7 @@ case='"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5'
 batch "{$case, \"v0\": [0.01]}" && batch "{$case, \"v0\": [0.01, 0.1, 1.0]}" && batch "[{$case, \"v0\": 0.01}, {$case, \"v0\": 0}]" \
     && batch '{"mu0": [0.3, 0.2], "Fz": [10, 9], "k": [1e6, 2e6], "y0": [2e-6, 0], "omega": [1e5, 2e5], "v0": [0.01, 0.1]}' \
     || fail "a batch was refused"
-loads=$("$engine" exec --env NUMBA_DEBUG_CACHE=1 "$container" python -m service.warm tables 2>&1)
+loads=$("$engine" exec --env NUMBA_DEBUG_CACHE=1 "$container" python -m service warm --tables tables 2>&1)
 if late=$({ "$engine" logs "$container" 2>&1; echo "$loads"; } | grep 'compiled while serving'); then
     fail "not every kernel is in the image: $late"
 fi

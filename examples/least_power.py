@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import openmdao.api as om
 
-from friction import Surrogate
+from mumacro import Surrogate
 
 TABLE = Path(__file__).resolve().parent.parent / "tables" / "mumacro-1e-10.nc"
 TARGET = 0.15
@@ -84,7 +84,7 @@ class Power(om.ExplicitComponent):
 def optimise(surrogate, target=TARGET):
     """The finished problem: ``y0`` and ``omega`` at least total power under mu_macro <= target."""
     problem = om.Problem(reports=None)
-    problem.model.add_subsystem("friction", Friction(surrogate=surrogate), promotes=["*"])
+    problem.model.add_subsystem("mumacro", Friction(surrogate=surrogate), promotes=["*"])
     problem.model.add_subsystem("power", Power(surrogate=surrogate), promotes=["*"])
     for name, value in INPUTS.items():
         problem.model.set_input_defaults(name, value, units=UNITS[name])

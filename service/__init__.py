@@ -1,12 +1,14 @@
 """The REST service: SI inputs in, macroscopic friction out, read from a verified table."""
 
-from importlib.metadata import PackageNotFoundError, version
-
 __all__ = ["API_VERSION", "__version__"]
 
 API_VERSION = "1"
 
-try:
-    __version__ = version("mumacro")
-except PackageNotFoundError:  # run from a source tree that was never installed
-    __version__ = "0+unknown"
+
+def __getattr__(name: str) -> str:
+    # Read when asked for: a health check starts this package every few seconds and must not pay for numba.
+    if name == "__version__":
+        from mumacro.version import __version__
+
+        return __version__
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

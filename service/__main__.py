@@ -1,11 +1,11 @@
-"""``python -m service``: serve.  ``python -m service healthcheck``: ask a running service whether it is ready.
-``python -m service eval CASES -o OUT``: answer a file of cases, see :mod:`service.bulk`.
+"""``python -m service``: serve (from an installed wheel: ``mumacro serve``).
+``python -m service healthcheck``: ask a running service whether it is ready.
+``python -m service warm``: load the tables once, so that kernels are compiled and kept.
 
 Exit codes: 0 stopped on request (or ready), 1 could not run (or not ready), 2 bad setting or argument.
 """
 
 import argparse
-import gc
 import os
 import signal
 import sys
@@ -13,7 +13,14 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from types import FrameType
 
-from service.settings import PREFIX, Settings, SettingsError, load_settings
+try:
+    from .settings import PREFIX, Settings, SettingsError, load_settings
+except ModuleNotFoundError as error:
+    # Said without mumacro.extras, which needs numba: here nothing at all may be installed.
+    raise SystemExit(
+        f"python -m service: {error.name} is not installed: pip install 'mumacro[service]' "
+        "(in a checkout: pip install -e '.[service]')"
+    ) from None
 
 __all__ = ["main"]
 
@@ -24,9 +31,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m service",
         description="Serve macroscopic friction over HTTP.  Every option is also a setting MUMACRO_<OPTION>.",
-        epilog="python -m service eval --help: answer a file of cases without a server.",
+        epilog="Files of cases need no server: mumacro eval --help.",
     )
-    parser.add_argument("command", nargs="?", choices=("serve", "healthcheck"), default="serve", help="default: serve")
+    parser.add_argument(
+        "command", nargs="?", choices=("serve", "healthcheck", "warm"), default="serve", help="default: serve"
+    )
     for name in _OPTIONS:
         description = Settings.model_fields[name].description
         parser.add_argument(f"--{name.replace('_', '-')}", metavar=name.upper(), help=description)
@@ -35,12 +44,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return the exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    if words[:1] == ["eval"]:
-        from service.bulk import main as evaluate
-
-        return evaluate(words[1:])
-    chosen = _parser().parse_args(words)
+    chosen = _parser().parse_args(arguments)
     for name in _OPTIONS:
         value = getattr(chosen, name)
         if value is not None:
@@ -52,9 +56,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     if chosen.command == "healthcheck":
-        from service.healthcheck import is_ready, loopback_url
+        from .healthcheck import is_ready, loopback_url
 
         return 0 if is_ready(loopback_url(settings)) else 1
+    if chosen.command == "warm":
+        from .app import load
+        from .tables import Tables
+
+        tables = Tables(settings.tables)
+        load(tables)
+        if tables.fault is not None:
+            print(tables.fault, file=sys.stderr)
+        return 0 if tables.fault is None else 1
     return _serve(settings)
 
 
@@ -68,22 +81,25 @@ def _serve(settings: Settings) -> int:
     # Set before the slow imports: as a container's first process this one would ignore the signal until then.
     signal.signal(signal.SIGTERM, _stop)
 
-    # Importing makes no garbage worth looking for; service.warm.settle_memory turns the collector on again.
-    gc.disable()
-
     # Imported here: a health check must not pay for the server and the kernels.
-    import uvicorn
+    try:
+        import uvicorn
+    except ModuleNotFoundError as error:
+        from mumacro.extras import missing
 
-    from service.logs import log_config
-    from service.shared import shared_folder
+        print(f"python -m service: {missing('service', error)}", file=sys.stderr)
+        return 1
+
+    from .logs import log_config
+    from .shared import shared_folder
 
     try:
         with shared_folder() if settings.workers > 1 else nullcontext():
             uvicorn.run(
                 # By name, so that only the processes that serve import it, not the one that watches over several.
-                "service.app:create_app",
+                f"{__package__}.app:create_app",
                 factory=True,
-                http="service.connection:Connection",
+                http=f"{__package__}.connection:Connection",
                 host=settings.host,
                 port=settings.port,
                 workers=settings.workers,
@@ -92,6 +108,10 @@ def _serve(settings: Settings) -> int:
                 access_log=False,
                 server_header=False,
                 ws="none",
+                root_path=settings.root_path,
+                forwarded_allow_ips=settings.trusted_proxies,
+                limit_concurrency=settings.max_connections,
+                timeout_keep_alive=settings.keep_alive_s,
                 timeout_graceful_shutdown=settings.shutdown_grace_s,
             )
     except SystemExit as stop:

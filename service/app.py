@@ -5,6 +5,7 @@ come from the environment.
 """
 
 import asyncio
+import gc
 import logging
 import os
 import sys
@@ -12,37 +13,39 @@ import threading
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
-from functools import partial
 
+import numpy as np
 from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
+from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
 
-from friction.errors import MumacroError
-from service import __version__
-from service.connection import sweep
-from service.drain import draining
-from service.errors import answer_problem
-from service.logs import AccessLog
-from service.memory import keep_lean
-from service.metrics import Metrics
-from service.middleware import HEALTH_PATHS, ApiKeyGate, BodyLimit, Compression, RequestRecord
-from service.openapi import install
-from service.routes import batch, docs, health, inverse, law, mu_macro, page, table, umbridge
-from service.routes import metrics as metrics_route
-from service.routes.batch import BatchEndpoint
-from service.settings import Settings, load_settings, unknown_variables
-from service.shelf import Shelf
-from service.warm import prepare, settle_memory
-from service.wire import Application, ShortWay
+from mumacro.errors import MumacroError
 
-__all__ = ["create_app"]
+from . import __version__, numbers
+from .connection import Bounded, Connection
+from .errors import answer_problem, invalid_request
+from .formats.columns import numbers_ready
+from .guard import Guard, Work, path_of
+from .logs import AccessLog
+from .metrics import Metrics
+from .middleware import HEALTH_PATHS, Compression, RequestRecord
+from .openapi import install
+from .routes import batch, docs, health, law, mu_macro, page, solve_for, table, umbridge
+from .routes import metrics as metrics_route
+from .settings import Settings, load_settings, unknown_variables
+from .shutdown import draining, end_with_parent
+from .single import SingleCase
+from .tables import Tables
+
+__all__ = ["create_app", "load"]
 
 _ROUTERS = (
-    mu_macro.router, batch.router, inverse.router, law.router, table.router, health.router, metrics_route.router,
+    mu_macro.router, batch.router, solve_for.router, law.router, table.router, health.router, metrics_route.router,
     docs.router, umbridge.router, page.router,
 )  # fmt: skip
 # The pages are the same for everyone and tell nothing; they ask their user for the key and send it with every question.
@@ -58,37 +61,85 @@ def _stand_back() -> None:
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
 
+def processors() -> int:
+    """How many processors this process may use; a container's limit counts where the system tells it."""
+    found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with suppress(OSError, ValueError):
+        with open("/sys/fs/cgroup/cpu.max", encoding="ascii") as limit:
+            quota, period = limit.read().split()
+        found = min(found, max(1, -(-int(quota) // int(period))))
+    return found
+
+
+def load(tables: Tables) -> None:
+    """Load the tables, then what is compiled and not needed by the first answers."""
+    tables.load()
+    _load_more(tables)
+
+
+def _load_more(tables: Tables) -> None:
+    if tables.loaded:
+        numbers.read_columns(np.frombuffer(bytearray(b"{}\0"), dtype=np.uint8), 0, 2, np.empty((6, 1)))
+        numbers_ready(now=True)
+        tables.warm_up_more()
+
+
+async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
+    """Become ready, then warm; ``/livez`` is answered meanwhile."""
+    loop = asyncio.get_running_loop()
+    tables: Tables = app.state.tables
+    await loop.run_in_executor(threads, tables.load)
+    app.state.metrics.start([table.label for table in tables.loaded])
+    tables.ready = tables.fault is None
+    try:
+        await loop.run_in_executor(threads, _load_more, tables)
+    except Exception:
+        _log.exception("not everything could be loaded")
+    if threading.current_thread() is threading.main_thread():
+        # The collector would walk through a hundred thousand objects of libraries again and again, for some fifty
+        # milliseconds, and nobody is answered meanwhile.
+        gc.collect()
+        gc.freeze()
+
+
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     for name in unknown_variables():
         _log.warning("%s is no setting and has no effect", name)
+    end_with_parent()
     state = app.state
-    settings: Settings = state.settings
-    with ThreadPoolExecutor(1) as start:
-        await asyncio.get_running_loop().run_in_executor(start, prepare, state.shelf)
-    with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="batch", initializer=_stand_back) as threads:
-        state.metrics.start([table.label for table in state.shelf.tables])
-        state.access_log.start()
-        state.batches.start(threads)
-        settle_memory()
-        always = [sweep(settings.client_timeout_s), state.metrics.share()]
-        if threading.current_thread() is threading.main_thread():  # as settle_memory
-            always.append(keep_lean(partial(asyncio.get_running_loop().run_in_executor, threads)))
-        tasks = [asyncio.create_task(work) for work in always]
-        with draining(state.shelf, settings.drain_s):
+    Connection.timeout_s = state.settings.client_timeout_s
+    count = processors()
+    threads = ThreadPoolExecutor(count, thread_name_prefix="batch", initializer=_stand_back)
+    state.work.threads = threads
+    state.access_log.start()
+    # A thread of its own, which neither waits behind batches nor stands back.
+    start = ThreadPoolExecutor(1, thread_name_prefix="start")
+    starting = asyncio.create_task(_start(app, start))
+    sharing = asyncio.create_task(state.metrics.share())
+    if state.wait:
+        await starting
+    try:
+        with draining(state.tables, state.settings):
             yield
-        for task in tasks:
+    finally:
+        for task in (starting, sharing):
             task.cancel()
         state.metrics.save()
+        for pool in (threads, start):
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
-def create_app(settings: Settings | None = None) -> Application:
+def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastAPI:
     """Return the application.
 
     Parameters
     ----------
     settings : Settings, optional
         Left out: read from the environment.
+    wait : bool
+        End the start only when everything is loaded.  By default the tables are loaded while the application listens,
+        and ``/readyz`` says when they are.
 
     Raises
     ------
@@ -97,40 +148,58 @@ def create_app(settings: Settings | None = None) -> Application:
     """
     if settings is None:
         settings = load_settings()
-    key = None if settings.api_key is None else settings.api_key.get_secret_value()
-    metrics, access_log, shelf = Metrics(), AccessLog(), Shelf(settings.tables)
-    app = Application(
+    metrics, access_log, tables, work = Metrics(), AccessLog(), Tables(settings.tables), Work(settings)
+    keys = settings.keys()
+    cors = [
+        Middleware(
+            CORSMiddleware, allow_origins=list(settings.cors_origins), allow_methods=["GET", "HEAD", "POST"],
+            allow_headers=["Content-Type", "X-API-Key", "Authorization", "If-None-Match", "X-Request-ID"],
+            expose_headers=["ETag", "X-Request-ID", "Retry-After"],
+        )
+    ] if settings.cors_origins else []  # fmt: skip
+    app = FastAPI(
         title="mumacro",
         version=__version__,
         lifespan=_lifespan,
         docs_url=None,  # FastAPI's own pages load their assets from a CDN; routes/docs.py has ours
         redoc_url=None,
         redirect_slashes=False,
+        root_path=settings.root_path,
+        strict_content_type=False,
+        telemetry={"metrics": False, "logs": False, "tracing": settings.tracing},
         middleware=[
-            Middleware(RequestRecord, metrics=metrics, log=access_log),
-            Middleware(ApiKeyGate, key=key, open_paths=_OPEN_PATHS),
-            Middleware(BodyLimit, max_bytes=settings.max_body_bytes),
+            Middleware(Bounded),
+            *cors,
+            Middleware(RequestRecord, metrics=metrics, log=access_log, tables=tables),
+            Middleware(Guard, keys=keys, open_paths=_OPEN_PATHS, max_bytes=settings.max_body_bytes),
+            Middleware(SingleCase, tables=tables, settings=settings, metrics=metrics),
             Middleware(Compression),
         ],
     )
-    app.state.settings = settings
-    app.state.shelf = shelf
-    app.state.metrics = metrics
-    app.state.access_log = access_log
-    app.state.batches = BatchEndpoint(shelf, settings, metrics)
-    app.batch_way = RequestRecord(ApiKeyGate(app.state.batches, key), metrics, access_log)
-    app.short = ShortWay(app.long_way, app.state.batches.small, shelf, settings, metrics, access_log)
+    state = app.state
+    state.settings, state.tables, state.metrics, state.access_log = settings, tables, metrics, access_log
+    state.work, state.wait = work, wait
+    state.batches = batch.Batches(tables, work, metrics, settings.max_body_bytes, settings.max_batch)
     app.add_exception_handler(MumacroError, answer_problem)
     app.add_exception_handler(HTTPException, _answer_http)
+    app.add_exception_handler(RequestValidationError, _answer_invalid)
     for router in _ROUTERS:
         app.include_router(router)
-    install(app)
+    install(app, keys=bool(keys))
     return app
+
+
+async def _answer_invalid(request: Request, error: Exception) -> Response:
+    """Answer 400 or 422 where FastAPI found something wrong."""
+    assert isinstance(error, RequestValidationError)  # noqa: S101  (what it is registered for)
+    return await answer_problem(request, invalid_request(path_of(request.scope), error.errors()))
 
 
 async def _answer_http(request: Request, error: Exception) -> Response:
     """Answer 404 and 405.  The framework's Allow names the methods of the first route of a path only."""
-    path = request.url.path
+    path = path_of(request.scope)
+    if isinstance(error.__cause__, MumacroError):  # the framework met it while it read the body
+        return await answer_problem(request, error.__cause__)
     if isinstance(error, HTTPException) and error.status_code == 405:
         allowed = _allowed_methods(path)
         if path in umbridge.PATHS:

@@ -1,255 +1,236 @@
-"""The server's side of a connection: the shortest way to an answer, and an end for callers who stand still.
+"""A bound around each connection: heads of limited size, in limited time, one request after another.
 
-Under any other ASGI server the service does the same without these two: answers take a little longer, and standing
-callers are that server's business.
+uvicorn's fast parser takes heads of any size, queues pipelined requests without a limit and waits for ever for the rest
+of a head or for a caller who does not read.  This protocol, given to uvicorn as its documented ``http`` parameter,
+stands between the socket and uvicorn's own: it only counts, holds back and closes.  It knows when a request begins,
+wants its body and ends from the application's side, by an ASGI middleware (:class:`Bounded`) that finds the connection
+in the scope's state.
 """
 
 import asyncio
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
-from weakref import WeakSet
 
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-from service.middleware import BATCH_PATH
-from service.wire import CASE_PATH, Application, ShortWay
+from .guard import BATCH_PATH, path_of
 
-__all__ = ["FILL", "PIECES", "Connection", "sweep"]
+__all__ = ["Bounded", "Connection"]
 
-#: extension of the protocol: puts the rest of a body where the application wants it, see Connection.fill
-FILL = "mumacro.fill"
-#: extension of the protocol: hands on the pieces of a body as they came, see Connection.pieces
-PIECES = "mumacro.pieces"
-
-_AHEAD = 256 * 1024  # bytes that are read while the application is busy with what came before
-_EVERY_S = 1.0
-_SHORT = frozenset({CASE_PATH, BATCH_PATH})  # where the short way leads
-_TURN = 512 * 1024  # bytes of a body that are taken before others get their turn
-_open: "WeakSet[Connection]" = WeakSet()
+MAX_HEAD = 64 * 1024  # bytes of a request's head
+_SLICE = 16 * 1024  # bytes that are handed on at a time between requests: so few pipelined ones are parsed at once
+_SETTLE_S = 0.005
+_AHEAD = 256 * 1024  # bytes that are held back before the socket is no longer read
+_TOO_LARGE = (
+    b"HTTP/1.1 431 Request Header Fields Too Large\r\ncontent-type: text/plain\r\ncontent-length: 0\r\n"
+    b"connection: close\r\n\r\n"
+)
 
 
-class Connection(HttpToolsProtocol):
-    """A connection that answers one good case as soon as it has come in, and else starts the application.
+class _Transport:
+    """What uvicorn sees of the socket: it cannot go on reading while too much is held back."""
 
-    It knows since when its caller owes a move: the server ends idle connections, but would wait for ever for the rest
-    of a request, and for a caller who does not read.  A sweep once a second costs a request nothing.
-    """
+    def __init__(self, transport: Any, connection: "Connection") -> None:
+        self._transport = transport
+        self._connection = connection
 
-    paused_since = 0.0
-    owed_since = 0.0
-    owed: object = None
-    _short: ShortWay | None = None
-    _filling: "_Filling | None" = None
-    _stream: "_Stream | None" = None
-    _taken = 0
-    _held: tuple[Any, Any] | None = None
-    _date: tuple[Any, bytes] = (None, b"")
+    def resume_reading(self) -> None:
+        if not self._connection.full:
+            self._transport.resume_reading()
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        app: Any = self.app
-        while app is not None and not isinstance(app, Application):  # what the server wraps around it
-            app = getattr(app, "app", None)
-        if app is not None and not self.root_path:
-            self._short = app.short
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
 
-    def _start_asgi_task(self, cycle: Any, app: Any) -> None:
-        """Start the application, unless the rest of a short request is worth waiting for."""
-        scope = cycle.scope
-        if scope["path"] == BATCH_PATH:
-            scope["extensions"] = {FILL: partial(self.fill, cycle), PIECES: partial(self.pieces, cycle)}
-        if self._short is not None and scope["path"] in _SHORT and cycle is self.cycle and app is self.app:
-            headers = dict(scope["headers"])
-            if (
-                self._short.is_short(scope, headers)
-                and cycle.more_body
-                and cycle.keep_alive
-                and not cycle.waiting_for_100_continue
-                and b"x-forwarded-for" not in headers
-            ):
-                self._held = cycle, headers
-                return
-        super()._start_asgi_task(cycle, app)
 
-    async def fill(self, cycle: Any, room: memoryview, start: int, note: Callable[[int], None]) -> bool:
-        """Put the rest of the body into ``room``, from ``start`` on; False if the caller leaves before all is there.
+class Connection(asyncio.Protocol):
+    """One connection; ``timeout_s`` is set by the application for all."""
 
-        ``note`` is told of the bytes as they come.
+    timeout_s = 30.0
 
-        Raises
-        ------
-        ValueError
-            There is more than room.
-        """
-        filling = _Filling(cycle, room, start, note, asyncio.get_running_loop().create_future())
-        filling.put(cycle.body)
-        cycle.body = bytearray()
-        if cycle.disconnected or not cycle.more_body:
-            return not cycle.disconnected
-        self._filling = filling
-        self.flow.resume_reading()
-        try:
-            return await filling.done
-        finally:
-            self._filling = None
+    def __init__(self, config: Any, server_state: Any, app_state: dict[str, Any], _loop: Any = None) -> None:
+        state = {**app_state, "connection": self}
+        made: Any = AutoHTTPProtocol
+        self._inner = made(config=config, server_state=server_state, app_state=state, _loop=_loop)
+        self._loop = asyncio.get_event_loop()
+        self._transport: Any = None
+        self._held = bytearray()
+        self._head = b""  # the end of what came of a head that is not complete
+        self._head_size = 0
+        self._open = 0  # requests that the application is answering
+        self._due = 0  # ends of heads that were handed on, less requests that have begun
+        self._begun = 0
+        self._settling = False  # whether a request has just ended
+        self._wanting = False  # whether it waits for a body
+        self._closing = False
+        self._stalled = False  # whether the caller does not read
+        self._clock: asyncio.TimerHandle | None = None
 
-    async def pieces(self, cycle: Any) -> tuple[list[bytes], bool] | None:
-        """The pieces of the body that have come since the last call, and whether there may be more.
-
-        None if the caller has left.
-        """
-        stream = self._stream
-        if stream is None or stream.cycle is not cycle:
-            stream = self._stream = _Stream(cycle, [bytes(cycle.body)] if cycle.body else [])
-            cycle.body = bytearray()
-        while not stream.pieces and cycle.more_body and not cycle.disconnected:
-            cycle.message_event.clear()
-            self.flow.resume_reading()
-            await cycle.message_event.wait()
-        pieces, stream.pieces, stream.size = stream.pieces, [], 0
-        return None if cycle.disconnected else (pieces, cycle.more_body)
-
-    def on_body(self, body: bytes) -> None:
-        """Put a piece where it belongs."""
-        filling, stream = self._filling, self._stream
-        if filling is not None and filling.cycle is self.cycle:
-            filling.put(body)
-            self._taken += len(body)
-            if self._taken >= _TURN:
-                # The loop would read on while there is more: megabytes, for which all others would wait.
-                self._taken = 0
-                self.transport.pause_reading()
-                self.loop.call_soon(self._read_on)
-        elif stream is not None and stream.cycle is self.cycle and not stream.cycle.response_complete:
-            stream.pieces.append(body)
-            stream.size += len(body)
-            if stream.size > _AHEAD:
-                self.flow.pause_reading()
-            stream.cycle.message_event.set()
-        else:
-            super().on_body(body)
-
-    def _read_on(self) -> None:
-        if not (self.flow.read_paused or self.transport.is_closing()):
-            self.transport.resume_reading()
-
-    def on_message_complete(self) -> None:
-        """Answer what was held back, or start the application after all."""
-        super().on_message_complete()
-        if self._filling is not None and self._filling.cycle is self.cycle:
-            self._filling.end(whole=True)
-        if self._held is not None:
-            (cycle, headers), self._held = self._held, None
-            if cycle.disconnected or not self._reply(cycle, headers):
-                super()._start_asgi_task(cycle, self.app)
-
-    def _reply(self, cycle: Any, headers: dict[bytes, bytes]) -> bool:
-        short = self._short
-        if short is None or not cycle.keep_alive or self.flow.write_paused:
-            return False
-        started = time.perf_counter()
-        try:
-            reply = short.reply(cycle.scope, headers, bytes(cycle.body))
-        except Exception:
-            return False  # the application will meet it again, and log it
-        if reply is None:
-            return False
-        identity, etag, content = reply
-        self.transport.write(b"".join((self._status_line(), short.head(identity, etag, len(content)), content)))
-        cycle.response_started = cycle.response_complete = True
-        cycle.message_event.set()
-        cycle.on_response()
-        cycle.on_response = _nothing
-        short.finish(cycle.scope, identity, time.perf_counter() - started)
-        return True
-
-    def _status_line(self) -> bytes:
-        """The status line and the server's own fields; those change once a second."""
-        fields = self.server_state.default_headers
-        known, text = Connection._date
-        if known is not fields:
-            text = b"HTTP/1.1 200 OK\r\n" + b"".join(b"%b: %b\r\n" % field for field in fields)
-            Connection._date = fields, text
-        return text
-
-    def connection_made(self, transport: Any) -> None:
-        """Join those that are swept."""
-        super().connection_made(transport)
-        _open.add(self)
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin."""
+        self._transport = transport
+        seen: Any = _Transport(transport, self)
+        self._inner.connection_made(seen)
+        self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave them."""
-        _open.discard(self)
-        super().connection_lost(exc)
-        if self._filling is not None:
-            self._filling.end(whole=False)
+        """End."""
+        self._unwatch()
+        self._closing = True
+        self._held.clear()
+        self._inner.connection_lost(exc)
+
+    def eof_received(self) -> Any:
+        """Hand on."""
+        return self._inner.eof_received()
 
     def pause_writing(self) -> None:
-        """Note since when the caller does not read."""
-        self.paused_since = time.monotonic()
-        super().pause_writing()
+        """Give the caller some time to read."""
+        self._stalled = True
+        self._watch()
+        self._inner.pause_writing()
 
-    def stands_still(self, now: float, limit_s: float) -> bool:
-        """Whether the caller has owed a move for longer than the limit: reading, or the rest of a request."""
-        if self.flow.write_paused:
-            return now - self.paused_since > limit_s
-        cycle = self.cycle
-        answered = cycle is None or cycle.response_complete
-        between_two = answered and self.timeout_keep_alive_task is not None  # the server's own clock runs
-        # All is here, or the answer has begun: the move is ours, or a stream watches its own clock.
-        ours = not answered and (not cycle.more_body or cycle.response_started)
-        if between_two or ours:
-            self.owed = None
-            return False
-        owed = id(cycle), answered
-        if self.owed != owed:
-            self.owed, self.owed_since = owed, now
-        return now - self.owed_since > limit_s
+    def resume_writing(self) -> None:
+        """The caller reads."""
+        self._stalled = False
+        self._unwatch()
+        self._inner.resume_writing()
+
+    @property
+    def full(self) -> bool:
+        """Whether as much is held back as may be."""
+        return len(self._held) > _AHEAD
+
+    @property
+    def _is_free(self) -> bool:
+        return self._open == 0 and self._due == 0 and not self._settling
+
+    def data_received(self, data: bytes) -> None:
+        """Hand on what belongs to the request that is being answered, or begins one; hold back the rest."""
+        if self._closing:
+            return
+        if self._is_free and not self._held and len(data) <= _SLICE:
+            self._hand_on(data)
+        elif self._wanting and not self._held:
+            self._inner.data_received(data)
+        else:
+            self._held += data
+            self._feed()
+            if self.full:
+                self._transport.pause_reading()
+
+    def _feed(self) -> None:
+        """Hand on what was held back, as far as somebody wants it."""
+        while self._held and not self._closing and (self._wanting or self._is_free):
+            size = _AHEAD if self._open else _SLICE
+            piece = bytes(self._held[:size])
+            del self._held[:size]
+            if self._open:
+                self._inner.data_received(piece)
+                continue
+            self._hand_on(piece)
+            if self._held and self._due == 0:
+                continue
+            break
+        if not self.full and self._transport is not None and not self._closing:
+            self._transport.resume_reading()
+
+    def _hand_on(self, data: bytes) -> None:
+        """Hand on the beginning of a request, or the next piece of it."""
+        seen = self._head + data
+        end = seen.rfind(b"\r\n\r\n")
+        if end >= 0:
+            self._due += seen.count(b"\r\n\r\n")
+            self._head_size = 0
+            self._head = b""  # a body may follow: what is in it counts as a head only until the application begins
+        else:
+            self._head_size += len(data)
+            self._head = seen[-3:]
+            if self._clock is None:
+                self._watch()
+            if self._head_size > MAX_HEAD:
+                self._closing = True
+                self._transport.write(_TOO_LARGE)
+                self._transport.close()
+                return
+        self._inner.data_received(data)
+
+    def begin(self) -> None:
+        """The application begins to answer a request."""
+        self._open += 1
+        self._begun += 1
+        self._due = max(self._due - 1, 0)
+        self._head_size, self._head = 0, b""
+        self._unwatch()
+
+    def want(self, wanting: bool, timed: bool) -> None:
+        """The application waits for a body, or no longer; ``timed``: all of it has to come within the limit."""
+        self._wanting = wanting
+        if timed and self._clock is None:
+            self._watch()
+        if wanting and self._held:
+            self._feed()
+
+    def end(self) -> None:
+        """The application has answered."""
+        self._open -= 1
+        self._wanting = False
+        if not self._stalled:
+            self._unwatch()
+        if self._due:
+            # What looked like the end of a head was in a body, or another request is about to begin.
+            self._loop.call_later(_SETTLE_S, self._settle, self._begun)
+        else:
+            # A request that was parsed already begins before this: what comes until then may be its body.
+            self._settling = True
+            self._loop.call_soon(self._settled)
+
+    def _settled(self) -> None:
+        self._settling = False
+        self._feed()
+
+    def _settle(self, begun: int) -> None:
+        if self._open == 0 and self._begun == begun:
+            self._due = 0
+            self._feed()
+
+    def _watch(self) -> None:
+        self._unwatch()
+        self._clock = self._loop.call_later(self.timeout_s, self._give_up)
+
+    def _unwatch(self) -> None:
+        if self._clock is not None:
+            self._clock.cancel()
+            self._clock = None
+
+    def _give_up(self) -> None:
+        self._closing = True
+        self._transport.abort()
 
 
-@dataclass
-class _Filling:
-    """A body on its way into the application's memory."""
+class Bounded:
+    """Middleware: tells a :class:`Connection` what the application is doing; under other servers it does nothing."""
 
-    cycle: Any
-    room: memoryview
-    end_of_text: int
-    note: Callable[[int], None]
-    done: "asyncio.Future[bool]"
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
 
-    def put(self, piece: bytes | bytearray) -> None:
-        end = self.end_of_text + len(piece)
-        self.room[self.end_of_text : end] = piece
-        self.end_of_text = end
-        self.note(len(piece))
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Run one request."""
+        connection = scope["state"].get("connection") if scope["type"] == "http" and "state" in scope else None
+        if not isinstance(connection, Connection):
+            await self.app(scope, receive, send)
+            return
 
-    def end(self, whole: bool) -> None:
-        if not self.done.done():
-            self.done.set_result(whole)
+        timed = scope["method"] == "POST" and not path_of(scope).startswith(BATCH_PATH)  # batches watch the time
 
+        async def wanted() -> Message:
+            connection.want(True, timed)
+            try:
+                return await receive()
+            finally:
+                connection.want(False, False)
 
-@dataclass
-class _Stream:
-    """A body whose pieces are handed on as they came."""
-
-    cycle: Any
-    pieces: list[bytes]
-    size: int = 0
-
-
-def _nothing() -> None:
-    pass
-
-
-async def sweep(limit_s: float) -> None:
-    """Cut, for ever, what stands still."""
-    while True:
-        await asyncio.sleep(_EVERY_S)
-        now = time.monotonic()
-        for connection in list(_open):
-            # Also one that is closing: it would wait for its caller to read the rest.
-            if connection.stands_still(now, limit_s):
-                connection.transport.abort()
+        connection.begin()
+        try:
+            await self.app(scope, wanted, send)
+        finally:
+            connection.end()

@@ -7,7 +7,7 @@ the value in a form that JSON can hold, and what it must be.  No traceback reach
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
@@ -16,8 +16,11 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
-from friction.errors import InputError, MumacroError, TableError
-from service.logs import request_id
+from mumacro.errors import InputError, MumacroError, TableError
+
+from .hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA, number_hint, unknown_name
+from .kernel import BOUNDS, INPUTS
+from .logs import request_id
 
 __all__ = [
     "PROBLEMS",
@@ -33,8 +36,14 @@ __all__ = [
     "TookTooLongError",
     "UnauthorizedError",
     "UnsupportedBodyError",
+    "accepts",
+    "faults_of",
+    "invalid_request",
+    "missing_inputs",
+    "names_at",
     "problem_of",
     "problem_response",
+    "refusal",
     "safe_value",
 ]
 
@@ -235,3 +244,139 @@ def problem_of(error: Exception, path: str) -> Response:
 async def answer_problem(request: Request, error: Exception) -> Response:
     """Exception handler of the application."""
     return problem_of(error, request.url.path)
+
+
+# --- pydantic's list of errors -> ours ----------------------------------------------------------------
+
+_KNOWN_BOUNDS = {**BOUNDS, "tolerance": "finite and > 0"} | {f"std_{name}": "finite and >= 0" for name in INPUTS}
+
+
+def refusal(faults: Sequence[FieldFault]) -> InvalidFieldsError:
+    """The error that tells of all of these."""
+    first = faults[0]
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return InvalidFieldsError(f"{safe_value(first.field)}: {first.reason}{more}", faults)
+
+
+def missing_inputs(given: Container[str], rigid: str) -> list[FieldFault]:
+    """What a batch with these inputs lacks, or has twofold; ``rigid`` is how its format writes rigid contact."""
+    reasons = {"k": STATE_K.format(rigid=rigid), "omega": STATE_OMEGA}
+    optional = ("omega", "f") if "f" in given else ("f",)
+    faults = [
+        FieldFault(name, reasons.get(name, "is required"), bound=BOUNDS[name])
+        for name in INPUTS
+        if name not in given and name not in optional
+    ]
+    if "omega" in given and "f" in given:
+        faults.append(FieldFault("f", ONE_FREQUENCY))
+    return faults
+
+
+def faults_of(
+    entries: Iterable[Mapping[str, Any]], place: str, known: Sequence[str], bounds: Mapping[str, str] | None = None
+) -> list[FieldFault]:
+    """Pydantic's entries as faults, one a place.
+
+    Parameters
+    ----------
+    entries : iterable of mapping
+        With ``type``, ``loc`` (from the field on), ``msg`` and ``input``.
+    place : str
+        "pointer" (JSON body) or "parameter" (query).
+    known : sequence of str
+        What the model's fields are called.
+    bounds : mapping, optional
+        What fields other than the inputs must be.
+    """
+    found: dict[tuple[str | int, ...], FieldFault] = {}
+    all_bounds = {**_KNOWN_BOUNDS, **(bounds or {})}
+    for entry in entries:
+        # a union reports each of its branches; their names are no place in the body
+        loc: tuple[str | int, ...] = entry["loc"]
+        path = tuple(step for i, step in enumerate(loc) if i == 0 or isinstance(step, int) or _is_member(loc, i))
+        kind, value = entry["type"], entry.get("input")
+        context = entry.get("ctx") or {}
+        if place == "parameter" and path[:1] == ("std",):
+            path = (f"std_{path[1]}" if len(path) > 1 else "std",)
+        if kind == "relation":  # between fields: the model says which one is to be mended
+            field = context["field"]
+            if place == "parameter" and field == "std":
+                field = "std_mu0"
+            path = (field,)
+            fault = FieldFault(field, context["reason"], place=place, path=path, bound=all_bounds.get(field))
+        elif kind == "missing":
+            name = str(path[-1]) if path else "body"
+            rigid = "null" if place == "pointer" else "rigid"
+            reason = STATE_K.format(rigid=rigid) if name == "k" else "is required"
+            fault = FieldFault(name, reason, bound=all_bounds.get(name), place=place, path=path)
+        elif kind == "extra_forbidden":
+            name = str(path[-1])
+            names = known if len(path) == 1 else INPUTS
+            fault = FieldFault(name, unknown_name(name, names), value, place=place, path=path)
+        else:
+            name = str(path[0]) if path else "body"
+            reason = _reason(kind, name, value, entry["msg"], all_bounds, place)
+            bound = all_bounds.get(str(path[-1]) if path else name, all_bounds.get(name))
+            fault = FieldFault(name, reason, value, bound, place, path)
+        found.setdefault(tuple(path), fault)
+    return list(found.values())
+
+
+def _is_member(loc: tuple[str | int, ...], index: int) -> bool:
+    """Whether a text in a location names a member of an object, such as std.mu0, and no branch of a union."""
+    return index == 1 and loc[0] == "std"
+
+
+def _reason(kind: str, name: str, value: object, message: str, bounds: Mapping[str, str], place: str) -> str:
+    plain = name.removeprefix("std_")
+    if name == "k" and isinstance(value, str) and value.strip().lower() in ("", "null", "none", "inf", "infinity"):
+        return (
+            "must be a number; say rigid for rigid contact"
+            if place == "parameter"
+            else ('must be a number; say null or "rigid" for rigid contact')
+        )
+    if plain in INPUTS or name == "tolerance":
+        text_of_none = isinstance(value, str) and value.strip().lower().lstrip("+-") in ("nan", "inf", "infinity")
+        if (isinstance(value, (int, float)) and not isinstance(value, bool)) or text_of_none:
+            return f"must be {bounds[name]}"
+        return number_hint(value, plain)
+    if name == "include":
+        names = message.partition("be ")[2].replace(" or ", ", ").replace("'", "")
+        return f"must be a list of names out of: {names}" if names else "must be a list of names, each once"
+    if name == "std" and kind in ("float_type", "greater_than_equal", "finite_number"):
+        return "must be finite and >= 0"
+    if kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
+        return "must be a JSON object"
+    return message[:1].lower() + message[1:]
+
+
+#: path -> names of the fields that its body or query may have
+_FIELDS_AT: dict[str, tuple[str, ...]] = {}
+
+
+def accepts(path: str, names: Iterable[str]) -> None:
+    """Say which fields a path takes, for refusals that list them."""
+    _FIELDS_AT[path] = tuple(names)
+
+
+def names_at(path: str) -> tuple[str, ...]:
+    """The fields that a path takes."""
+    return _FIELDS_AT.get(path, ())
+
+
+def invalid_request(path: str, entries: Sequence[Mapping[str, Any]]) -> RequestError:
+    """The error for what FastAPI found wrong with a body or a query."""
+    for entry in entries:
+        if entry["type"] == "model_attributes_type" and tuple(entry["loc"]) == ("body",) and entry["input"] == b"":
+            return MalformedBodyError("the body is empty")
+        if entry["type"] == "json_invalid":
+            reason = str((entry.get("ctx") or {}).get("error", "unexpected text"))
+            return MalformedBodyError(f"the body is not JSON: {reason}")
+        if entry["type"] == "missing" and tuple(entry["loc"]) == ("body",):
+            return MalformedBodyError("the body is empty")
+    known = names_at(path)
+    faults = []
+    for place, name in (("body", "pointer"), ("query", "parameter")):
+        chosen = [{**entry, "loc": tuple(entry["loc"][1:])} for entry in entries if entry["loc"][0] == place]
+        faults += faults_of(chosen, name, known)
+    return refusal(faults)

@@ -3,7 +3,7 @@
 import urllib.error
 import urllib.request
 
-from service.settings import Settings
+from .settings import Settings
 
 __all__ = ["is_ready", "loopback_url"]
 

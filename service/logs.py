@@ -28,6 +28,8 @@ request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,128}", re.ASCII)
 
 _FLUSH_AFTER_S = 0.05
+# Lines of the most frequent requests are written without a record; their texts hold nothing that JSON escapes.
+_KNOWN, _METHODS = frozenset({"/v1/mu-macro", "/v1/mu-macro/batch"}), frozenset({"GET", "POST"})
 _stem, _number = os.urandom(8).hex(), 0
 
 
@@ -70,8 +72,9 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(line, default=str)
 
 
-# time, request id, what stands between it and the duration, seconds, client; texts free of what JSON escapes
-Entry = tuple[float, str, str, float, str | None]
+# time, request id, what stands between it and the duration, seconds, client, holder of the key; texts free of what JSON
+# escapes
+Entry = tuple[float, str, str, float, str | None, str | None]
 
 
 def _access_text(method: str, path: str, status: int) -> str:
@@ -82,14 +85,16 @@ def _access_text(method: str, path: str, status: int) -> str:
 def _access_lines(entries: list[Entry]) -> str:
     lines = []
     second, text = -1, ""
-    for now, identity, between, seconds, client in entries:
+    for now, identity, between, seconds, client, key in entries:
         if int(now) != second:
             second = int(now)
             text = time.strftime('{"time": "%Y-%m-%dT%H:%M:%S.', time.gmtime(second))
-        shown = f'"{client}"}}\n' if client is not None else "null}\n"
+        shown = f'"{client}"' if client is not None else "null"
+        holder = f', "key": "{key}"' if key is not None else ""
         lines.append(
             f'{text}{int(1e3 * (now - second)):03d}+00:00", "level": "info", "logger": "mumacro.access", '
             f'"message": "request", "request_id": "{identity}{between}{1e3 * seconds:.3f}, "client": {shown}'
+            f"{holder}}}\n"
         )
     return "".join(lines)
 
@@ -142,24 +147,22 @@ class AccessLog:
         straight = found and self._log.propagate and not self._log.handlers and self._log.isEnabledFor(logging.INFO)
         self._put = found[0].put if straight else None
 
-    def write(self, identity: str, method: str, path: str, status: int, seconds: float, client: str | None) -> None:
-        """Write the line of one finished request.  All texts must be free of what JSON escapes."""
-        if self._put is None:
-            self.record(logging.INFO, method, path, status, seconds, client)
-        else:
-            self._put((time.time(), identity, self._texts[method, path, status], seconds, client))
-
-    def record(self, level: int, method: str, path: str, status: int, seconds: float, client: str | None) -> None:
-        """Log the same the ordinary way."""
+    def write(
+        self, identity: str, method: str, path: str, status: int, seconds: float, client: str | None, key: str | None,
+        *, quiet: bool = False,
+    ) -> None:  # fmt: skip
+        """Write the line of one finished request; ``quiet`` for probes, which say nothing while they succeed."""
+        if self._put is not None and not quiet and status == 200 and path in _KNOWN and method in _METHODS:
+            self._put((time.time(), identity, self._texts[method, path, status], seconds, client, key))
+            return
+        level = logging.DEBUG if quiet else logging.INFO
         if not self._log.isEnabledFor(level):
             return
         fields = {
-            "method": method,
-            "path": path,
-            "status": status,
-            "duration_ms": round(1e3 * seconds, 3),
-            "client": client,
-        }
+            "method": method, "path": path, "status": status, "duration_ms": round(1e3 * seconds, 3), "client": client,
+        }  # fmt: skip
+        if key is not None:
+            fields["key"] = key
         self._log.log(level, "request", extra={"fields": fields})
 
 

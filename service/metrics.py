@@ -14,17 +14,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from friction.regions import REGIMES, SOURCES
-from friction.surrogate import REGIME_OF_SOURCE
-from service.shared import FOLDER_VARIABLE
+from .kernel import REGIME_NAMES, SOURCES
+from .shared import FOLDER_VARIABLE
 
-__all__ = ["CONTENT_TYPE", "Metrics", "source_place"]
+__all__ = ["CONTENT_TYPE", "Metrics", "first_cell"]
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 ROUTES = (
-    "/v1/mu-macro", "/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/law.csv", "/v1/table", "/v1/table.nc",
+    "/v1/mu-macro", "/v1/mu-macro.txt",
+    "/v1/mu-macro/batch", "/v1/mu-macro/batch/columns", "/v1/mu-macro/batch/rows",
+    "/v1/mu-macro/batch/lines", "/v1/mu-macro/batch/csv", "/v1/mu-macro/batch/arrow",
+    "/v1/solve-for", "/v1/law", "/v1/law.csv", "/v1/table", "/v1/table.nc",
     "/Info", "/ModelInfo", "/InputSizes", "/OutputSizes", "/Evaluate", "/Gradient", "/ApplyJacobian", "/ApplyHessian",
     "/livez", "/readyz", "/healthz", "/metrics", "/", "/docs", "/openapi.json", "other",
 )  # fmt: skip
@@ -45,7 +48,7 @@ _SHARE_EVERY_S = 0.25
 Place = tuple[int, int]
 
 
-def source_place(table: int) -> int:
+def first_cell(table: int) -> int:
     """Where cases of the first source of a table are counted; the others follow, bad cases are last."""
     return _CASES + table * _PER_TABLE
 
@@ -58,7 +61,6 @@ class Metrics:
         self._file: Path | None = None
         self._saved: list[float] = []
         self._tables: list[dict[str, Any]] = []
-        self._pending: dict[Place, list[float]] = {}
 
     def start(self, tables: list[dict[str, Any]]) -> None:
         """Make room for the cases of each table; find the shared folder.  The same tables in every worker."""
@@ -84,38 +86,20 @@ class Metrics:
         cells[durations + bisect_left(BUCKETS_S, seconds)] += 1.0
         cells[durations + _WIDTH - 1] += seconds
 
-    def pending(self, place: Place) -> list[float]:
-        """A list that durations of a kind may simply be appended to; :meth:`settle` counts them."""
-        return self._pending.setdefault(place, [])
-
-    def settle(self) -> None:
-        """Count what is pending."""
-        for place, durations in self._pending.items():
-            taken = durations.copy()
-            del durations[: len(taken)]
-            if taken:
-                request, first = place
-                numbers = np.bincount(np.searchsorted(BUCKETS_S, taken), minlength=_WIDTH - 1).tolist()
-                self.cells[request] += len(taken)
-                for index, number in enumerate(numbers):
-                    self.cells[first + index] += number
-                self.cells[first + _WIDTH - 1] += sum(taken)
-
-    def count_cases(self, first: int, by_source: list[int], bad: int) -> None:
-        """Count the cases of a batch; ``first`` is the source_place of the table."""
-        for index, number in enumerate(by_source):
+    def count_cases(self, first: int, source: NDArray[np.int8], bad: int) -> None:
+        """Count the cases of a batch by their source codes; ``first`` is the first_cell of the table."""
+        for index, number in enumerate(np.bincount(source + 1, minlength=_PER_TABLE).tolist()[1:]):
             self.cells[first + index] += number
         self.cells[first + _PER_TABLE - 1] += bad
 
     async def share(self) -> None:
-        """Settle, and leave copies in the shared folder if there is one, for ever."""
+        """Leave copies in the shared folder if there is one, for ever."""
         while True:
             self.save()
             await asyncio.sleep(_SHARE_EVERY_S)
 
     def save(self) -> None:
         """Leave a copy in the shared folder.  Replacing the file is atomic: nobody reads half a copy."""
-        self.settle()
         if self._file is None or self.cells == self._saved:
             return
         self._saved = self.cells.copy()
@@ -128,7 +112,6 @@ class Metrics:
 
     def total(self) -> list[float]:
         """Sum over all workers; of the others, what they last left, at most a quarter of a second ago."""
-        self.settle()
         cells = self.cells.copy()
         if self._file is None:
             return cells
@@ -174,10 +157,10 @@ class Metrics:
         bad = CounterMetricFamily("mumacro_bad_cases", "Cases of batches that were refused", labels=("table",))
         info = GaugeMetricFamily("mumacro_table_info", "Loaded tables", labels=("id", "tolerance"))
         for index, table in enumerate(self._tables):
-            first = source_place(index)
+            first = first_cell(index)
             for code, source in enumerate(SOURCES):
                 if cells[first + code]:
-                    cases.add_metric((table["id"], source, REGIMES[REGIME_OF_SOURCE[code]]), cells[first + code])
+                    cases.add_metric((table["id"], source, REGIME_NAMES[code]), cells[first + code])
             bad.add_metric((table["id"],), cells[first + _PER_TABLE - 1])
             info.add_metric((table["id"], format(table["tolerance"], "g")), 1)
         yield cases

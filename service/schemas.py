@@ -1,59 +1,132 @@
-"""Requests and responses of ``/v1``: what is accepted, and what the interface's description says of it."""
+"""Requests and answers: the one truth about what is legal, and what OpenAPI says of it."""
 
-from typing import Annotated, Any, Literal
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    JsonValue,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    create_model,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from .hints import ONE_FREQUENCY, STATE_OMEGA, TOO_FREQUENT, read_number
+from .kernel import FIELDS, MOST_HZ, RAD_PER_CYCLE
+from .quantities import QUANTITIES, Part
 
 __all__ = [
-    "INCLUDES",
-    "BatchColumns",
-    "BatchFault",
-    "Case",
-    "CaseAnswer",
-    "CaseRequest",
-    "ColumnsAnswer",
-    "Gradient",
-    "Groups",
-    "Health",
-    "InputStd",
-    "Limits",
-    "Power",
-    "Problem",
-    "Result",
-    "RowsAnswer",
-    "TableAnswer",
-    "TableLabel",
-]
+    "INCLUDES", "Answered", "BatchColumns", "BatchFault", "BatchQuery", "Case", "CaseAnswer", "CaseQuery",
+    "CaseRequest", "ColumnsAnswer", "Health", "InputStd", "NotNegative", "Options", "Positive", "Problem",
+    "RequestFields", "Result", "RowsAnswer", "Stiffness", "TableAnswer", "TableChoice", "TableLabel", "canonical",
+    "examples", "relation", "std_fault",
+]  # fmt: skip
 
-Include = Literal["groups", "limits", "gradient", "std", "stick_fraction", "power"]
-INCLUDES: tuple[Include, ...] = ("groups", "limits", "gradient", "std", "stick_fraction", "power")
-_INCLUDE = f"More to compute: {', '.join(INCLUDES)}"
+INCLUDES = tuple(QUANTITIES)
+Include = Literal[INCLUDES]  # type: ignore[valid-type]
+MAX_INCLUDE = 2 * len(INCLUDES)
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+#: null and "rigid" are rigid contact
+Stiffness = Positive | Literal["rigid"] | None
+IncludeList = Annotated[list[Include], Field(max_length=MAX_INCLUDE)]
 
-_K = "Tangential contact stiffness [N/m], finite and > 0; left out or null: rigid contact"
+_TEXTS = {
+    "mu0": "Coulomb friction coefficient of the contact [-], finite and > 0",
+    "Fz": "Normal force [N], finite and > 0",
+    "k": "Tangential contact stiffness [N/m], finite and > 0; rigid contact has to be said",
+    "y0": "Amplitude of the transverse oscillation [m], finite and >= 0",
+    "omega": "Angular frequency of the oscillation [rad/s], finite and >= 0; or f in its place",
+    "f": "Frequency of the oscillation [Hz], finite and >= 0; in place of omega",
+    "v0": "Sliding velocity [m/s], finite and >= 0",
+}
+_INCLUDE = "More to compute: " + "; ".join(f"{name} ({entry.text})" for name, entry in QUANTITIES.items())
+_TOLERANCE = "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
 _STD = "Standard deviations of the inputs; needed where include asks for std, and nowhere else"
-_STICK = "Share of the period during which the contact sticks [-]; only if asked for"
-_STICK_BOUND = (
-    "Bound of the absolute error of stick_fraction [-]; comes with it. null: the table does not have it. Larger at the "
-    "border of continuous sliding than elsewhere"
-)
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
-class Case(BaseModel):
-    """One case, in SI units."""
+def examples(*found: Mapping[str, JsonValue]) -> ConfigDict:
+    """Strict checks (``"0.3"`` and true are no numbers), no unknown fields, and examples."""
+    return ConfigDict(strict=True, extra="forbid", json_schema_extra={"examples": [dict(case) for case in found]})
 
-    # Strict: "0.3" and true are no numbers here.
-    model_config = ConfigDict(strict=True, extra="forbid", json_schema_extra={"examples": [_EXAMPLE]})
 
-    mu0: Positive = Field(description="Coulomb friction coefficient of the contact [-], finite and > 0")
-    Fz: Positive = Field(description="Normal force [N], finite and > 0")
-    k: Positive | None = Field(None, description=_K)
-    y0: NotNegative = Field(description="Amplitude of the transverse oscillation [m], finite and >= 0")
-    omega: NotNegative = Field(description="Angular frequency of the oscillation [rad/s], finite and >= 0")
-    v0: NotNegative = Field(description="Sliding velocity [m/s], finite and >= 0")
+def relation(field: str, reason: str) -> PydanticCustomError:
+    """What is wrong between fields, and which one is to be mended."""
+    return PydanticCustomError("relation", "{field}: {reason}", {"field": field, "reason": reason})
+
+
+class CaseFields(BaseModel):
+    """One case, in SI units, without what has to hold between its fields."""
+
+    model_config = examples(_EXAMPLE)
+
+    mu0: Positive = Field(description=_TEXTS["mu0"])
+    Fz: Positive = Field(description=_TEXTS["Fz"])
+    k: Stiffness = Field(description=f'{_TEXTS["k"]}: null or "rigid"')
+    y0: NotNegative = Field(description=_TEXTS["y0"])
+    omega: NotNegative | None = Field(None, description=_TEXTS["omega"])
+    f: NotNegative | None = Field(None, description=_TEXTS["f"])
+    v0: NotNegative = Field(description=_TEXTS["v0"])
+
+    def fault(self) -> PydanticCustomError | None:
+        """What does not hold between the fields."""
+        if (self.omega is None) == (self.f is None):
+            return frequency_fault(self.f is not None)
+        if self.f is not None and self.f > MOST_HZ:
+            return relation("f", TOO_FREQUENT)
+        return None
+
+    def inputs(self) -> tuple[float, float, float, float, float, float]:
+        """The six inputs in the order of FIELDS; k = inf is rigid contact."""
+        k, omega = self.k, self.omega
+        if omega is None:
+            omega = RAD_PER_CYCLE * (self.f or 0.0)
+        return self.mu0, self.Fz, k if isinstance(k, float) else math.inf, self.y0, omega, self.v0
+
+
+def _related(value: Any, handler: ModelWrapValidatorHandler[Any], title: str) -> Any:
+    """Check a case, and what has to hold between its fields; a missing frequency is told beside other faults."""
+    try:
+        made = handler(value)
+    except ValidationError as error:
+        if not isinstance(value, dict) or (value.get("omega") is None) != (value.get("f") is None):
+            raise
+        entries: Any = [
+            {"type": relation(**entry["ctx"]), "loc": entry["loc"], "input": entry["input"]}
+            if entry["type"] == "relation"
+            else {name: entry[name] for name in ("type", "loc", "input", "ctx") if name in entry}
+            for entry in error.errors(include_url=False)
+        ]
+        entries.append({"type": frequency_fault(value.get("f") is not None), "loc": (), "input": None})
+        raise ValidationError.from_exception_data(title, entries) from None
+    fault = made.fault()
+    if fault is not None:
+        raise fault
+    return made
+
+
+class Case(CaseFields):
+    """One case, in SI units; ``omega`` or ``f``, exactly one of them."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _related(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Any:
+        return _related(value, handler, cls.__name__)
+
+
+def frequency_fault(both: bool) -> PydanticCustomError:
+    """omega and f, or neither."""
+    if both:
+        return relation("f", ONE_FREQUENCY)
+    return relation("omega", STATE_OMEGA)
 
 
 class InputStd(BaseModel):
@@ -65,37 +138,180 @@ class InputStd(BaseModel):
     Fz: NotNegative = Field(0.0, description="[N]")
     k: NotNegative = Field(0.0, description="[N/m]; means nothing where contact is rigid")
     y0: NotNegative = Field(0.0, description="[m]")
-    omega: NotNegative = Field(0.0, description="[rad/s]")
+    omega: NotNegative = Field(0.0, description="[rad/s]; or f in its place")
+    f: NotNegative = Field(0.0, description="[Hz]; in place of omega")
     v0: NotNegative = Field(0.0, description="[m/s]")
 
+    @model_validator(mode="after")
+    def _one_frequency(self) -> Self:
+        if self.omega and self.f:
+            raise relation("std", "give the standard deviation of omega or of f, not of both")
+        return self
 
-class CaseRequest(Case):
-    """One case, and what is wanted beside the default answer."""
+    def of_inputs(self) -> dict[str, float]:
+        """By name of the input, omega in place of f."""
+        found = {name: getattr(self, name) for name in FIELDS}
+        found["omega"] += RAD_PER_CYCLE * self.f
+        return found
 
-    include: list[Include] | None = Field(None, description=_INCLUDE)
-    tolerance: Positive | None = Field(
-        None, description="Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
-    )
+
+class Options(BaseModel):
+    """What a request asks for beside its cases."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    include: IncludeList | None = Field(None, description=_INCLUDE)
+    tolerance: Positive | None = Field(None, description=_TOLERANCE)
     std: InputStd | None = Field(None, description=_STD)
+
+    @model_validator(mode="after")
+    def _std_where_asked(self) -> Self:
+        if (self.std is not None) != ("std" in (self.include or ())):
+            raise std_fault(self.std is None)
+        return self
+
+    def names(self) -> tuple[str, ...]:
+        """Included names once each, in the order of the registry."""
+        return canonical(self.include)
+
+
+def std_fault(missing: bool) -> PydanticCustomError:
+    """Standard deviations are given exactly where they are asked for."""
+    reason = "is required where include asks for std" if missing else "is of no use unless include asks for std"
+    return relation("std", reason)
+
+
+def canonical(include: Any) -> tuple[str, ...]:
+    """Names once each, in the order of the registry."""
+    asked = set(include or ())
+    return tuple(name for name in QUANTITIES if name in asked) if asked else ()
+
+
+class RequestFields(CaseFields):
+    """One case, and what is wanted beside the default answer; without what has to hold between the fields."""
+
+    include: IncludeList | None = Field(None, description=_INCLUDE)
+    tolerance: Positive | None = Field(None, description=_TOLERANCE)
+    std: InputStd | None = Field(None, description=_STD)
+
+    def fault(self) -> PydanticCustomError | None:
+        """What does not hold between the fields."""
+        found = super().fault()
+        if found is not None:
+            return found
+        if (self.std is not None) != ("std" in (self.include or ())):
+            return std_fault(self.std is None)
+        return None
+
+    def names(self) -> tuple[str, ...]:
+        """Included names once each, in the order of the registry."""
+        return canonical(self.include)
+
+
+class CaseRequest(RequestFields):
+    """One case, and what is wanted beside the default answer; ``omega`` or ``f``, exactly one of them."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _related(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Any:
+        return _related(value, handler, cls.__name__)
+
+
+# --- queries ------------------------------------------------------------------------------------------
+
+_Number = BeforeValidator(read_number)
+QueryPositive = Annotated[float, Field(gt=0, allow_inf_nan=False), _Number]
+QueryNotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), _Number]
+
+
+def _split(names: Any) -> Any:
+    """``include=a,b`` and ``include=a&include=b`` are the same."""
+    if isinstance(names, list) and all(isinstance(part, str) for part in names):
+        return [part.strip() for name in names for part in name.split(",") if part.strip()]
+    return names
+
+
+QueryInclude = Annotated[list[Include], Field(max_length=MAX_INCLUDE), BeforeValidator(_split)]
+
+
+class BatchQuery(BaseModel):
+    """Options as a query."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    include: QueryInclude = Field([], description=_INCLUDE)
+    tolerance: QueryPositive | None = Field(None, description=_TOLERANCE)
+    std_mu0: QueryNotNegative | None = Field(None, description="Standard deviation of mu0 [-]")
+    std_Fz: QueryNotNegative | None = Field(None, description="Standard deviation of Fz [N]")  # noqa: N815
+    std_k: QueryNotNegative | None = Field(None, description="Standard deviation of k [N/m]")
+    std_y0: QueryNotNegative | None = Field(None, description="Standard deviation of y0 [m]")
+    std_omega: QueryNotNegative | None = Field(None, description="Standard deviation of omega [rad/s]")
+    std_f: QueryNotNegative | None = Field(None, description="Standard deviation of f [Hz]")
+    std_v0: QueryNotNegative | None = Field(None, description="Standard deviation of v0 [m/s]")
+
+    def given(self) -> dict[str, Any]:
+        """The options as :class:`Options` has them."""
+        std = {name: getattr(self, f"std_{name}") for name in InputStd.model_fields}
+        std = {name: value for name, value in std.items() if value is not None}
+        found: dict[str, Any] = {"include": list(self.include) or None, "tolerance": self.tolerance, "std": std or None}
+        return {name: value for name, value in found.items() if value is not None}
+
+
+class CaseQuery(BatchQuery):
+    """One case as a query; ``omega`` or ``f``, exactly one of them."""
+
+    mu0: QueryPositive = Field(description=_TEXTS["mu0"], examples=[0.3])
+    Fz: QueryPositive = Field(description=_TEXTS["Fz"], examples=[10.0])
+    k: Annotated[Positive | Literal["rigid"], _Number] = Field(description=f"{_TEXTS['k']}: rigid", examples=[1e6])
+    y0: QueryNotNegative = Field(description=_TEXTS["y0"], examples=[2e-6])
+    omega: QueryNotNegative | None = Field(None, description=_TEXTS["omega"], examples=[1.3e5])
+    f: QueryNotNegative | None = Field(None, description=_TEXTS["f"])
+    v0: QueryNotNegative = Field(description=_TEXTS["v0"], examples=[0.01])
+
+    def case(self) -> CaseRequest:
+        """The same as a body would have it."""
+        named = {name: getattr(self, name) for name in Case.model_fields}
+        return CaseRequest.model_validate({**named, **self.given()})
+
+
+class TableChoice(BaseModel):
+    """Which table is meant: by one of the two, or the tightest."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    id: str | None = Field(None, description="Name of the table")
+    tolerance: QueryPositive | None = Field(None, description=_TOLERANCE)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.id is not None and self.tolerance is not None:
+            raise relation("id", "choose by one id or by tolerance")
+        return self
+
+
+# --- batches ------------------------------------------------------------------------------------------
+
+_COLUMNS: dict[str, JsonValue] = {**_EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}
 
 
 class BatchColumns(BaseModel):
     """A batch as columns: lists of one length; a plain number holds for every case."""
 
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{**_EXAMPLE, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}]},
-    )
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [_COLUMNS]})
 
     mu0: Positive | list[float] = Field(description="[-], finite and > 0")
     Fz: Positive | list[float] = Field(description="[N], finite and > 0")
-    k: Positive | list[float | None] | None = Field(None, description="[N/m], finite and > 0; null: rigid contact")
+    k: Stiffness | list[float | Literal["rigid"] | None] = Field(description='[N/m]; null or "rigid": rigid contact')
     y0: NotNegative | list[float] = Field(description="[m], finite and >= 0")
-    omega: NotNegative | list[float] = Field(description="[rad/s], finite and >= 0")
+    omega: NotNegative | list[float] | None = Field(None, description="[rad/s], finite and >= 0; or f in its place")
+    f: NotNegative | list[float] | None = Field(None, description="[Hz], finite and >= 0; in place of omega")
     v0: NotNegative | list[float] = Field(description="[m/s], finite and >= 0")
-    include: list[Include] | None = Field(None, description=_INCLUDE)
-    tolerance: Positive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
+    include: IncludeList | None = Field(None, description=_INCLUDE)
+    tolerance: Positive | None = Field(None, description=_TOLERANCE)
     std: InputStd | None = Field(None, description=_STD)
+
+
+# --- answers ------------------------------------------------------------------------------------------
 
 
 class TableLabel(BaseModel):
@@ -105,68 +321,34 @@ class TableLabel(BaseModel):
     tolerance: float = Field(description="The error of mu_macro/mu0 [-] that it was built to")
 
 
-class Groups(BaseModel):
-    """Dimensionless groups.  null: not finite (rigid contact, no oscillation, or beyond double range)."""
+class Answered(BaseModel):
+    """What every answer carries."""
 
-    v_tilde: float | None = Field(description="v0/(l0 omega) [-]")
-    y_tilde: float | None = Field(description="y0/l0 [-]")
-    l0: float | None = Field(description="Length scale mu0 Fz/k [m]; 0 for rigid contact")
-
-
-class Limits(BaseModel):
-    """Marks on the friction law of this case.  null: not finite in double precision."""
-
-    mu_static: float | None = Field(description="Static limit, v0 -> 0 [-]: mu0 sqrt(1 - y~^2), or 0 for y~ >= 1")
-    v0_crit: float | None = Field(description="Velocity at the border of continuous sliding [m/s]")
-    mu_crit: float | None = Field(description="Macroscopic coefficient of friction at that border [-]")
+    table: TableLabel
+    api_version: str
 
 
-class Gradient(BaseModel):
-    """d mu_macro / d input.  null: not finite, or no such input (k of rigid contact)."""
-
-    mu0: float | None = Field(description="[-]")
-    Fz: float | None = Field(description="[1/N]")
-    k: float | None = Field(description="[m/N]")
-    y0: float | None = Field(description="[1/m]")
-    omega: float | None = Field(description="[s/rad]")
-    v0: float | None = Field(description="[s/m]")
-
-
-class Power(BaseModel):
-    """Mean powers [W].  null: not finite in double precision."""
-
-    oscillation: float | None = Field(
-        description="What the shaker puts in: mu0 Fz l0 omega <y~ cos tau u_y>; null for rigid contact"
-    )
-    saved: float | None = Field(description="What the drive is spared: (mu0 - mu_macro) Fz v0")
-    oscillation_bound: float | None = Field(
-        description="Bound of the absolute error of oscillation; null also where the table does not have it"
-    )
-    saved_bound: float | None = Field(description="Bound of the absolute error of saved")
-
-
-class Result(BaseModel):
-    """What is known of one case."""
+class _Default(BaseModel):
+    """The default answer to one case."""
 
     mu_macro: float = Field(description="Macroscopic coefficient of friction [-]")
     mu_ratio: float = Field(description="mu_macro/mu0 [-], from 0 to 1")
     regime: Literal["continuous", "stick_slip", "static"] = Field(description="How the contact moves")
     error_bound: float | None = Field(description="Bound of the absolute error of mu_macro [-]")
     source: str = Field(description="Block of the table, or closed-form tail, that the value came from")
-    groups: Groups | None = Field(None, description="Only if asked for")
-    limits: Limits | None = Field(None, description="Only if asked for")
-    gradient: Gradient | None = Field(None, description="Only if asked for")
-    std: float | None = Field(None, description="Standard deviation of mu_macro [-], to first order; only if asked for")
-    stick_fraction: float | None = Field(None, description=_STICK)
-    stick_fraction_bound: float | None = Field(None, description=_STICK_BOUND)
-    power: Power | None = Field(None, description="Only if asked for")
 
 
-class CaseAnswer(Result):
-    """Answer to one case."""
+class _BatchEnd(Answered):
+    errors: list["BatchFault"] = Field(description="One entry per bad case, in order; the first 1000 of them")
+    n_errors: int = Field(description="Number of bad cases, listed or not")
 
-    table: TableLabel
-    api_version: str
+
+class _DefaultColumns(_BatchEnd):
+    mu_macro: list[float | None]
+    mu_ratio: list[float | None]
+    regime: list[str | None]
+    error_bound: list[float | None]
+    source: list[str | None]
 
 
 class BatchFault(BaseModel):
@@ -177,37 +359,51 @@ class BatchFault(BaseModel):
     reason: str
 
 
-class _BatchEnd(BaseModel):
-    errors: list[BatchFault] = Field(description="One entry per bad case, in order; the first 1000 of them")
-    n_errors: int = Field(description="Number of bad cases, listed or not")
-    table: TableLabel
-    api_version: str
+def _title(name: str) -> str:
+    return "".join(word.capitalize() for word in name.split("_"))
 
 
-class ColumnsAnswer(_BatchEnd):
-    """Answer to a batch in columns, order kept; null where a case is bad."""
+def _included(listed: bool) -> dict[str, Any]:
+    """Members that the registry adds to a model of an answer."""
+    members: dict[str, list[Part]] = {}
+    texts = {}
+    for quantity in QUANTITIES.values():
+        for part in quantity.parts:
+            name = part.path.partition(".")[0]
+            members.setdefault(name, []).append(part)
+            texts[name] = quantity.text
 
-    mu_macro: list[float | None]
-    mu_ratio: list[float | None]
-    regime: list[str | None]
-    error_bound: list[float | None]
-    source: list[str | None]
-    groups: dict[str, list[float | None]] | None = None
-    limits: dict[str, list[float | None]] | None = None
-    gradient: dict[str, list[float | None]] | None = None
-    std: list[float | None] | None = None
-    stick_fraction: list[float | None] | None = None
-    stick_fraction_bound: list[float | None] | None = None
-    power: dict[str, list[float | None]] | None = None
+    def kind(part: Part) -> Any:
+        return (list[part.kind | None] if listed else part.kind) | None  # type: ignore[name-defined]
+
+    fields: dict[str, Any] = {}
+    for name, parts in members.items():
+        only = "Only if asked for"
+        if "." not in parts[0].path:
+            fields[name] = (kind(parts[0]), Field(None, description=f"{only}. {parts[0].text} [{parts[0].unit}]"))
+            continue
+        inner = {
+            part.path.partition(".")[2]: (kind(part), Field(description=f"{part.text} [{part.unit}]")) for part in parts
+        }
+        model = create_model(_title(name) + ("Columns" if listed else ""), __doc__=texts[name] + ".", **inner)  # type: ignore[call-overload]
+        fields[name] = (model | None, Field(None, description=only))
+    return fields
 
 
-class RowsAnswer(_BatchEnd):
-    """Answer to a batch in rows, order kept; null where a case is bad."""
+_made: Any = create_model
+Result: type[BaseModel] = _made("Result", __base__=_Default, __doc__="What is known of one case.", **_included(False))
+CaseAnswer: type[BaseModel] = _made("CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.")
+ColumnsAnswer: type[BaseModel] = _made(
+    "ColumnsAnswer", __base__=_DefaultColumns, __doc__="Answer to a batch in columns, order kept; null: a bad case.",
+    **_included(True),
+)  # fmt: skip
+RowsAnswer: type[BaseModel] = _made(
+    "RowsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in rows, order kept; null where a case is bad.",
+    results=(list[Result | None], ...),  # type: ignore[valid-type]
+)  # fmt: skip
 
-    results: list[Result | None]
 
-
-class TableAnswer(BaseModel):
+class TableAnswer(Answered):
     """What is known of a table."""
 
     id: str
@@ -219,9 +415,7 @@ class TableAnswer(BaseModel):
     max_rel_error: float | None = Field(description="Largest verified relative error of mu_macro [-]")
     attributes: dict[str, Any] = Field(description="Root attributes of the file")
     blocks: list[dict[str, Any]]
-    table: TableLabel
     loaded: list[TableLabel] = Field(description="All loaded tables, tightest first")
-    api_version: str
     service_version: str
 
 

@@ -5,6 +5,7 @@ names the variable, the value and what it must be; the value of the API key is n
 """
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -33,6 +34,21 @@ def _split_paths(value: object) -> object:
     return value
 
 
+def _split_list(value: object) -> object:
+    """``a, b`` -> (``a``, ``b``)."""
+    if isinstance(value, str):
+        return tuple(part.strip() for part in value.split(",") if part.strip())
+    return value
+
+
+def _split_keys(value: object) -> object:
+    """``a=1,b=2`` -> {``a``: ``1``, ``b``: ``2``}."""
+    if isinstance(value, str):
+        pairs = [part.partition("=") for part in value.split(",") if part.strip()]
+        return {name.strip(): key for name, _, key in pairs}
+    return value
+
+
 def _default_tables() -> tuple[Path, ...]:
     # An installed package has site-packages as its parent, where PyTables owns a folder of this name:
     # only a folder that really holds tables counts.
@@ -56,10 +72,20 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(16 * 2**20, ge=1024, le=2**31, description="an integer from 1024 to 2147483648")
     max_batch: int = Field(100_000, ge=1, le=10_000_000, description="an integer from 1 to 10000000")
     max_batches: int = Field(8, ge=1, le=1024, description="an integer from 1 to 1024")
-    least_rate: int = Field(65536, ge=0, le=2**31, description="an integer from 0 to 2147483648")
+    max_connections: int = Field(1000, ge=1, le=1_000_000, description="an integer from 1 to 1000000")
+    keep_alive_s: int = Field(75, ge=1, le=3600, description="an integer from 1 to 3600")
     client_timeout_s: int = Field(30, ge=1, le=3600, description="an integer from 1 to 3600")
     time_limit_s: int = Field(300, ge=1, le=86400, description="an integer from 1 to 86400")
     api_key: SecretStr | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
+    api_keys: Annotated[dict[str, SecretStr], NoDecode, BeforeValidator(_split_keys)] = Field(
+        default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -"
+    )
+    cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split_list)] = Field(
+        (), description="origins such as https://tool.example joined by commas, or *"
+    )
+    root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
+    trusted_proxies: str = Field("127.0.0.1", description="addresses or networks joined by commas, or *")
+    tracing: bool = Field(False, description="true or false")
     log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
         "info", description="one of debug, info, warning, error, critical"
     )
@@ -81,12 +107,30 @@ class Settings(BaseSettings):
                 raise ValueError("unusable key")
         return key
 
+    @field_validator("api_keys")
+    @classmethod
+    def _usable_keys(cls, keys: dict[str, SecretStr]) -> dict[str, SecretStr]:
+        for name, key in keys.items():
+            if not re.fullmatch(r"[A-Za-z0-9._-]{1,64}", name):
+                raise ValueError("unusable name")
+            cls._usable_key(key)
+        if len({key.get_secret_value() for key in keys.values()}) != len(keys):
+            raise ValueError("two names for one key")
+        return keys
+
+    def keys(self) -> dict[str, str]:
+        """API key -> name of its holder, which logs show; empty where no key is needed."""
+        found = {key.get_secret_value(): name for name, key in self.api_keys.items()}
+        if self.api_key is not None:
+            found.setdefault(self.api_key.get_secret_value(), "default")
+        return found
+
 
 def cache_fields(settings: Settings) -> dict[str, str]:
     """How long an answer may be kept, and by whom.  With an API key in force it is for its caller alone."""
-    if settings.api_key is None:
-        return {"cache-control": f"public, max-age={_MAX_AGE_S}"}
-    return {"cache-control": f"private, max-age={_MAX_AGE_S}", "vary": "x-api-key, authorization"}
+    if not settings.keys():
+        return {"cache-control": f"public, max-age={_MAX_AGE_S}", "vary": "accept"}
+    return {"cache-control": f"private, max-age={_MAX_AGE_S}", "vary": "accept, x-api-key, authorization"}
 
 
 def load_settings(**chosen: Any) -> Settings:
@@ -105,7 +149,7 @@ def load_settings(**chosen: Any) -> Settings:
             name = str(problem["loc"][0]).lower() if problem["loc"] else "settings"
             field = Settings.model_fields.get(name)
             bound = field.description if field is not None else "a known setting"
-            given = "(hidden)" if name == "api_key" else repr(problem["input"])[:200]
+            given = "(hidden)" if name in ("api_key", "api_keys") else repr(problem["input"])[:200]
             lines.setdefault(name, f"{PREFIX}{name.upper()} must be {bound}, got {given}")
         raise SettingsError("; ".join(lines.values())) from None
 

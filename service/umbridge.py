@@ -16,9 +16,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from friction import InputError, Surrogate
-from friction.nondim import FIELDS
-from service.errors import safe_value
+from mumacro import InputError, Surrogate
+
+from .errors import safe_value
+from .kernel import FIELDS
 
 __all__ = ["INFO", "MODELS", "OPERATIONS", "UmBridgeError", "model_of"]
 
@@ -123,7 +124,8 @@ def _case(model: str, body: Mapping[str, Any]) -> list[float]:
 
 def _evaluate(surrogate: Surrogate, values: list[float], gradient: bool) -> Any:
     try:
-        return surrogate.evaluate(*values, gradient=gradient)
+        case: dict[str, Any] = dict(zip(FIELDS, values, strict=True))
+        return surrogate.evaluate(case, gradient=gradient)
     except InputError as error:
         raise _invalid(str(error)) from None
 

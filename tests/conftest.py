@@ -10,24 +10,25 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, Queue
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from fastapi import FastAPI
 from numpy.typing import NDArray
-from starlette.testclient import TestClient
 
 from builder.sweep import Sweep
-from friction import Surrogate
-from service.app import create_app
-from service.settings import Settings
+from mumacro import Surrogate
+
+if TYPE_CHECKING:  # tests of the library do without the service and what it is made of
+    from fastapi import FastAPI
+    from starlette.testclient import TestClient
 
 START_S = 180  # a first start compiles the kernels
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -46,24 +47,27 @@ def tables_dir(repository: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def app(tables_dir: Path) -> FastAPI:
+def app(tables_dir: Path) -> "FastAPI":
     """An application on the committed tables, with default settings."""
-    return create_app(Settings(tables=(tables_dir,)))
+    from service.app import create_app
+    from service.settings import Settings
+
+    return create_app(Settings(tables=(tables_dir,)), wait=True)
 
 
 @pytest.fixture(scope="session")
-def client(app: FastAPI) -> Iterator[TestClient]:
+def client(app: "FastAPI") -> "Iterator[TestClient]":
     """A client of that application, after its start."""
+    from starlette.testclient import TestClient
+
     with TestClient(app) as started:
         yield started
 
 
 @pytest.fixture(scope="session")
-def surrogate(client: TestClient, app: FastAPI) -> Surrogate:
-    """The table that answers by default."""
-    assert client.get("/readyz").status_code == 200
-    found: Surrogate = app.state.shelf.tables[0].surrogate
-    return found
+def surrogate() -> Surrogate:
+    """The tightest committed table, which also answers by default in the service."""
+    return Surrogate.open()
 
 
 @pytest.fixture
@@ -114,10 +118,24 @@ def live_server(
             assert process.poll() is None, log.read_text("utf-8")
             assert time.monotonic() < deadline, log.read_text("utf-8")
             time.sleep(0.05)
+        wait_until_ready(found[1])
         yield LiveServer(found[1], log)
     finally:
         process.terminate()
         process.wait(timeout=60)
+
+
+def wait_until_ready(url: str) -> None:
+    """Wait until the service at the URL says that it is ready: it listens before that."""
+    deadline = time.monotonic() + START_S
+    while True:
+        try:
+            with urllib.request.urlopen(f"{url}/readyz", timeout=60):
+                return
+        except OSError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.05)
 
 
 class Server:
@@ -170,6 +188,17 @@ class Server:
                 assert time.monotonic() < deadline, "".join(self.lines)
                 time.sleep(0.1)
 
+    def wait_until_ready(self):
+        """Wait until questions are answered, or refused for good because of the tables."""
+        deadline = time.monotonic() + START_S
+        while True:
+            self.wait_for_workers()
+            status, _, body = self.ask("GET", "/readyz")
+            if status == 200 or b"not loaded yet" not in body:
+                return
+            assert time.monotonic() < deadline, "".join(self.lines)
+            time.sleep(0.05)
+
     def stop(self, number=signal.SIGTERM):
         self.process.send_signal(number)
         return self.wait()
@@ -186,10 +215,12 @@ def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
     """A service process of one's own, for as long as the context lasts."""
 
     @contextmanager
-    def serve(tables: Path, *arguments: str, **environment: str) -> Iterator[Server]:
+    def serve(tables: Path, *arguments: str, ready: bool = True, **environment: str) -> Iterator[Server]:
         server = Server(repository, tables, arguments, environment)
         try:
             assert server.port, "".join(server.lines)
+            if ready:
+                server.wait_until_ready()
             yield server
         finally:
             if server.process.poll() is None:

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 
 @njit
-def march(v: float, y: float, steps: int, periods: int) -> NDArray[np.float64]:
-    """Orbit (steps, 2) of u over the last of ``periods`` periods; v = v~ [-], y = y~ [-], from the relaxed spring."""
+def march(v: float, y: float, steps: int, periods: int, ux: float = 0.0, uy: float = 0.0) -> NDArray[np.float64]:
+    """Orbit (steps, 2) of u over the last of ``periods`` periods from (ux, uy); v = v~ [-], y = y~ [-]."""
     orbit = np.empty((steps, 2))
-    ux, uy = 0.0, 0.0
     d_tau = 2.0 * math.pi / steps
     for _ in range(periods):
         for i in range(steps):

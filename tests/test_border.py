@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from builder.steady import border, solve
 from builder.sweep import Sweep
-from friction import InputError, Surrogate
-from friction.regions import BORDER_PIECES, Y_CONT, Y_TAIL
+from mumacro import InputError, Surrogate
+from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL, amplitude
 
 Array = NDArray[np.float64]
 
@@ -116,13 +116,16 @@ def test_stored_border_refuses_illegal_amplitudes(table: Surrogate, bad: float) 
     with pytest.raises(InputError, match="y_tilde must be >= 0") as caught:
         table.v_tilde_crit(bad)
     assert caught.value.index is None
-    with pytest.raises(InputError, match="y_tilde at index 3 must be >= 0") as caught:
-        table.v_tilde_crit([[1.0, 2.0], [3.0, bad]])
-    assert caught.value.index == 3
+    many = table.v_tilde_crit([[1.0, 2.0], [3.0, bad]])
+    assert np.isnan(many).tolist() == [[False, False], [False, True]]
+    assert many[0].tolist() == [table.v_tilde_crit(1.0), table.v_tilde_crit(2.0)]
 
 
 def test_pieces_cover_every_amplitude() -> None:
-    (_, _, low, _), (_, _, mid, _), (_, _, high, _) = BORDER_PIECES
-    assert low == (0.0, Y_CONT**2)
-    assert mid == (math.log(Y_CONT), math.log(Y_TAIL))
-    assert high == (0.0, 1.0 / Y_TAIL)
+    low, mid, high = (axis for _, axis, _ in BORDER_PIECES)
+    assert (low.low, low.high) == (0.0, Y_CONT**2)
+    assert (mid.low, mid.high) == (math.log(Y_CONT), math.log(Y_TAIL))
+    assert (high.low, high.high) == (0.0, 1.0 / Y_TAIL)
+    for axis, y in ((low, [0.0, Y_CONT]), (mid, [Y_CONT, Y_TAIL]), (high, [math.inf, Y_TAIL])):
+        with np.errstate(divide="ignore"):
+            assert amplitude(axis, np.array([axis.low, axis.high])) == pytest.approx(y, rel=1e-14)

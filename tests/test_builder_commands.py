@@ -35,6 +35,8 @@ BAD = {
     "no table": (("verify", "no-such-table.nc"), "no-such-table.nc"),
     "no table but text": (("verify", "README.md"), "README.md"),
     "too few points": (("verify", "x.nc", "--points", "1"), "--points"),
+    "no folder for figures": (("figures", "--out", "no/such/folder"), "--out"),
+    "no table for figures": (("figures", "--out", ".", "--table", "no-such-table.nc"), "no-such-table.nc"),
     "no command": (("bake",), "bake"),
 }
 

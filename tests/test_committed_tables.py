@@ -1,27 +1,30 @@
 """The committed tables: tolerance, bounds, seams, monotony and slopes against fresh solves and the reference."""
 
 import math
-import pickle
 import threading
 
 import numpy as np
 import pytest
 
 from builder.assemble import ABS_TO_REL, build_table
+from builder.measure import SOLVER_NOISE, STICK_NOISE, power_noise
 from builder.sweep import Sweep
-from builder.verify import (
-    CASES,
-    SOLVER_NOISE,
-    STICK_NOISE,
-    draw,
-    monotony,
-    power_noise,
-    seam_jumps,
-    seam_slope_jumps,
+from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps
+from mumacro import InputError, Surrogate, TableError
+from mumacro.charts import (
+    CONTINUOUS,
+    REGIME_OF_SOURCE,
+    REGIMES,
+    SOURCES,
+    Y_CONT,
+    Y_HIGH,
+    Y_MID,
+    Y_STICK_LO,
+    Y_TAIL,
 )
-from friction import InputError, Surrogate, TableError
-from friction.regions import REGIMES, SOURCES, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
-from friction.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP, REGIME_OF_SOURCE
+from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
+
+pytestmark = pytest.mark.slow
 
 TOLERANCES = ("1e-4", "1e-7", "1e-10", "1e-12")
 
@@ -159,7 +162,7 @@ def test_gradient_is_the_slope_of_the_answer(fine):
         assert found.gradient[name] == pytest.approx((up - down) / (2 * h), rel=1e-6, abs=1e-12)
     columns = fine.evaluate(**{**base, "v0": np.array([0.01, 0.1])}, gradient=True)
     assert columns.gradient["y0"][0] == found.gradient["y0"]
-    assert "k" not in fine.evaluate(**{**base, "k": None}, gradient=True).gradient
+    assert fine.evaluate(**{**base, "k": None}, gradient=True).gradient["k"] == 0.0
 
 
 def test_gradient_at_the_edges(fine):
@@ -187,12 +190,13 @@ def inside(table, sweep, v, y):
     power, of_power = table.power_with_bound(v, y)
     stick, of_stick = table.stick_fraction_with_bound(v, y)
     source = table.ratio_with_bound(v, y)[2]
-    noise = power_noise(v, y, solved["power"], REGIME_OF_SOURCE[source])
+    noise = power_noise(v, y, solved["power"], REGIME_OF_SOURCE[source] == CONTINUOUS)
     assert np.all(np.abs(power - solved["power"]) <= of_power + noise)
     assert np.all(np.abs(stick - solved["stick_fraction"]) <= of_stick + STICK_NOISE)
     return of_power / power, of_stick
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [name for name, _, _ in CASES])
 def test_fresh_solves_lie_within_the_bounds_of_power_and_stick_fraction(table, sweep, case):
     v, y = draw(case, 4000, table, seed=78)
@@ -275,18 +279,6 @@ def test_illegal_points(fine):
         fine.mu_ratio(-1.0, 1.0)
     with pytest.raises(InputError, match="y_tilde"):
         fine.mu_ratio(1.0, math.inf)
-    with pytest.raises(InputError, match=r"Fz must be finite and > 0, got 0\.0"):
-        fine.evaluate(0.3, 0.0, 1e6, 1e-6, 1.0, 1.0)
-    with pytest.raises(InputError, match=r"y0 at index 1 must be finite and >= 0, got nan"):
-        fine.evaluate(0.3, 1.0, 1e6, np.array([0.0, math.nan]), 1.0, 1.0)
-    with pytest.raises(InputError, match="broadcast"):
-        fine.evaluate(0.3, np.ones(2), 1e6, np.ones(3), 1.0, 1.0)
-
-
-def test_pickles_by_path_and_checksum(fine):
-    data = pickle.dumps(fine)
-    assert len(data) < 500
-    assert pickle.loads(data).mu_ratio(0.1, 0.5) == fine.mu_ratio(0.1, 0.5)  # noqa: S301 (its own bytes)
 
 
 def test_threads_may_share_one_table(fine):
@@ -300,6 +292,7 @@ def test_threads_may_share_one_table(fine):
     assert all(np.array_equal(found[i], expected) for i in range(8))
 
 
+@pytest.mark.slow
 def test_the_smallest_table_is_what_the_builder_makes(repository, tmp_path):
     committed = Surrogate.open(repository / "tables" / "mumacro-1e-4.nc")
     with Sweep(workers=2) as sweep:

@@ -15,8 +15,8 @@ from scipy.io import loadmat
 
 from builder import export
 from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table, long_columns
-from friction.errors import TableError
-from friction.table import read_table
+from mumacro.errors import TableError
+from mumacro.table import read_table
 
 
 @pytest.fixture(scope="module")

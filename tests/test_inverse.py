@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from friction import InputError
-from friction.inverse import border_crossings, solve_for
-from friction.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
-from friction.nondim import FIELDS
+from mumacro import InputError
+from mumacro.dimensional import FIELDS
+from mumacro.inverse import border_crossings, solve_for
+from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 

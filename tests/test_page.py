@@ -58,7 +58,7 @@ def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path, problem)
     from service.app import create_app
     from service.settings import Settings
 
-    with TestClient(create_app(Settings(tables=(tmp_path,)))) as client:
+    with TestClient(create_app(Settings(tables=(tmp_path,)), wait=True)) as client:
         assert client.get("/").status_code == 200
         problem(client.get("/static/page/map.json"), 503)
 
@@ -387,7 +387,7 @@ def test_the_page_is_open_where_the_numbers_are_not(tables_dir, problem):
     from service.routes import docs, page
     from service.settings import Settings
 
-    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="sesame"))) as client:
+    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="sesame"), wait=True)) as client:
         for path in page.OPEN_PATHS | docs.OPEN_PATHS:
             assert client.get(path).status_code == 200, path
         for path in ("/static/page/map.json", "/v1/mu-macro", "/openapi.json", "/v1/law.csv", "/Info", "/static/page/"):

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from builder.steady import border, solve
-from friction import Surrogate
+from mumacro import Surrogate
+from mumacro.charts import QUANTITIES
 
 POINTS = [(0.1, 0.5), (2.0, 1.0), (1e-6, 1.0), (0.05, 3.0), (30.0, 400.0), (1e-9, 0.3), (300.0, 200.0)]
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -18,7 +19,8 @@ SCRIPT = """
 import json, sys, numba
 from builder.model import slip
 from builder.steady import border, solve
-from friction import Surrogate
+from mumacro import Surrogate
+from mumacro.charts import QUANTITIES
 points, case, table = json.load(sys.stdin)
 assert numba.config.DISABLE_JIT
 assert not hasattr(slip, "py_func")
@@ -31,12 +33,14 @@ print(json.dumps({
     "scalar": [float(s.mu_ratio(*p)) for p in points],
     "array": s.mu_ratio(v, y).tolist(),
     "bound": s.ratio_with_bound(v, y)[1].tolist(),
-    "slopes": [x.tolist() for x in s.slopes(v, y)],
+    "slopes": [x.tolist() for of in QUANTITIES for x in s.slopes(v, y, of, bounds=True)],
     "power": s.power(v, y).tolist(),
     "stick": s.stick_fraction(v, y).tolist(),
     "crit": s.v_tilde_crit(y).tolist(),
     "macro": float(answer.mu_macro),
     "gradient": answer.gradient,
+    "gradient_bound": answer.gradient_bound,
+    "certain": answer.regime_certain,
 }))
 """
 
@@ -69,8 +73,12 @@ def test_plain_python_says_what_the_compiled_code_says(repository: Path) -> None
         "crit": s.v_tilde_crit(y),
     }.items():
         assert plain[name] == pytest.approx(expected.tolist(), rel=1e-13, abs=1e-15), name
-    for one, two in zip(plain["slopes"], s.slopes(v, y), strict=True):
-        assert one == pytest.approx(two.tolist(), rel=1e-9, abs=1e-12)
+    for one, two in zip(
+        plain["slopes"], (x for of in QUANTITIES for x in s.slopes(v, y, of, bounds=True)), strict=True
+    ):
+        assert one == pytest.approx(two.tolist(), rel=1e-7, abs=1e-12)
     answer = s.evaluate(**CASE, gradient=True)
     assert plain["macro"] == pytest.approx(answer.mu_macro, rel=1e-14)
     assert plain["gradient"] == pytest.approx(answer.gradient, rel=1e-9)
+    assert plain["gradient_bound"] == pytest.approx(answer.gradient_bound, rel=1e-6)
+    assert plain["certain"] is answer.regime_certain is True

@@ -1,9 +1,6 @@
 """Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, limits of size."""
 
-import asyncio
 import json
-import math
-import threading
 
 import numpy as np
 import pytest
@@ -12,9 +9,6 @@ from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
 from service.app import create_app
-from service.errors import SlowClientError
-from service.routes.batch import BatchEndpoint
-from service.sending import Budget
 from service.settings import Settings
 
 PATH = "/v1/mu-macro/batch"
@@ -29,10 +23,10 @@ rows_of_cases = st.lists(
             "mu0": positive,
             "Fz": positive,
             "y0": st.just(0.0) | positive,
+            "k": positive | st.none(),
             "omega": positive,
             "v0": st.just(0.0) | positive,
-        },
-        optional={"k": positive | st.none()},
+        }
     ),
     max_size=12,
 )
@@ -107,9 +101,10 @@ def test_a_bad_case_spoils_only_itself_in_rows(client, case):
     ]
     answer = client.post(PATH, json=rows).json()
     assert answer.keys() == {"results", *END}
-    assert [result is None for result in answer["results"]] == [False, *[True] * 7, False]
+    assert [result is None for result in answer["results"]] == [False, *[True] * 8]
     found = [(error["index"], error["field"]) for error in answer["errors"]]
-    assert found == [(1, "mu0"), (2, None), (3, "Fz"), (4, "speed"), (5, "v0"), (6, None), (7, "include")]
+    fields = [(1, "mu0"), (2, None), (3, "Fz"), (4, "speed"), (5, "v0"), (6, None), (7, "include"), (8, "k")]
+    assert found == fields
     single = client.post("/v1/mu-macro", json=case).json()
     assert answer["results"][0]["mu_macro"] == pytest.approx(single["mu_macro"], rel=1e-13)
 
@@ -167,7 +162,7 @@ def test_what_is_no_json_is_malformed(client, problem, body):
 
 
 def test_other_media_types_are_refused(client, problem):
-    problem(client.post(PATH, content="mu0,Fz", headers={"Content-Type": "text/csv"}), 415)
+    problem(client.post(PATH, content="mu0,Fz", headers={"Content-Type": "text/html"}), 415)
 
 
 def test_an_empty_batch_has_an_empty_answer(client, case):
@@ -209,114 +204,37 @@ def test_a_large_batch_keeps_its_order(client, case, surrogate):
 
 
 def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
-    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3))) as client:
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3), wait=True)) as client:
         assert client.post(PATH, json={**case, "v0": [0.1] * 3}).status_code == 200
         for body in ({**case, "v0": [0.1] * 4}, [case] * 4, [None] * 400):
             assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
 
 
-class Holder:
-    """Somebody who holds a place."""
-
-    def __init__(self, rate, is_slow):
-        self.rate, self.is_slow, self.left = (lambda: rate), is_slow, False
-
-    def give_way(self):
-        self.left = True
-
-
 def test_one_batch_too_many_is_turned_away_before_it_is_read(tables_dir, case, problem):
-    app = create_app(Settings(tables=(tables_dir,), max_batches=2))
+    app = create_app(Settings(tables=(tables_dir,), max_batches=2), wait=True)
     with TestClient(app) as client:
-        holders = app.state.batches.holders
-        holders |= {Holder(math.inf, is_slow=False), Holder(70_000.0, is_slow=False)}
+        app.state.work.used = 2
 
         def pieces():
-            yield json.dumps({**case, "v0": [0.1] * 10_000}).encode()
+            yield json.dumps({**case, "v0": [0.1] * 20_000}).encode()
 
         response = client.post(PATH, content=b" " * 70_000)
         problem(response, 503)
         assert response.headers["retry-after"] == "1"
         problem(client.post(PATH, content=pieces()), 503)
         assert client.post(PATH, json=[case]).status_code == 200  # a small one takes no place
-        holders.clear()
+        app.state.work.used = 0
         assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
-        assert not holders
+        assert app.state.work.used == 0
 
 
-def test_the_slowest_gives_way_if_it_is_slow(tables_dir, case):
-    app = create_app(Settings(tables=(tables_dir,), max_batches=3))
+def test_a_small_text_that_asks_for_much_takes_a_place(tables_dir, case, problem):
+    app = create_app(Settings(tables=(tables_dir,), max_batches=1), wait=True)
+    body = {**case, "v0": [1] * 25_000, "include": ["limits", "gradient", "stick_fraction", "power", "groups"]}
     with TestClient(app) as client:
-        busy, slow, slower = Holder(math.inf, is_slow=False), Holder(2.0, is_slow=True), Holder(1.0, is_slow=True)
-        holders = app.state.batches.holders
-        holders |= {busy, slow, slower}
-        assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
-        assert holders == {busy, slow}
-        assert (busy.left, slow.left, slower.left) == (False, False, True)
-
-
-def test_free_memory_is_handed_back_when_no_large_batch_is_left(tables_dir, case, monkeypatch):
-    trimmed = threading.Event()
-    app = create_app(Settings(tables=(tables_dir,)))
-    trim = BatchEndpoint._trim
-
-    def noted(endpoint):  # those of other tests may still have something to hand back
-        trim(endpoint)
-        if endpoint is app.state.batches:
-            trimmed.set()
-
-    monkeypatch.setattr(BatchEndpoint, "_trim", noted)
-    monkeypatch.setattr("service.routes.batch._QUIET_S", 0.0)
-    with TestClient(app) as client:
-        assert client.post(PATH, json=[case]).status_code == 200
-        assert not trimmed.is_set()
-        assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
-        assert trimmed.wait(60)
-
-
-def test_a_rate_is_that_of_the_time_waited_for_the_caller(monkeypatch):
-    async def run():
-        loop = asyncio.get_running_loop()
-        now = loop.time()
-        monkeypatch.setattr(loop, "time", lambda: now)
-        budget = Budget(Settings(least_rate=1000))
-        assert budget.rate() == math.inf  # the move is ours
-        move = loop.create_future()
-        waiting = asyncio.create_task(budget.client(move))
-        await asyncio.sleep(0)
-        budget.note(3000)
-        assert budget.rate() == math.inf  # not for long
-        now += 2.0
-        assert (budget.rate(), budget.is_slow) == (1500.0, False)
-        now += 2.0
-        assert (budget.rate(), budget.is_slow) == (750.0, True)
-        move.set_result("made")
-        assert await waiting == "made"
-        now += 100.0
-        assert (budget.rate(), budget.is_slow) == (math.inf, False)
-        waiting = asyncio.create_task(budget.client(loop.create_future()))
-        await asyncio.sleep(0)
-        assert budget.rate() == 750.0  # a hundred seconds of work were not the caller's
-        budget.give_way()
-        with pytest.raises(SlowClientError, match="gives way"):
-            await waiting
-
-    asyncio.run(run())
-
-
-def test_who_gave_way_does_not_go_on_though_the_move_was_made():
-    async def run():
-        loop = asyncio.get_running_loop()
-        budget = Budget(Settings())
-        move = loop.create_future()
-        waiting = asyncio.create_task(budget.client(move))
-        await asyncio.sleep(0)
-        move.set_result("made")
-        budget.give_way()
-        with pytest.raises(SlowClientError):
-            await waiting
-
-    asyncio.run(run())
+        assert len(json.dumps(body, separators=(",", ":"))) < 64 * 1024
+        app.state.work.used = 1
+        problem(client.post(PATH, content=json.dumps(body, separators=(",", ":"))), 503)
 
 
 @pytest.mark.parametrize("n", [1, 7, 300, 4096, 4097])
@@ -332,3 +250,30 @@ def test_plain_columns_get_the_same_bytes_the_short_way(client, case, n):
     answer = client.post(PATH, json=spoilt).json()
     assert (answer["n_errors"], answer["errors"][0]["index"]) == (1, n - 1)
     assert answer["mu_macro"][:-1] == short.json()["mu_macro"][:-1]
+
+
+def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_name_in_every_form(client, case):
+    del case["omega"]
+    case["f"] = 1.7e308
+    ordinary = {**case, "f": 1.0}
+    single = client.post("/v1/mu-macro", json=case)
+    assert single.status_code == 422
+    assert single.json()["errors"][0]["field"] == "f"
+    assert client.get("/v1/mu-macro", params=case).json()["errors"][0]["field"] == "f"
+    for body in ([case, ordinary], {**case, "f": [1.7e308, 1.0]}):
+        answer = client.post("/v1/mu-macro/batch", json=body).json()
+        assert [(error["index"], error["field"]) for error in answer["errors"]] == [(0, "f")]
+    scalars = client.post("/v1/mu-macro/batch", json={**case, "v0": [0.01, 0.1]})
+    assert scalars.status_code == 422
+    assert scalars.json()["errors"][0]["field"] == "f"
+    line = client.post("/v1/mu-macro/batch", content=json.dumps(case), headers={"content-type": "application/x-ndjson"})
+    assert json.loads(line.text)["errors"][0]["field"] == "f"
+    table = ",".join(case) + "\n" + ",".join(map(repr, case.values())) + "\n"
+    cells = client.post("/v1/mu-macro/batch", content=table, headers={"content-type": "text/csv"})
+    assert "f: must be finite" in cells.text
+    held = {name: value for name, value in case.items() if name != "v0"}
+    for path, asked in (
+        ("law", {"along": "v0", "start": 0.1, "stop": 1.0}),
+        ("solve-for", {"unknown": "v0", "target": 0.1}),
+    ):
+        assert client.post(f"/v1/{path}", json={**held, **asked}).json()["errors"][0]["field"] == "f"

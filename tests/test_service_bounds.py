@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 BATCH = "/v1/mu-macro/batch"
 LIMIT_S = 2  # of the client's moves, in these tests
 PATIENCE_S = 60  # until a test that waits for something gives up
@@ -330,45 +332,6 @@ def test_a_third_batch_is_turned_away_unread(server, case):
     assert server.ask("POST", BATCH, json.dumps([case]), {"Content-Type": "application/json"})[0] == 200
     for raw in held:
         raw.close()
-
-
-def ask_for_a_place(server, case):
-    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 20_001)]})
-    return server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0]
-
-
-@pytest.mark.parametrize("length", [5_000_000, None])
-@pytest.mark.parametrize("kind", ["application/json", "application/x-ndjson"])
-def test_a_slow_caller_gives_way_to_another(serving, surrogate, case, kind, length):
-    with (
-        serving(surrogate.path, MUMACRO_MAX_BATCHES="1", MUMACRO_CLIENT_TIMEOUT_S="600") as server,
-        connect(server) as slow,
-    ):
-        line = json.dumps(case).encode() + b"\n"
-        slow.sendall(head(BATCH, length, kind) + (line if length else b"%x\r\n%b\r\n" % (len(line), line)))
-        deadline = time.monotonic() + PATIENCE_S
-        while ask_for_a_place(server, case) != 200:
-            assert time.monotonic() < deadline
-        received = read_to_end(slow)
-    if kind == "application/json":
-        assert received.startswith(b"HTTP/1.1 408")
-        assert b"application/problem+json" in received
-    else:
-        assert received.startswith(b"HTTP/1.1 200")
-        assert not received.endswith(b"0\r\n\r\n")
-
-
-@pytest.mark.parametrize(("rate", "sent"), [("0", 1), ("1", 200_000)])
-def test_a_caller_who_keeps_up_keeps_its_place(serving, surrogate, case, rate, sent):
-    body = json.dumps([case]).encode() + b" " * 400_000
-    with serving(surrogate.path, MUMACRO_MAX_BATCHES="1", MUMACRO_LEAST_RATE=rate) as server, connect(server) as raw:
-        raw.sendall(head(BATCH, len(body)) + body[:sent])
-        while ask_for_a_place(server, case) == 200:  # until the first has come in
-            pass
-        time.sleep(1.5)
-        assert ask_for_a_place(server, case) == 503
-        raw.sendall(body[sent:])
-        assert raw.recv(4096).startswith(b"HTTP/1.1 200")
 
 
 def test_a_declared_length_over_the_limit_is_a_problem_document(server):

@@ -4,11 +4,6 @@ import json
 import math
 
 import pytest
-from starlette.testclient import TestClient
-
-from friction.table import read_table, write_table
-from service.app import create_app
-from service.settings import Settings
 
 PATH = "/v1/mu-macro"
 STD = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "y0": 1e-7, "omega": 1e3, "v0": 1e-3}
@@ -138,23 +133,6 @@ def test_an_amplitude_below_double_range_leaves_the_stick_fraction_open(client, 
 def test_what_comes_with_the_companions_comes_only_if_asked_for(client, case):
     assert not {"stick_fraction", "stick_fraction_bound", "power"} & ask(client, case).keys()
     assert {"stick_fraction", "stick_fraction_bound"} <= ask(client, case, include=["stick_fraction"]).keys()
-
-
-def test_a_table_without_bounds_says_null(tables_dir, tmp_path, case):
-    table = read_table(tables_dir / "mumacro-1e-7.nc")
-    for block in table.blocks:
-        block.power_error = block.stick_error = None
-    write_table(table, tmp_path / "old.nc")
-    with TestClient(create_app(Settings(tables=(tmp_path,)))) as old:
-        answer = ask(old, case, include=["stick_fraction", "power"])
-        assert answer["stick_fraction"] > 0.0
-        assert answer["stick_fraction_bound"] is None
-        assert answer["power"]["oscillation"] > 0.0
-        assert answer["power"]["oscillation_bound"] is None
-        assert answer["power"]["saved_bound"] > 0.0
-        body = {**case, "v0": [0.01, 0.1], "include": ["stick_fraction", "power"]}
-        columns = old.post(f"{PATH}/batch", json=body).json()
-        assert columns["stick_fraction_bound"] == columns["power"]["oscillation_bound"] == [None, None]
 
 
 def test_power_and_stick_fraction_come_in_batches(client, case):

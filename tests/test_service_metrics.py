@@ -27,7 +27,7 @@ def samples(text):
 @pytest.fixture
 def fresh(tables_dir):
     """A client of an application that has counted nothing yet."""
-    with TestClient(create_app(Settings(tables=(tables_dir,)))) as started:
+    with TestClient(create_app(Settings(tables=(tables_dir,)), wait=True)) as started:
         yield started
 
 
@@ -91,7 +91,7 @@ def test_every_described_path_is_counted_by_its_name(fresh):
 
 
 def test_counters_are_described_and_under_the_key(tables_dir, problem):
-    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="k3y"))) as closed:
+    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="k3y"), wait=True)) as closed:
         problem(closed.get("/metrics"), 401)
         text = closed.get("/metrics", headers={"Authorization": "Bearer k3y"}).text
     for name in ("mumacro_requests", "mumacro_request_duration_seconds", "mumacro_cases", "mumacro_bad_cases"):

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from friction.law import APPROXIMATIONS, BORDERS
+from mumacro.law import APPROXIMATIONS, BORDERS
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 SOLVE = {"unknown": "y0", "target": 0.15, **{name: value for name, value in CASE.items() if name != "y0"}}
@@ -20,7 +20,7 @@ def law_query(**changed):
 
 def test_a_root_gives_its_target_back(client):
     answer = client.post("/v1/solve-for", json=SOLVE).json()
-    assert answer.keys() == {"unknown", "unit", "range", "reachable", "results", "table", "api_version"}
+    assert answer.keys() == {"unknown", "unit", "quantity", "range", "reachable", "results", "table", "api_version"}
     assert (answer["unknown"], answer["unit"], answer["api_version"]) == ("y0", "m", "1")
     ((root,),) = [result["roots"] for result in answer["results"]]
     assert root.keys() == {"value", "low", "high", "mu_macro", "regime"}
@@ -64,7 +64,7 @@ def test_folded_roots_are_all_returned_within_the_range(client):
 
 
 def test_a_tolerance_picks_the_table(client, app):
-    for table in app.state.shelf.tables:
+    for table in app.state.tables.loaded:
         for path, body in (("/v1/solve-for", SOLVE), ("/v1/law", LAW)):
             answer = client.post(path, json={**body, "tolerance": table.surrogate.tolerance}).json()
             assert answer["table"]["tolerance"] == table.surrogate.tolerance
@@ -179,7 +179,7 @@ def test_a_head_of_the_table_has_no_body(client):
     ("changed", "field"),
     [({"along": "x"}, "along"), ({"start": 0.0}, "start"), ({"start": 20.0}, "stop"), ({"stop": 0.0}, "stop"),
      ({"points": 1}, "points"), ({"points": 10_002}, "points"), ({"scale": "cubic"}, "scale"), ({"v0": 0.01}, "v0"),
-     ({"mu0": -1.0}, "mu0"), ({"include": ["gradient"]}, "include"), ({"extra": 1.0}, "extra")],
+     ({"mu0": -1.0}, "mu0"), ({"include": ["curvature"]}, "include"), ({"extra": 1.0}, "extra")],
 )  # fmt: skip
 def test_a_bad_law_is_refused_by_field(client, problem, changed, field):
     document = problem(client.post("/v1/law", json={**LAW, **changed}), 422)

@@ -46,7 +46,7 @@ def test_the_answer_is_the_surrogates(client, surrogate, given_case):
         assert answer[name] == finite(getattr(expected, name))
     assert (answer["regime"], answer["source"]) == (expected.regime, expected.source)
     assert 0.0 <= answer["mu_ratio"] <= 1.0
-    query = {name: repr(value) for name, value in given_case.items() if value is not None}
+    query = {name: "rigid" if value is None else repr(value) for name, value in given_case.items()}
     assert client.get(PATH, params=query).json() == answer
 
 
@@ -95,10 +95,15 @@ def test_groups_are_the_dimensionless_inputs(client, case):
     assert groups["v_tilde"] == pytest.approx(0.01 / (l0 * 1.3e5), rel=1e-14)
 
 
-def test_no_stiffness_means_rigid_contact(client, case):
+def test_rigid_contact_is_said_and_never_assumed(client, case, problem):
     null = client.post(PATH, json={**case, "k": None}).json()
+    assert client.post(PATH, json={**case, "k": "rigid"}).json() == null
+    assert client.get(PATH, params={**case, "k": "rigid"}).json() == null
     absent = {name: value for name, value in case.items() if name != "k"}
-    assert client.post(PATH, json=absent).json() == client.get(PATH, params=absent).json() == null
+    for response, word in ((client.post(PATH, json=absent), "null"), (client.get(PATH, params=absent), "rigid")):
+        (fault,) = problem(response, 422)["errors"]
+        assert (fault["field"], word in fault["reason"]) == ("k", True)
+    absent["k"] = None
     stiff = client.post(PATH, json={**case, "k": 1e18}).json()
     assert stiff["mu_macro"] == pytest.approx(null["mu_macro"], rel=1e-5)
     limits = client.post(PATH, json={**absent, "include": ["limits"]}).json()["limits"]
@@ -177,7 +182,8 @@ def test_zero_is_out_of_bounds_where_it_divides(client, case, problem, name):
 @pytest.mark.parametrize("name", ["mu0", "k", "v0", "tolerance"])
 def test_json_numbers_are_strict(client, case, problem, name, value):
     (fault,) = problem(client.post(PATH, json={**case, name: value}), 422)["errors"]
-    assert (fault["field"], fault["reason"]) == (name, "must be a number")
+    assert fault["field"] == name
+    assert fault["reason"].startswith("must be a number")
 
 
 @pytest.mark.parametrize("text", ["abc", "", " ", "1_000", "0x10", "１", "1e", "1,5", "--1", "1 2", "null"])
@@ -195,15 +201,65 @@ def test_an_unescaped_plus_of_an_exponent_is_understood(client, case):
 def test_all_faults_are_reported_at_once(client, problem):
     body = {"mu0": -1, "Fz": "10", "amplitude": 3, "omega": None}
     faults = problem(client.post(PATH, json=body), 422)["errors"]
-    assert {fault["field"] for fault in faults} == {"mu0", "Fz", "y0", "omega", "v0", "amplitude"}
+    assert {fault["field"] for fault in faults} == {"mu0", "Fz", "k", "y0", "omega", "v0", "amplitude"}
     faults = problem(client.get(PATH, params=body), 422)["errors"]
-    assert {fault["field"] for fault in faults} == {"mu0", "y0", "omega", "v0", "amplitude"}
+    assert {fault["field"] for fault in faults} == {"mu0", "k", "y0", "omega", "v0", "amplitude"}
+
+
+def test_a_frequency_is_given_once_in_either_unit(client, case, problem):
+    by_omega = client.post(PATH, json=case).json()
+    named = {name: value for name, value in case.items() if name != "omega"}
+    f = case["omega"] / (2 * math.pi)
+    assert client.post(PATH, json={**named, "f": f}).json()["mu_macro"] == pytest.approx(
+        by_omega["mu_macro"], rel=1e-13
+    )
+    assert client.get(PATH, params={**named, "f": f}).json() == client.post(PATH, json={**named, "f": f}).json()
+    for sender in ({"json": named}, {"json": {**case, "f": f}}):
+        assert "omega" in problem(client.post(PATH, **sender), 422)["errors"][0]["reason"]
+
+
+@pytest.mark.parametrize(
+    ("change", "advice"),
+    [({"y0": "2um"}, "give metres, 2e-06"), ({"v0": "5 mm/s"}, "give metres per second, 0.005"), ({"K": 1}, "mean k?"),
+     ({"stiffness": 1}, "mean k?"), ({"frequency": 1}, "mean f?"), ({"k": ""}, "rigid"), ({"v0": "0,01"}, "0.01")],
+)  # fmt: skip
+def test_a_refusal_says_what_was_meant(client, case, problem, change, advice):
+    (fault,) = problem(client.get(PATH, params={**case, **change}), 422)["errors"]
+    assert advice in fault["reason"]
+
+
+def test_one_value_is_had_as_text(client, case, problem):
+    answer = client.post(PATH, json={**case, "include": ["power"]}).json()
+    plain = client.get(PATH, params=case, headers={"Accept": "text/plain"})
+    assert (float(plain.text), plain.headers["content-type"]) == (answer["mu_macro"], "text/plain; charset=utf-8")
+    assert float(client.get(f"{PATH}.txt", params=case).text) == answer["mu_macro"]
+    asked = {**case, "include": "power", "value": "power.saved"}
+    assert float(client.get(f"{PATH}.txt", params=asked).text) == answer["power"]["saved"]
+    assert client.get(f"{PATH}.txt", params={**case, "value": "regime"}).text == "stick_slip"
+    (fault,) = problem(client.get(f"{PATH}.txt", params={**case, "value": "power"}), 422)["errors"]
+    assert fault["parameter"] == "value"
+
+
+def test_most_cases_take_the_short_way(client, app, case):
+    def short():
+        layer = app.middleware_stack
+        while type(layer).__name__ != "SingleCase":
+            layer = layer.app
+        return layer.answered
+
+    before = short()
+    assert client.post(PATH, json=case).status_code == 200
+    assert client.get(PATH, params=case).status_code == 200
+    assert client.post(PATH, json={**case, "k": None, "include": ["groups"]}).status_code == 200
+    assert short() == before + 3
+    assert client.post(PATH, json={**case, "v0": -1}).status_code == 422
+    assert short() == before + 3
 
 
 def test_unknown_and_repeated_fields_are_refused(client, case, problem):
     (fault,) = problem(client.post(PATH, json={**case, "f/~z": 1}), 422)["errors"]
     assert fault["pointer"] == "#/f~1~0z"
-    assert "mu0, Fz, k, y0, omega, v0, include, tolerance, std" in fault["reason"]
+    assert "mu0, Fz, k, y0, omega, f, v0, include, tolerance, std" in fault["reason"]
     (fault,) = problem(client.get(PATH, params={**case, "fz": 1}), 422)["errors"]
     assert fault["parameter"] == "fz"
     (fault,) = problem(client.get(PATH, params=[*case.items(), ("v0", 1)]), 422)["errors"]
@@ -216,7 +272,7 @@ def test_unknown_and_repeated_fields_are_refused(client, case, problem):
 def test_the_list_of_faults_is_bounded(client, problem):
     document = problem(client.post(PATH, json={f"x{i}": i for i in range(5000)}), 422)
     assert len(document["errors"]) == 100
-    assert document["n_errors"] == 5005
+    assert document["n_errors"] == 5006
 
 
 @pytest.mark.parametrize("body", ["[]", "3", "null", '"text"', "[1, 2]"])
@@ -225,14 +281,14 @@ def test_json_that_is_no_object_is_refused(client, problem, body):
     assert (fault["pointer"], fault["reason"]) == ("#", "must be a JSON object")
 
 
-@pytest.mark.parametrize("body", [b"", b" ", b"{", b"{'mu0': 1}", b"\xff\xfe", b"{} {}", b"[" * 100_000, b"nonsense"])
+@pytest.mark.parametrize("body", [b"", b" ", b"{", b"{'mu0': 1}", b"\xff\xfe", b"{} {}", b"[" * 50_000, b"nonsense"])
 def test_what_is_no_json_is_malformed(client, problem, body):
     problem(client.post(PATH, content=body), 400)
 
 
-def test_an_integer_that_no_parser_holds_is_out_of_range(client, case, problem):
+def test_an_integer_that_no_parser_holds_is_malformed(client, case, problem):
     body = json.dumps({**case, "v0": "@"}).replace('"@"', "1" + "0" * 5000)
-    problem(client.post(PATH, content=body), 422)
+    problem(client.post(PATH, content=body), 400)
 
 
 @pytest.mark.parametrize(
@@ -302,3 +358,10 @@ def test_the_tag_follows_the_question_not_its_spelling(client, case):
 def test_head_is_get_without_the_body(client, case):
     head, get = client.head(PATH, params=case), client.get(PATH, params=case)
     assert (head.status_code, head.headers["etag"]) == (200, get.headers["etag"])
+
+
+def test_two_frequencies_in_the_case_and_in_its_deviations_are_both_told(client, case, problem):
+    body = {**case, "f": 1.0, "include": ["std"], "std": {"omega": 1.0, "f": 1.0}}
+    faults = problem(client.post(PATH, json=body), 422)["errors"]
+    assert len(faults) == 2
+    assert all("not of both" in fault["reason"] or "exactly one" in fault["reason"] for fault in faults)

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from service.schemas import INCLUDES
 
+pytestmark = pytest.mark.slow
+
 FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0", "include", "tolerance", "std")
 POST_PATHS = ("/v1/mu-macro", "/v1/mu-macro/batch")
 

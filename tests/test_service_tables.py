@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import pytest
 from starlette.testclient import TestClient
 
-from friction import TableError
+from mumacro import TableError
 from service.app import create_app
 from service.errors import InvalidFieldsError, NotReadyError
 from service.settings import Settings
-from service.shelf import LoadedTable, Shelf, table_files
+from service.tables import LoadedTable, Tables, table_files
 
 HEALTH = ("/readyz", "/healthz")
 
@@ -23,7 +23,7 @@ def table_copy(surrogate, tmp_path):
 
 
 def started(*paths):
-    return TestClient(create_app(Settings(tables=paths)))
+    return TestClient(create_app(Settings(tables=paths), wait=True))
 
 
 def test_the_table_describes_itself(client, surrogate):
@@ -139,7 +139,7 @@ def test_a_file_that_goes_or_changes_after_loading_is_noticed(table_copy, case, 
 
 
 def test_before_the_start_nothing_is_ready(tables_dir, case, problem):
-    client = TestClient(create_app(Settings(tables=(tables_dir,))))
+    client = TestClient(create_app(Settings(tables=(tables_dir,)), wait=True))
     problem(client.get("/readyz"), 503)
     problem(client.post("/v1/mu-macro", json=case), 503)
 
@@ -157,7 +157,7 @@ def test_an_error_nobody_foresaw_while_loading_is_not_told(surrogate, problem, m
     def broken(_self):
         raise RuntimeError("secret")
 
-    monkeypatch.setattr(type(surrogate), "warm_up", broken)
+    monkeypatch.setattr("service.kernel.Kernel.warm_up", broken)
     with started(surrogate.path) as client:
         assert "secret" not in problem(client.get("/readyz"), 503)["detail"]
 
@@ -184,29 +184,29 @@ def test_two_tables_of_one_name_are_refused(tmp_path, table_copy, surrogate, pro
 
 
 @pytest.fixture
-def shelf():
+def tables():
     """Three tables: the tighter the larger, and one that is tight and small."""
 
     def table(name, tolerance, size):
-        return LoadedTable(SimpleNamespace(id=name, tolerance=tolerance), (size, 0, 0))
+        return LoadedTable(SimpleNamespace(id=name, tolerance=tolerance), None, (size, 0, 0))
 
-    filled = Shelf(())
-    filled.tables = (table("c", 1e-12, 9000), table("b", 1e-10, 100), table("a", 1e-8, 500))
-    filled.fault = None
+    filled = Tables(())
+    filled.loaded = (table("c", 1e-12, 9000), table("b", 1e-10, 100), table("a", 1e-8, 500))
+    filled.fault, filled.ready = None, True
     return filled
 
 
 @pytest.mark.parametrize(("tolerance", "name"), [(None, "c"), (1e-12, "c"), (9e-11, "c"), (1e-10, "b"), (1, "b")])
-def test_the_smallest_table_that_is_tight_enough_is_picked(shelf, tolerance, name):
-    assert shelf.pick(tolerance).surrogate.id == name
+def test_the_smallest_table_that_is_tight_enough_is_picked(tables, tolerance, name):
+    assert tables.pick(tolerance).surrogate.id == name
 
 
-def test_no_table_is_tight_enough(shelf):
+def test_no_table_is_tight_enough(tables):
     with pytest.raises(InvalidFieldsError) as caught:
-        shelf.pick(1e-13)
+        tables.pick(1e-13)
     assert caught.value.members == {"tightest_available": 1e-12}
 
 
-def test_an_unloaded_shelf_picks_nothing():
+def test_an_unloaded_tables_picks_nothing():
     with pytest.raises(NotReadyError):
-        Shelf(()).pick()
+        Tables(()).pick()

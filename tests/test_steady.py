@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from builder import model, steady
-from builder.model import NO_SLIP, OK, slip
-from builder.steady import ADVICE, BAD_INPUT, Steady, solve, solve_raw, workspace
+from builder import model, sections, steady
+from builder.model import ANGLE, CHART, MIN_SPEED, NO_SLIP, OK, PATH, SIGMA, SUM_UX, WORK, slip
+from builder.steady import ADVICE, BAD_INPUT, solve, solve_raw, workspace
 from builder.sweep import Sweep
-from friction.tails import outer, second_order
+from mumacro.closed_forms import outer, second_order
 
 Array = NDArray[np.float64]
 
@@ -108,12 +108,12 @@ def test_naive_orbit_is_antisymmetric_about_half_a_period(v: float, y: float, na
 def test_continuous_orbit_closes_over_a_whole_period(v: float, y: float) -> None:
     w, out, _, _ = workspace()
     assert steady.continuous(v, y, w, out) == OK
-    start, chart = out[1], int(out[2])  # at sigma = pi/2 half a period has passed
+    start, chart = out[ANGLE], int(out[CHART])  # at sigma = pi/2 half a period has passed
     half_turn = chart * 0.5 * math.pi + start
     # the other half, with the shaker moving the other way, is the mirror image: start it from the mirrored angle
     assert slip(v, y, -0.5 * math.pi, 0, -start, -chart, 0.5 * math.pi, False, w, out) == OK
-    assert out[2] * 0.5 * math.pi + out[1] == pytest.approx(half_turn, abs=4e-15)
-    assert out[8] > 0.0
+    assert out[CHART] * 0.5 * math.pi + out[ANGLE] == pytest.approx(half_turn, abs=4e-15)
+    assert out[MIN_SPEED] > 0.0
 
 
 @pytest.mark.parametrize(("v", "y"), STICKING)
@@ -145,13 +145,13 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     shaker = integral(lambda s: -y * math.sin(s) * uy(s), start, stop)
     assert drive + shaker == pytest.approx(0.0, abs=1e-13 * (1.0 + y))  # the spring returns all it took
 
-    assert (stick_mean + out[4]) / math.pi == pytest.approx(res[0], abs=1e-15)
-    assert (shaker + out[7]) / math.pi == pytest.approx(res[4], abs=1e-13 * (1.0 + y))
-    assert out[6] / math.pi == pytest.approx(res[5], rel=1e-15)
+    assert (stick_mean + out[SUM_UX]) / math.pi == pytest.approx(res[steady.MU_RATIO], abs=1e-15)
+    assert (shaker + out[WORK]) / math.pi == pytest.approx(res[steady.POWER], abs=1e-13 * (1.0 + y))
+    assert out[PATH] / math.pi == pytest.approx(res[steady.SLIP_SPEED], rel=1e-15)
     # what drive and shaker put in is what friction takes out
-    assert (drive + shaker + v * out[4] + out[7]) / math.pi == pytest.approx(res[5], rel=1e-12)
+    assert (drive + shaker + v * out[SUM_UX] + out[WORK]) / math.pi == pytest.approx(res[steady.SLIP_SPEED], rel=1e-12)
     # and slip ends, mirrored, exactly where stick started
-    assert out[0] == pytest.approx(start, abs=1e-14)
+    assert out[SIGMA] == pytest.approx(start, abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -169,13 +169,13 @@ def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float]
     w, out, orbit, res = workspace()
     for vi, yi in zip(v, y, strict=True):
         assert solve_raw(vi, yi, yi - 1.0, w, out, orbit, res) == OK
-        mu, deficit, regime, stick, power, path, _, estimate = res
+        mu, deficit, regime, stick, power, path, _ = res
         assert 0.0 <= mu <= 1.0
         assert 0.0 <= deficit <= 1.0
         assert mu + deficit == pytest.approx(1.0, abs=1e-15)
         assert 0.0 <= stick <= 1.0
         assert (stick > 0.0) == (regime == steady.STICK_SLIP)
-        assert 0.0 < estimate < 1e-15
+        assert power >= 0.0
         if vi * mu > 1e-280:
             assert path > 0.0
             assert abs(vi * mu + power - path) <= 4e-15 * path
@@ -390,28 +390,7 @@ def test_illegal_inputs_are_a_status_with_advice(bad: float) -> None:
         assert "finite and > 0" in found.advice
 
 
-@pytest.mark.parametrize(
-    ("v_range", "y_range"),
-    [((1e-300, 1e8), (1e-300, 1e8)), ((1e-300, 1e-12), (1e-3, 1e8)), ((1e-8, 1e12), (1e8, 1e20))],
-)
-def test_extreme_inputs_end_in_an_answer_or_in_advice(
-    v_range: tuple[float, float], y_range: tuple[float, float]
-) -> None:
-    rng = np.random.default_rng(3)
-    for v, y in zip(log_uniform(rng, *v_range, 800), log_uniform(rng, *y_range, 800), strict=True):
-        found = solve(v, y)
-        assert isinstance(found, Steady)
-        assert found.advice == ADVICE[found.status]
-        if found.ok:
-            assert 0.0 <= found.mu_ratio <= 1.0
-            assert found.error_estimate < 1e-15
-        else:
-            # an answer that comes with a failure is no answer: the estimate says so
-            assert not found.error_estimate < 1e-9
-
-
 def test_every_status_has_advice() -> None:
-
     codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED}
     assert codes | {steady.NOT_CONVERGED, steady.BAD_INPUT} == set(ADVICE)
     assert all(ADVICE.values())
@@ -420,5 +399,5 @@ def test_every_status_has_advice() -> None:
 def test_a_stick_phase_without_end_is_told_apart() -> None:
     # slip stops with the spring nearly across: half a swing of 2 y~ = 0.4 back cannot stretch it to the limit again
     w, out, orbit, _ = workspace()
-    _, status = steady._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)
+    _, status = sections._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)
     assert status == NO_SLIP

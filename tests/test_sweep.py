@@ -93,7 +93,7 @@ def test_finished_work_is_kept_and_taken_up_again(tmp_path: Path, monkeypatch: p
             sweep.solve("continuous", v, y)
         with pytest.raises(AssertionError, match="solved again"):
             sweep.solve("full", v * (1.0 + 1e-15), y)
-        monkeypatch.setattr(module, "source_digest", lambda: "of another program")
+        monkeypatch.setattr(module, "source_digest", lambda *_: "of another program")
         with pytest.raises(AssertionError, match="solved again"):
             sweep.solve("full", v, y)
     assert all(np.array_equal(found[name], expected[name]) for name in COLUMNS)

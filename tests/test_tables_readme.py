@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from friction import Surrogate
+from mumacro import Surrogate
 
 NAMES = ("mumacro-1e-4.nc", "mumacro-1e-7.nc", "mumacro-1e-10.nc", "mumacro-1e-12.nc")
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-from friction.nondim import FIELDS
+from mumacro.dimensional import FIELDS
 from service.app import create_app
 from service.settings import Settings
 
@@ -60,7 +60,7 @@ def test_the_value_is_the_surrogates(client, surrogate):
 @pytest.mark.parametrize("model", MODELS)
 def test_all_ones_is_valid(client, surrogate, model):
     value = 1.0 if model == "mu_macro" else 10.0
-    expected = surrogate.evaluate(*[value] * 6).mu_macro
+    expected = surrogate.evaluate(dict.fromkeys(FIELDS, value)).mu_macro
     request = {"name": model, "input": [[1] * 6], "config": {}}
     assert ask(client, "Evaluate", request).json() == {"output": [[expected]]}
     assert len(ask(client, "Gradient", {**request, **WRT, "sens": [1.0]}).json()["output"]) == 6
@@ -203,24 +203,24 @@ def test_a_wrong_method_is_told_in_the_protocols_form(client, path):
 
 def test_without_a_table_the_error_is_the_protocols(tmp_path):
     (tmp_path / "damaged.nc").write_bytes(b"damaged")
-    with TestClient(create_app(Settings(tables=(tmp_path,)))) as client:
+    with TestClient(create_app(Settings(tables=(tmp_path,)), wait=True)) as client:
         message = refused(ask(client, "Evaluate", {"name": "mu_macro", "input": [POINT]}), "InvalidOutput", 500)
         assert "damaged.nc" in message
         refused(ask(client, "Evaluate", {"name": "nobody"}), "ModelNotFound")
 
 
 def test_a_body_over_the_limit_without_a_length_is_invalid_input(tables_dir):
-    with TestClient(create_app(Settings(tables=(tables_dir,), max_body_bytes=1024))) as client:
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_body_bytes=1024), wait=True)) as client:
         refused(client.post("/Evaluate", content=iter([b" " * 600] * 4)), "InvalidInput")
 
 
 def test_an_unforeseen_error_is_the_protocols_too(tables_dir):
-    app = create_app(Settings(tables=(tables_dir,)))
+    app = create_app(Settings(tables=(tables_dir,)), wait=True)
 
     def fail(*_args):
         raise RuntimeError("secret detail")
 
-    app.state.shelf.pick = fail
+    app.state.tables.pick = fail
     message = refused(ask(TestClient(app), "Evaluate", {"name": "mu_macro", "input": [POINT]}), "InvalidOutput", 500)
     assert "secret" not in message
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from builder.measure import block_errors
 from builder.sweep import Sweep
-from builder.verify import CASES, block_errors, draw, monotony, seam_jumps, verify
-from friction import Surrogate
-from friction.regions import BLOCK_INDEX, BLOCKS, NAMES, SOURCES
-from friction.table import Table, read_table
+from builder.verify import CASES, draw, monotony, seam_jumps, verify
+from mumacro import Surrogate
+from mumacro.charts import CHARTS, MU, NAMES, POWER, QUANTITIES, SOURCES, STICK
+from mumacro.table import Table, read_table
 
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-7.nc"
 
@@ -24,7 +25,7 @@ def sound() -> Surrogate:
 def damaged(block: str, factor: float) -> Surrogate:
     """The same table with one block's values multiplied by ``factor``."""
     table: Table = copy.deepcopy(read_table(TABLE))
-    table.blocks[BLOCK_INDEX[block]].values *= factor
+    table.blocks[NAMES.index(block)].values *= factor
     return Surrogate(table, TABLE)
 
 
@@ -95,26 +96,26 @@ def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
 
 def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None:
     found = block_errors(sound, sweep, 200, seed=1)
-    assert len(found) == len(BLOCKS)
-    for spec, block, errors in zip(BLOCKS, sound.table.blocks, found, strict=True):
-        assert 0.0 <= errors.quantity <= block.quantity_error, spec.name
+    assert len(found) == len(CHARTS)
+    for chart, block, errors in zip(CHARTS, sound.table.blocks, found, strict=True):
+        assert np.all(errors.errors >= 0.0)
+        assert np.all(errors.errors <= block.errors), chart.name
         assert errors.absolute <= sound.tolerance
         assert errors.relative <= 10.0 * sound.tolerance
-        assert 0.0 <= errors.power <= block.power_error, spec.name
-        assert 0.0 <= errors.stick <= (block.stick_error or 0.0), spec.name
-    wrong = damaged("corner", 1.0 + 1e-5)
-    quantity = block_errors(wrong, sweep, 200, seed=1)[BLOCK_INDEX["corner"]].quantity
-    assert quantity == pytest.approx(1e-5, rel=0.3)
+    wrong = block_errors(damaged("corner", 1.0 + 1e-5), sweep, 200, seed=1)[NAMES.index("corner")]
+    assert wrong.errors[MU, 0] == pytest.approx(1e-5, rel=0.3)
+    assert wrong.errors[MU, 1:].max() > 1e-6  # the slopes of what is off by a factor are off by the same factor
 
 
-def test_report_of_power_and_stick_fraction(sound: Surrogate, sweep: Sweep) -> None:
+def test_report_of_power_stick_fraction_and_slopes(sound: Surrogate, sweep: Sweep) -> None:
     report = verify(sound, sweep, 1000, seed=3)
-    for key, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error")):
+    for key, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error"), ("slopes", "max_abs_error")):
         part = report[key]
         assert part["not_covered"] == 0
         assert 0.0 < part[error] < 1e-5
         assert part[error] == max(source[error] for source in part["sources"].values())
-        assert set(part["sources"]) == set(report["sources"])
+        assert set(part["sources"]) == set(report["sources"]) or key == "slopes"
+    assert len(report["slopes"]["sources"]) > 8
 
 
 @pytest.mark.parametrize(
@@ -128,21 +129,25 @@ def test_report_of_power_and_stick_fraction(sound: Surrogate, sweep: Sweep) -> N
 )
 def test_companions_off_by_a_hundred_thousandth_are_found(sweep: Sweep, key: str, nodes: str, block: str) -> None:
     table: Table = copy.deepcopy(read_table(TABLE))
-    values = getattr(table.blocks[BLOCK_INDEX[block]], nodes)
+    values = getattr(table.blocks[NAMES.index(block)], nodes)
     values *= 1.0 + 1e-5
     wrong = Surrogate(table, TABLE)
     report = verify(wrong, sweep, 1000, seed=3)
     assert report["not_covered"] == 0
     assert report[key]["not_covered"] > 0
     assert [name for name, part in report[key]["sources"].items() if part["not_covered"]] == [block]
-    found = block_errors(wrong, sweep, 200, seed=1)[BLOCK_INDEX[block]]
-    assert (found.power if key == "power" else found.stick) > 1e-6
+    found = block_errors(wrong, sweep, 200, seed=1)[NAMES.index(block)]
+    assert found.errors[QUANTITIES.index(key), 0] > 1e-6
 
 
-def test_a_table_without_bounds_is_not_blamed_for_it(sweep: Sweep) -> None:
+@pytest.mark.parametrize("block", ["continuous_low", "stick_slip_mid", "stick_slip_high"])
+def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, block: str) -> None:
+    """Every second node off by half the stated error: values stay within their bound, slopes do not."""
     table: Table = copy.deepcopy(read_table(TABLE))
-    for block in table.blocks:
-        block.power_error = block.stick_error = None
-    report = verify(Surrogate(table, TABLE), sweep, 300, seed=3)
-    assert report["power"]["not_covered"] is report["stick_fraction"]["not_covered"] is None
-    assert report["power"]["max_rel_error"] > 0.0
+    part = table.blocks[NAMES.index(block)]
+    part.values += 0.25 * part.errors[MU, 0] * (-1.0) ** np.arange(part.values.shape[1])
+    wrong = Surrogate(table, TABLE)
+    found = block_errors(wrong, sweep, 200, seed=1)[NAMES.index(block)]
+    assert found.errors[MU, 1:].max() > part.errors[MU, 1:].max()
+    assert found.errors[POWER, 0] <= part.errors[POWER, 0]
+    assert found.errors[STICK, 0] <= part.errors[STICK, 0]

@@ -1,80 +1,83 @@
-"""Many cases at once: ``POST /v1/mu-macro/batch``, as JSON columns, JSON rows, NDJSON or an Arrow stream.
+"""Many cases at once: ``POST /v1/mu-macro/batch``, in every form of :mod:`service.formats`.
 
-A pure ASGI endpoint: it reads and writes the messages itself, so that an answer can begin before the last of its
-question has come, and so that no more of either is held than is being worked on.
+The form is that of the Content-Type; ``/v1/mu-macro/batch/<name>`` takes one form only, so that generated clients are
+typed.  Answers are sent piece by piece, no faster than the caller takes them.
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager, suppress
+from collections import deque
+from collections.abc import Iterator
 from functools import partial
-from importlib.util import find_spec
-from typing import TypeVar
+from typing import Annotated, Any
 
-import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends, Query
+from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
-from friction.errors import MumacroError
-from friction.regions import SOURCES
-from service.answers import Answers, answer_cases, signature
-from service.codecs import columns_text, is_rows, read_batch, row_text, rows_text, terminated
-from service.compiled.block import count_codes
-from service.compiled.digits import PADDING, Bytes
-from service.connection import FILL, PIECES
-from service.errors import (
-    BodyTooLargeError,
-    MalformedBodyError,
-    OverloadedError,
-    problem_of,
-)
-from service.intake import ARROW, JSON, NDJSON, Options, media_type, merged_options, options_from_query
-from service.memory import trim
-from service.metrics import Metrics
-from service.middleware import BATCH_PATH, COMPRESS_FROM
-from service.openapi import batch_bodies, describe_batch, option_parameters
-from service.rooms import Rooms
-from service.sending import CLOSE, Budget, Packer, gather, wants_gzip
-from service.settings import Settings
-from service.shelf import LoadedTable, Shelf
-from service.streams import Blocks, LineAnswers, Lines, Spans
-from service.wire import SMALL_BATCH
+from mumacro.errors import MumacroError
 
-__all__ = ["BatchEndpoint", "router"]
+from ..errors import BodyTooLargeError, FieldFault, MalformedBodyError, accepts, faults_of, problem_of, refusal
+from ..evaluation import Answers, answer_batch
+from ..formats import FORMATS, Format, choose
+from ..formats.columns import dump
+from ..formats.lines import LineAnswers
+from ..formats.rows import objects
+from ..guard import BATCH_PATH, CLOSE, SMALL_BODY, Work, check_media_type
+from ..metrics import Metrics
+from ..openapi import batch_operation, problems
+from ..quantities import cost_of
+from ..schemas import BatchQuery, Options
+from ..tables import LoadedTable, Tables, TablesDep, signature
+from . import once_each
+
+__all__ = ["Batches", "router"]
 
 router = APIRouter(tags=["answers"])
-T = TypeVar("T")
 
-_AT_ONCE = 256 * 1024  # bytes that are answered without a thread: it takes about a millisecond
-_FEW_LINES = 16
-_QUIET_S = 1.0  # without a large batch, before free memory is handed back
+_PIECE = 256 * 1024  # bytes of an answer that are sent at a time
+_AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are taken
+_LINES = 256 * 1024  # bytes of lines that are answered together
+_BYTES_PER_UNIT = 16  # of a body, for the time of a plain case: what reading it costs
 
 
-class BatchEndpoint:
-    """Answers batches; holds what they share: places, threads, counters."""
+class Batches:
+    """What batches share; made once an application."""
 
-    def __init__(self, shelf: Shelf, settings: Settings, metrics: Metrics) -> None:
-        self._shelf = shelf
-        self._settings = settings
-        self._metrics = metrics
-        self._threads: ThreadPoolExecutor | None = None
-        self._kinds = (JSON, NDJSON, ARROW) if find_spec("pyarrow") else (JSON, NDJSON)
-        self._arrow_known = False
-        self.rooms = Rooms(settings.max_body_bytes)
-        self._plain = Blocks(settings.max_batch)
-        self.holders: set[Budget] = set()
-        self._trimming: asyncio.TimerHandle | None = None
+    def __init__(self, tables: Tables, work: Work, metrics: Metrics, max_body_bytes: int, max_batch: int) -> None:
+        self.tables = tables
+        self.work = work
+        self.metrics = metrics
+        self.max_body_bytes = max_body_bytes
+        self.max_batch = max_batch
 
-    def start(self, threads: ThreadPoolExecutor) -> None:
-        """Take over the threads that large batches run in."""
-        self._threads = threads
+    def count(self, table: LoadedTable, answers: Answers) -> None:
+        """Count the cases of an answer."""
+        self.metrics.count_cases(table.cell, answers.source, answers.n_bad)
+
+    def too_large(self) -> BodyTooLargeError:
+        """More bytes than the settings allow."""
+        return BodyTooLargeError(
+            f"the body may have up to {self.max_body_bytes} bytes: split it, or stream it as NDJSON without a "
+            "Content-Length and read the answer while you send",
+            headers=CLOSE, max_bytes=self.max_body_bytes,
+        )  # fmt: skip
+
+
+class BatchResponse(Response):
+    """Reads the body, and answers in pieces."""
+
+    def __init__(self, request: Request, batches: Batches, chosen: Format | None, query: BatchQuery) -> None:
+        self._request = request
+        self._batches = batches
+        self._chosen = chosen
+        self._query = query
+        self._placed = False
+        self.background = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run one request."""
-        request = Request(scope)
+        """Answer, and give the place back if one was taken."""
         started = False
 
         async def send_noted(message: Message) -> None:
@@ -83,310 +86,289 @@ class BatchEndpoint:
             await send(message)
 
         try:
-            kind = media_type(request, self._kinds)
-            options = options_from_query(request)
-            budget = Budget(self._settings)
-            given = request.headers.get("content-length", "")
-            length = int(given) if given.isdigit() else -1
-            async with self._place(length, budget):
-                if kind == NDJSON:
-                    await self._stream(request, receive, send_noted, options, budget)
-                else:
-                    await self._whole(request, receive, send_noted, options, budget, kind, length)
+            known = {name: entry.media_type for entry in FORMATS for name in (entry.media_type, *entry.aliases)}
+            if self._chosen is not None:
+                known = dict.fromkeys((self._chosen.media_type, *self._chosen.aliases), self._chosen.media_type)
+            media_type = check_media_type(self._request.headers, known)
+            if any(entry.streams for entry in FORMATS if entry.media_type == media_type):
+                await self._stream(receive, send_noted, media_type)
+            else:
+                await self._whole(receive, send_noted, media_type)
         except MumacroError as error:
             if started:
                 raise ClientDisconnect from error  # nothing but the end of the connection can say it now
             await problem_of(error, scope["path"])(scope, receive, send)
-
-    @asynccontextmanager
-    async def _place(self, length: int, budget: Budget) -> AsyncIterator[None]:
-        if 0 <= length <= SMALL_BATCH:
-            yield
-            return
-        holders = self.holders
-        if len(holders) >= self._settings.max_batches:
-            slowest = min(holders, key=lambda held: held.rate())
-            if not slowest.is_slow:
-                raise OverloadedError(f"{len(holders)} large batches are being answered already", headers=CLOSE)
-            # Places are for who uses them: a few who send a byte a second would keep all others out.
-            holders.discard(slowest)
-            slowest.give_way()
-        holders.add(budget)
-        if self._trimming is not None:
-            self._trimming.cancel()
-        try:
-            yield
         finally:
-            holders.discard(budget)
-            if not holders:  # not at once: the next batch would have to ask for it again
-                self._trimming = asyncio.get_running_loop().call_later(_QUIET_S, self._trim)
+            if self._placed:
+                self._batches.work.used -= 1
 
-    def _trim(self) -> None:
-        self.rooms.empty()
-        with suppress(RuntimeError):  # the threads have been stopped
-            asyncio.get_running_loop().run_in_executor(self._threads, trim)
-
-    async def _run(self, size: int, work: Callable[[], T]) -> T:
-        """Do the work at once if it is small, else in a thread: short requests are not kept waiting behind it."""
-        if size <= _AT_ONCE or self._threads is None:
-            return work()
-        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+    def _place(self) -> None:
+        if not self._placed:
+            self._batches.work.take()
+            self._placed = True
 
     # --- bodies that are read whole -------------------------------------------------------------------
 
-    async def _whole(
-        self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget, kind: str, length: int
-    ) -> None:
-        body = await self._body(request.scope, length, receive, budget)
-        size = body.size - PADDING
-        if size == 0:
+    async def _whole(self, receive: Receive, send: Send, media_type: str) -> None:
+        text = await self._body(receive)
+        if not text:
             raise MalformedBodyError("the body is empty")
-        if kind == ARROW:
-            query, place = merged_options(query, {})
-            table = self._shelf.pick(query.tolerance, place)
-            if not self._arrow_known:
-                size += _AT_ONCE  # into a thread, where the first one loads pyarrow
-            pieces = self._arrow_pieces(body, table, query)
-        else:
-            pieces = self._pieces(body, query)
-        del body  # or it would be held until the last piece is sent
-        await self._send(request, send, kind, size, gather(pieces), budget)
+        size = len(text)
+        chosen = self._chosen or choose(media_type, memoryview(text))
+        query = self._options({}, "parameter")[0]
+        # What is read costs by its bytes, what is computed by its cases: small texts can ask for much.
+        batch, given = await self._run(partial(chosen.read, text, self._batches.max_batch), size / _BYTES_PER_UNIT)
+        options, place = self._options(given, "pointer") if given else (query, "parameter")
+        if given and self._query.given().get("tolerance") is not None:
+            place = "parameter"
+        del text
+        table = self._batches.tables.pick(options.tolerance, place)
+        include = options.names()
+        cost = batch.size * cost_of(include) * (1.0 if not include or self._batches.tables.warm else 1e9)
+        std = options.std.of_inputs() if options.std is not None else {}
+        answers = await self._run(partial(answer_batch, table, batch, include, std), cost)
+        del batch
+        self._batches.count(table, answers)
+        pieces = _gathered(chosen.write(answers, signature(table)))
+        await self._send(send, chosen.media_type, pieces, cost=size / _BYTES_PER_UNIT + cost, table=table)
 
-    async def _body(self, scope: Scope, length: int, receive: Receive, budget: Budget) -> Bytes:
-        """The body, with 0 bytes behind it.  Memory is taken as it comes in, not as it is announced."""
-        limit = self._settings.max_body_bytes
-        if length > limit:
-            raise _body_too_large(limit)
-        deadline = budget.deadline()
-        message = await self._message(receive, budget, deadline)
-        piece, more = message.get("body", b""), message.get("more_body", False)
-        if length >= 0 and len(piece) <= length:
-            text = self.rooms.take(length)
-            room = text.data
-            room[: len(piece)] = piece
-            filled = len(piece)
-            fill = scope.get("extensions", {}).get(FILL)
-            if more and fill is not None:
-                # the server below puts the rest in its place, instead of sending a message for every few kilobytes
-                if not await budget.client(fill(room, filled, budget.note), deadline):
-                    raise ClientDisconnect
-                return text
-            while more:
-                message = await self._message(receive, budget, deadline)
-                piece, more = message.get("body", b""), message.get("more_body", False)
-                room[filled : filled + len(piece)] = piece
-                filled += len(piece)
-            text[filled:] = 0
-            return text
-        body = bytearray(piece)
+    async def _run(self, work: Any, cost: float) -> Any:
+        if cost > 4000.0:
+            self._place()
+        return await self._batches.work.run(work, cost)
+
+    async def _body(self, receive: Receive) -> bytearray:
+        """The body; above 64 KiB in a place."""
+        limit, work = self._batches.max_body_bytes, self._batches.work
+        length = self._request.headers.get("content-length", "0")
+        if not length.isdigit() or len(length) > 18 or int(length) > limit:
+            raise self._batches.too_large()
+        if int(length) > SMALL_BODY:
+            self._place()
+        until = asyncio.get_running_loop().time() + self._request.app.state.settings.client_timeout_s
+        body = bytearray()
+        more = True
         while more:
-            if len(body) > limit:
-                raise _body_too_large(limit)
-            message = await self._message(receive, budget, deadline)
+            message = await work.message(receive, until)
             body += message.get("body", b"")
             more = message.get("more_body", False)
-        if len(body) > limit:
-            raise _body_too_large(limit)
-        return terminated(body)
+            if len(body) > SMALL_BODY:
+                self._place()
+            if len(body) > limit:
+                raise self._batches.too_large()
+        return body
 
-    @staticmethod
-    async def _message(receive: Receive, budget: Budget, deadline: float) -> Message:
-        message = await budget.client(receive(), deadline)
-        if message["type"] != "http.request":
-            raise ClientDisconnect
-        budget.note(len(message.get("body", b"")))
-        return message
-
-    def _pieces(self, text: Bytes, query: Options) -> Iterator[bytes]:
-        """Answer one JSON text when the first piece is asked for."""
-        block = self._block(text) if text.size <= _AT_ONCE and query == Options() else None
-        if block is not None:
-            table, answers, content = block
-            self._count(table, answers)
-            yield content
-            return
-        answered = self._answer(text, query)
-        del text
-        yield from answered
-
-    def small(self, body: bytes, most: int) -> bytes | None:
-        """Answer a small batch without options beside it, in ``most`` bytes; None where that cannot be done."""
-        text = terminated(body)
-        if text.size > self._settings.max_body_bytes + PADDING or self._shelf.fault is not None:
-            return None
+    def _options(self, given: dict[str, Any], place: str) -> tuple[Options, str]:
+        """Options of query and body together, and where they stand."""
+        query = self._query.given()
+        twice = [name for name in given if name in query]
+        if twice:
+            faults = [FieldFault(name, "is given in the query and in the body", given[name]) for name in twice]
+            raise refusal(faults)
         try:
-            table, answers, content = self._block(text) or self._small(text)
-        except MumacroError:
-            return None  # the long way will find the words for it
-        if len(content) > most:
-            return None
-        self._count(table, answers)
-        return content
-
-    def _block(self, text: Bytes) -> tuple[LoadedTable, Answers, bytes] | None:
-        """Answer plain columns of good cases, in a tenth of the time; None if it is anything else.
-
-        In the loop's thread only, which small texts never leave: the memory for it is there once.
-        """
-        size = self._plain.read(text, 0, text.size - PADDING)
-        if size <= 0:
-            return None
-        table = self._shelf.pick()
-        answers = self._plain.answer(table, size)
-        return None if answers is None else (table, answers, self._plain.text(table, answers, (0, size))[:-1])
-
-    def _small(self, text: Bytes) -> tuple[LoadedTable, Answers, bytes]:
-        table, answers, pieces = self._answered(text, Options())
-        return table, answers, b"".join(pieces)
-
-    def _arrow_pieces(self, body: Bytes, table: LoadedTable, query: Options) -> Iterator[bytes]:
-        from service.arrow import answer_arrow
-
-        self._arrow_known = True
-        yield from answer_arrow(body[: body.size - PADDING], table, query, self._settings.max_batch, self._count)
-
-    def _answer(self, text: Bytes, query: Options, *, line: bool = False) -> Iterator[bytes]:
-        """Answer and count one JSON text, which ends in 0 bytes; what is returned writes it, piece by piece."""
-        table, answers, pieces = self._answered(text, query, line=line)
-        self._count(table, answers)
-        return pieces
-
-    def _answered(
-        self, text: Bytes, query: Options, *, line: bool = False
-    ) -> tuple[LoadedTable, Answers, Iterator[bytes]]:
-        rows = is_rows(text)
-        cases, given = read_batch(text, self._settings.max_batch)
-        options, place = merged_options(query, given)
-        table = self._shelf.pick(options.tolerance, place)
-        answers = answer_cases(table, cases, options.include, options.std)
-        write = row_text if line and not rows and not cases.listed else rows_text if rows else columns_text
-        return table, answers, write(answers, signature(table))
-
-    def _count(self, table: LoadedTable, answers: Answers, n_bad: int | None = None) -> None:
-        by_source = np.zeros(len(SOURCES) + 1, dtype=np.int64)
-        count_codes(answers.source, by_source)
-        self._metrics.count_cases(
-            table.metrics_place, by_source[:-1].tolist(), answers.n_bad if n_bad is None else n_bad
-        )
+            return Options.model_validate({**query, **given}), place
+        except ValidationError as error:
+            faults = faults_of(error.errors(include_url=False), place, tuple(Options.model_fields))
+            raise refusal(faults) from None
 
     async def _send(
-        self, request: Request, send: Send, kind: str, size: int, pieces: Iterator[bytes], budget: Budget
+        self, send: Send, media_type: str, pieces: Iterator[bytes], *, cost: float, table: LoadedTable
     ) -> None:
-        """Send the pieces, no faster than the caller takes them."""
-        packer: Packer | None = None
-        started = False
-        async for piece, last in self._each(size, pieces):
-            if not started:
-                started = True
-                headers = [(b"content-type", kind.encode("ascii"))]
-                if len(piece) >= COMPRESS_FROM and wants_gzip(request.headers.get("accept-encoding", "")):
-                    packer = Packer()
-                    headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
-                elif last:
-                    headers.append((b"content-length", b"%d" % len(piece)))
-                await send({"type": "http.response.start", "status": 200, "headers": headers})
-            if packer is not None:
-                piece = await self._run(len(piece), partial(packer.pack, piece, last=last))
-            budget.note(len(piece))
-            await budget.client(send({"type": "http.response.body", "body": piece, "more_body": not last}))
-
-    async def _each(self, size: int, pieces: Iterator[bytes]) -> AsyncIterator[tuple[bytes, bool]]:
-        """The pieces, each with whether it is the last; a thread is asked once for the first two."""
-        piece, following = await self._run(size, lambda: (next(pieces, None), next(pieces, None)))
-        while piece is not None:
-            yield piece, following is None
-            piece = following
-            if piece is not None:
-                following = await self._run(size, lambda: next(pieces, None))
+        """Send the pieces; the size is told where there is only one."""
+        work = self._batches.work
+        piece, following = await work.run(lambda: (next(pieces, b""), next(pieces, None)), cost)
+        headers = [(b"content-type", media_type.encode("ascii")), (b"x-table", table.surrogate.id.encode("latin-1"))]
+        if following is None:
+            headers.append((b"content-length", b"%d" % len(piece)))
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        while following is not None:
+            await work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+            piece, following = following, await work.run(lambda: next(pieces, None), cost)
+        await work.client(send({"type": "http.response.body", "body": piece, "more_body": False}))
 
     # --- streams --------------------------------------------------------------------------------------
 
-    async def _stream(self, request: Request, receive: Receive, send: Send, query: Options, budget: Budget) -> None:
+    async def _stream(self, receive: Receive, send: Send, media_type: str) -> None:
         """Answer line by line, each as soon as it is there: what is held does not grow with the stream."""
-        answer = partial(self._answer, query=query, line=True)
-        answers = LineAnswers(self._shelf, query, self._settings.max_batch, answer, self._count)  # or an error, by now
-        headers = [(b"content-type", NDJSON.encode("ascii"))]
-        packer = Packer() if wants_gzip(request.headers.get("accept-encoding", "")) else None
-        if packer is not None:
-            headers += [(b"content-encoding", b"gzip"), (b"vary", b"accept-encoding")]
-        # Who asks whether to go on sends nothing until the server says so, which it does when it is to receive; others
-        # may send nothing until they see that the answer begins.
-        first = await self._message(receive, budget, budget.deadline()) if "expect" in request.headers else None
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        async for lines, spans, number in self._lines(request.scope, receive, budget, first):
-            # Lines that are not plain are answered one by one, so many of them take longer than their bytes say.
-            size = max(end - start for start, end in spans) if len(spans) <= _FEW_LINES else _AT_ONCE + 1
-            async for piece, _ in self._each(size, gather(answers.pieces(lines, spans, number))):
-                if packer is not None:
-                    piece = await self._run(len(piece), partial(packer.pack, piece, flush=True))
-                budget.note(len(piece))
-                await budget.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
-        end = b"" if packer is None else packer.pack(b"", last=True)
-        await budget.client(send({"type": "http.response.body", "body": end, "more_body": False}))
+        batches, work = self._batches, self._batches.work
+        length = self._request.headers.get("content-length")
+        if length is not None and (not length.isdigit() or len(length) > 18 or int(length) > batches.max_body_bytes):
+            raise batches.too_large()
+        options, place = self._options({}, "parameter")
+        table = batches.tables.pick(options.tolerance, place)
+        std = options.std.of_inputs() if options.std is not None else {}
+        include = options.names()
+        answers = LineAnswers(
+            table, include, std, batches.max_batch, self._line, batches.count, self._request.scope["path"]
+        )
+        source = _Pieces(receive, work)
+        patience = self._request.app.state.settings.client_timeout_s
+        source.until = asyncio.get_running_loop().time() + patience
+        text, more = bytearray(), True
+        # Who tells a length may send all of it before reading, and gets the answer then; others may send nothing until
+        # they see that the answer begins.
+        while length is not None and more:
+            if len(text) > SMALL_BODY:
+                self._place()
+            came, more = await source.next()
+            text += came
+        self._place()
+        reader = asyncio.create_task(source.read_on()) if more else None
+        end = asyncio.get_running_loop().time() + self._request.app.state.settings.time_limit_s
+        try:
+            await send({
+                "type": "http.response.start", "status": 200,
+                "headers": [(b"content-type", media_type.encode("ascii")), (b"x-accel-buffering", b"no")],
+            })  # fmt: skip
+            number = 0
+            while True:
+                cut = len(text) if not more else text.rfind(b"\n") + 1
+                for lines in _cut(text[:cut], _LINES):
+                    pieces, count = await work.run(partial(_answered, answers, lines, number))
+                    number += count
+                    for piece in pieces:
+                        await work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+                del text[:cut]
+                if cut:
+                    source.until = asyncio.get_running_loop().time() + patience
+                if not more:
+                    break
+                if len(text) > batches.max_body_bytes:
+                    raise batches.too_large()
+                if asyncio.get_running_loop().time() > end:
+                    raise work.took_too_long()
+                taken, more = await source.taken()
+                text += taken
+            await work.client(send({"type": "http.response.body", "body": b"", "more_body": False}))
+        finally:
+            if reader is not None:
+                reader.cancel()
 
-    async def _lines(
-        self, scope: Scope, receive: Receive, budget: Budget, first: Message | None
-    ) -> AsyncIterator[tuple[Lines, Spans, int]]:
-        """Whole lines, some at a time, and how many came before."""
-        limit = self._settings.max_body_bytes
-        take = scope.get("extensions", {}).get(PIECES)
-        lines = Lines()
-        number = 0
-        deadline = budget.deadline()
-        message = first or await self._message(receive, budget, deadline)
-        pieces, more = [message.get("body", b"")], message.get("more_body", False)
-        while True:
-            for piece in pieces:
-                lines.put(piece)
-            while spans := lines.take(_AT_ONCE, last=not more):
-                yield lines, spans, number
-                number += len(spans)
-                deadline = budget.deadline()
-                await asyncio.sleep(0)  # others' turn
-            if lines.rest > limit:
-                raise BodyTooLargeError(f"a line may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
-            if not more:
-                return
-            if take is None:
-                message = await self._message(receive, budget, deadline)
-                pieces, more = [message.get("body", b"")], message.get("more_body", False)
-            else:
-                taken = await budget.client(take(), deadline)
-                if taken is None:
-                    raise ClientDisconnect
-                pieces, more = taken
-                budget.note(sum(map(len, pieces)))
+    def _line(self, line: bytearray) -> Iterator[bytes]:
+        """Answer one line as a batch of its own: a block of columns, a list of rows, or one case."""
+        chosen = choose("application/json", memoryview(line))
+        batch, given = chosen.read(line, self._batches.max_batch)
+        options, place = self._options(given, "pointer")
+        table = self._batches.tables.pick(options.tolerance, place)
+        std = options.std.of_inputs() if options.std is not None else {}
+        answers = answer_batch(table, batch, options.names(), std)
+        if answers.n_bad and not batch.listed:  # one case, and no list that could hold its place
+            raise refusal([FieldFault(error["field"] or "body", error["reason"]) for error in answers.errors])
+        self._batches.count(table, answers)
+        if batch.listed:
+            return chosen.write(answers, signature(table))
+        return iter([dump(objects(answers, 0, 1, signature(table))[0])])
 
 
-def _body_too_large(limit: int) -> BodyTooLargeError:
-    return BodyTooLargeError(f"the body may have up to {limit} bytes", headers=CLOSE, max_bytes=limit)
+class _Pieces:
+    """A body as it comes, read ahead of the answers: some callers send all before they read."""
+
+    def __init__(self, receive: Receive, work: Work) -> None:
+        self._receive = receive
+        self._work = work
+        self._held: deque[bytearray] = deque()
+        self._size = 0
+        self._more = True
+        self._fault: BaseException | None = None
+        self.until = 0.0  # when the line that is coming has to be complete
+        self._came, self._went = asyncio.Event(), asyncio.Event()
+
+    async def next(self) -> tuple[bytearray, bool]:
+        """The next piece, and whether there may be more."""
+        message = await self._work.message(self._receive, self.until)
+        return bytearray(message.get("body", b"")), message.get("more_body", False)
+
+    async def read_on(self) -> None:
+        """Read until the end, or until there is as much as may be held."""
+        try:
+            while self._more:
+                if self._size > _AHEAD:
+                    self._went.clear()
+                    await self._went.wait()
+                piece, self._more = await self.next()
+                self._held.append(piece)
+                self._size += len(piece)
+                self._came.set()
+        except (MumacroError, ClientDisconnect) as error:
+            self._fault = error
+            self._came.set()
+
+    async def taken(self) -> tuple[bytes, bool]:
+        """All that has come since the last time; waits for something."""
+        while not self._held and self._more:
+            if self._fault is not None:
+                raise self._fault
+            self._came.clear()
+            await self._came.wait()
+        text = b"".join(self._held)
+        self._held.clear()
+        self._size = 0
+        self._went.set()
+        return text, self._more
 
 
-class Direct(Response):
-    """Lets the router's route end in the endpoint itself."""
-
-    def __init__(self, endpoint: BatchEndpoint) -> None:
-        self._endpoint = endpoint
-        self.background = None
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run the endpoint."""
-        await self._endpoint(scope, receive, send)
+def _cut(text: bytearray, most: int) -> Iterator[bytearray]:
+    """Whole lines, some at a time, with a byte behind the last."""
+    start = 0
+    while start < len(text):
+        end = len(text) if len(text) - start <= most else text.find(b"\n", start + most) + 1 or len(text)
+        piece = text[start:end]
+        yield piece if piece.endswith(b"\n") else piece + b"\n"
+        start = end
 
 
-@router.post(
-    BATCH_PATH,
-    operation_id="post_mu_macro_batch",
-    summary="Macroscopic friction of many cases",
-    response_class=Response,
-    openapi_extra={"parameters": option_parameters(), "requestBody": batch_bodies()},
-    responses=describe_batch(),
-)
-async def post_batch(request: Request) -> Response:
-    """Answer in the form that was asked in, order kept.  A bad case has the result null and an entry in ``errors``.
+def _answered(answers: LineAnswers, text: bytearray, number: int) -> tuple[list[bytes], int]:
+    """The answers to some lines, and how many lines it were; blank ones are counted and have none."""
+    spans, start, count = [], 0, 0
+    while start < len(text):
+        end = text.find(b"\n", start)
+        count += 1
+        if text[start] not in b" \t\r\n" or text[start:end].strip():
+            spans.append((start, end, number + count))
+        start = end + 1
+    return list(_gathered(answers.pieces(text, spans))), count
 
-    A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
-    Read the answer while you send, or the stream stands still.
-    """
-    endpoint: BatchEndpoint = request.app.state.batches
-    return Direct(endpoint)
+
+def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    """The same bytes in pieces of a size that is worth a message."""
+    gathered: list[bytes] = []
+    size = 0
+    for piece in pieces:
+        gathered.append(piece)
+        size += len(piece)
+        if size >= _PIECE:
+            yield b"".join(gathered)
+            gathered, size = [], 0
+    if size:
+        yield b"".join(gathered)
+
+
+def _add(path: str, chosen: Format | None) -> None:
+    accepts(path, BatchQuery.model_fields)
+
+    async def post_batch(query: Annotated[BatchQuery, Query()], request: Request, _tables: TablesDep) -> Response:
+        """Answer in the form that was asked in, order kept.  A bad case has the result null and an entry in ``errors``.
+
+        A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
+        """
+        return BatchResponse(request, request.app.state.batches, chosen, query)
+
+    forms = FORMATS if chosen is None else [chosen]
+    router.add_api_route(
+        path, post_batch, methods=["POST"],
+        operation_id="post_mu_macro_batch" + (f"_{chosen.name}" if chosen else ""),
+        summary="Macroscopic friction of many cases" + (f", as {chosen.name}" if chosen else ""),
+        response_class=Response, dependencies=[Depends(once_each)],
+        responses={200: batch_operation(forms)["answer"], **problems(400, 401, 408, 413, 415, 422, 503)},
+        openapi_extra={"requestBody": batch_operation(forms)["body"]},
+    )  # fmt: skip
+
+
+def add_routes() -> None:
+    """One path for all forms, and one for each."""
+    _add(BATCH_PATH, None)
+    for entry in FORMATS:
+        _add(f"{BATCH_PATH}/{entry.name}", entry)
+
+
+add_routes()

@@ -1,13 +1,13 @@
 """Health: ``/livez`` (the process answers), ``/readyz`` and its alias ``/healthz`` (it answers rightly)."""
 
 from fastapi import APIRouter
-from starlette.requests import Request
 from starlette.responses import Response
 
-from service import API_VERSION, __version__
-from service.codecs import encode
-from service.openapi import describe_json
-from service.shelf import shelf_of
+from .. import API_VERSION, __version__
+from ..formats.columns import dump
+from ..openapi import problems
+from ..schemas import Health
+from ..tables import TablesDep
 
 __all__ = ["router"]
 
@@ -22,12 +22,11 @@ _VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
     "/livez",
     operation_id="livez",
     summary="The process is alive",
-    response_class=Response,
-    responses=describe_json("Health"),
+    response_model=Health,
 )
 async def livez() -> Response:
     """Say that the process answers.  It does so without a table, too: a restart would not mend a table."""
-    return Response(encode({"status": "alive", **_VERSIONS}), headers=_NO_STORE, media_type="application/json")
+    return Response(dump({"status": "alive", **_VERSIONS}), headers=_NO_STORE, media_type="application/json")
 
 
 @router.head("/healthz", include_in_schema=False)
@@ -35,20 +34,19 @@ async def livez() -> Response:
     "/healthz",
     operation_id="healthz",
     summary="The same as /readyz",
-    response_class=Response,
-    responses=describe_json("Health", 503),
+    response_model=Health,
+    responses=problems(503),
 )
 @router.head("/readyz", include_in_schema=False)
 @router.get(
     "/readyz",
     operation_id="readyz",
     summary="The service answers rightly",
-    response_class=Response,
-    responses=describe_json("Health", 503),
+    response_model=Health,
+    responses=problems(503),
 )
-async def readyz(request: Request) -> Response:
+async def readyz(tables: TablesDep) -> Response:
     """Say whether every table is loaded, was checksummed, gives its known answer and still is the file it was."""
-    shelf = shelf_of(request)
-    shelf.check()
-    answer = {"status": "ready", "tables": [table.label for table in shelf.tables], **_VERSIONS}
-    return Response(encode(answer), headers=_NO_STORE, media_type="application/json")
+    tables.check()
+    answer = {"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}
+    return Response(dump(answer), headers=_NO_STORE, media_type="application/json")

@@ -3,44 +3,45 @@
 import csv
 import io
 import math
-from typing import Any
+from typing import Annotated, Any
 
-import anyio.to_thread
-from fastapi import APIRouter
+import numpy as np
+from fastapi import APIRouter, Depends, Query
 from starlette.requests import Request
 from starlette.responses import Response
 
-from friction.errors import InputError
-from friction.law import Law, approximations, border_speeds, friction_law, sweep_values
-from friction.nondim import UNITS
-from service.answers import signature
-from service.codecs import encode
-from service.errors import FieldFault, InvalidFieldsError
-from service.forms import LawRequest, from_text, read_form
-from service.intake import query_pairs, read_body, refuse_query
-from service.openapi import describe_json, form_parameters, json_body
-from service.shelf import LoadedTable, shelf_of
+from mumacro.errors import InputError
+from mumacro.law import approximations, border_speeds, friction_law, sweep_values
+
+from ..errors import FieldFault, InvalidFieldsError, accepts
+from ..evaluation import Batch, answer_batch
+from ..formats.columns import dump
+from ..kernel import FIELDS, RAD_PER_CYCLE, UNITS
+from ..openapi import problems
+from ..quantities import nested
+from ..questions import LawAnswer, LawFamilyAnswer, LawQuery, LawRequest
+from ..tables import LoadedTable, TablesDep, signature
+from . import no_query, once_each, parameters_of
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["answers"])
+accepts("/v1/law", LawRequest.model_fields)
+accepts("/v1/law.csv", LawQuery.model_fields)
 
 
 @router.post(
     "/v1/law",
     operation_id="post_law",
     summary="mu_macro over a range of one input",
-    response_class=Response,
-    openapi_extra=json_body("LawRequest"),
-    responses=describe_json("LawAnswer", 400, 401, 413, 415, 422, 503),
+    response_model=LawAnswer | LawFamilyAnswer,
+    responses=problems(400, 401, 413, 415, 422, 503),
+    dependencies=[Depends(no_query)],
 )
-async def post_law(request: Request) -> Response:
-    """Return the law in columns, with its static limit and its border; ``include`` adds the paper's approximations."""
-    refuse_query(request)
-    form = read_form(LawRequest, await read_body(request))
-    case = form.inputs(form.along)
-    table = shelf_of(request).pick(form.tolerance)
-    content = await anyio.to_thread.run_sync(lambda: encode(_answer(table, form, case)))
+async def post_law(form: LawRequest, tables: TablesDep, request: Request) -> Response:
+    """Return the law in columns, with its static limit and its border; with ``family``, one curve a value."""
+    table = tables.pick(form.tolerance)
+    content = await request.app.state.work.run_in_place(lambda: dump(_answer(table, form, "pointer")))
     return Response(content, media_type="application/json")
 
 
@@ -50,21 +51,18 @@ async def post_law(request: Request) -> Response:
     operation_id="get_law_csv",
     summary="mu_macro over a range of one input, as a table for spreadsheets",
     response_class=Response,
-    openapi_extra={"parameters": form_parameters(LawRequest)},
     responses={
-        **describe_json("LawAnswer", 401, 422, 503),
+        **problems(401, 422, 503),
         200: {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}},
     },
+    dependencies=[Depends(once_each)],
 )
-async def get_law_csv(request: Request) -> Response:
+async def get_law_csv(query: Annotated[LawQuery, Query()], tables: TablesDep, request: Request) -> Response:
     """Return the law as CSV (RFC 4180), one row per value; the header names the columns with their units."""
-    form = from_text(LawRequest, query_pairs(request))
-    try:
-        case = form.inputs(form.along)
-    except InvalidFieldsError as error:
-        raise _as_parameters(error) from None
-    table = shelf_of(request).pick(form.tolerance, "parameter")
-    content = await anyio.to_thread.run_sync(lambda: _as_csv(_answer(table, form, case, "parameter")))
+    with parameters_of("/v1/law.csv"):
+        form = query.form()
+    table = tables.pick(form.tolerance, "parameter")
+    content = await request.app.state.work.run_in_place(lambda: _as_csv(_answer(table, form, "parameter")))
     headers = {
         "Content-Disposition": f'attachment; filename="friction-law-{form.along}.csv"',
         "Cache-Control": "no-cache",
@@ -72,41 +70,59 @@ async def get_law_csv(request: Request) -> Response:
     return Response(content, headers=headers, media_type="text/csv; charset=utf-8; header=present")
 
 
-def _as_parameters(error: InvalidFieldsError) -> InvalidFieldsError:
-    faults = [FieldFault(f.field, f.reason, bound=f.bound, place="parameter") for f in error.faults]
-    return InvalidFieldsError(error.detail, faults)
-
-
-def _law(table: LoadedTable, form: LawRequest, case: dict[str, float | None]) -> Law:
-    values = sweep_values(form.along, form.start, form.stop, form.points, form.scale)
-    return friction_law(table.surrogate, form.along, values, case)
-
-
-def _answer(
-    table: LoadedTable, form: LawRequest, case: dict[str, float | None], place: str = "pointer"
-) -> dict[str, Any]:
+def _answer(table: LoadedTable, form: LawRequest, place: str) -> dict[str, Any]:
+    case = form.inputs()
+    swept: dict[str, Any] = {"along": form.along, "unit": UNITS[form.along]}
     try:
-        law = _law(table, form, case)
+        values = sweep_values(*_internal(form.along, form.start, form.stop), form.points, form.scale)
+        swept["values"] = (values / _per(form.along)).tolist()
+        if not form.family:
+            return {**swept, **_curve(table, form, values, case), **signature(table)}
+        ((name, listed),) = form.family.items()
+        inner = "omega" if name == "f" else name
+        curves = [
+            {"value": value, **_curve(table, form, values, {**case, inner: value * _per(name)})} for value in listed
+        ]
+        return {**swept, "family": name, "family_unit": UNITS[name], "curves": curves, **signature(table)}
     except InputError as error:
-        fault = FieldFault(error.field, f"must be {error.bound}", error.value, error.bound, place)
-        raise InvalidFieldsError(f"{error.field}: must be {error.bound}", [fault]) from None
+        reason = f"must be {error.bound}"
+        raise InvalidFieldsError(
+            f"{error.field}: {reason}", [FieldFault(error.field, reason, error.value, error.bound, place)]
+        ) from None
+
+
+def _per(name: str) -> float:
+    """What a value of the name is multiplied with inside: omega [rad/s] of f [Hz]."""
+    return RAD_PER_CYCLE if name == "f" else 1.0
+
+
+def _internal(name: str, start: float, stop: float) -> tuple[str, float, float]:
+    return "omega" if name == "f" else name, start * _per(name), stop * _per(name)
+
+
+def _curve(table: LoadedTable, form: LawRequest, values: Any, case: dict[str, Any]) -> dict[str, Any]:
+    along = "omega" if form.along == "f" else form.along
+    law = friction_law(table.surrogate, along, values, case)
     answer: dict[str, Any] = {
-        "along": form.along,
-        "unit": UNITS[form.along],
-        "values": law.values.tolist(),
         "mu_macro": law.answer.mu_macro.tolist(),
         "mu_ratio": law.answer.mu_ratio.tolist(),
         "regime": law.answer.regime.tolist(),
         "error_bound": law.answer.error_bound.tolist(),
         "source": law.answer.source.tolist(),
         "mu_static": law.mu_static.tolist(),
-        "border": [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border],
+        "border": [{"value": mark.value / _per(form.along), "mu_macro": mark.mu_macro} for mark in law.border],
     }
-    if form.include:
+    if "approximations" in (form.include or ()):
         for name, columns in (("approximations", approximations), ("border_speeds", border_speeds)):
             found = columns(table.surrogate, law, case)
             answer[name] = {key: column.tolist() for key, column in found.items()}
-    answer.update(signature(table))
+    quantities = form.quantities()
+    if quantities:
+        full = {"k": math.inf, **{name: math.inf if value is None else value for name, value in case.items()}}
+        columns_of = [values if name == along else np.array([full[name]]) for name in FIELDS]
+        std = form.std.of_inputs() if form.std else {}
+        more = answer_batch(table, Batch(values.size, columns_of), quantities, std)
+        answer.update(nested({path: column.tolist() for path, column in more.extras.items()}))
     return answer
 
 

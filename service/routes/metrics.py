@@ -5,8 +5,8 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.metrics import CONTENT_TYPE, Metrics
-from service.openapi import describe_problems
+from ..metrics import CONTENT_TYPE, Metrics
+from ..openapi import problems
 
 __all__ = ["router"]
 
@@ -24,7 +24,7 @@ router = APIRouter(tags=["health"])
             "description": "Requests by route, method and status, their duration, cases by table, source and regime",
             "content": {"text/plain": {"schema": {"type": "string"}}},
         },
-        **describe_problems(401),
+        **problems(401),
     },
 )
 async def get_metrics(request: Request) -> Response:

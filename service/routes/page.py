@@ -8,11 +8,12 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from friction import Surrogate
-from service import __version__
-from service.codecs import encode
-from service.routes.mu_macro import etag_matches
-from service.shelf import shelf_of
+from mumacro import Surrogate
+
+from .. import __version__
+from ..formats.columns import dump
+from ..tables import tables_of
+from . import etag_matches
 
 __all__ = ["ASSETS", "OPEN_PATHS", "POLICY", "router"]
 
@@ -59,7 +60,7 @@ for _name, _media_type in ASSETS.items():
 @router.get("/static/page/map.json")
 async def map_data(request: Request) -> Response:
     """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and the border."""
-    surrogate = shelf_of(request).pick().surrogate
+    surrogate = tables_of(request).pick().surrogate
     etag = f'"{surrogate.checksum[:32]}-{__version__}"'
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
     if etag_matches(request, etag):
@@ -78,4 +79,4 @@ def _map(surrogate: Surrogate) -> bytes:
     border = np.column_stack((surrogate.v_tilde_crit(amplitudes), amplitudes))
     rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
     line = [[float(f"{x:.6g}") for x in place] for place in border.tolist()]
-    return encode({**axes, "unit": _UNIT, "mu_ratio": rounded, "border": line})
+    return dump({**axes, "unit": _UNIT, "mu_ratio": rounded, "border": line})

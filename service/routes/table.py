@@ -1,27 +1,35 @@
 """The table itself: ``GET /v1/table`` (metadata) and ``GET /v1/table.nc`` (the file)."""
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from friction.errors import TableError
-from service import __version__
-from service.answers import signature
-from service.codecs import encode
-from service.intake import table_choice_from_query
-from service.openapi import describe_json, table_parameters
-from service.routes.mu_macro import etag_matches
-from service.shelf import LoadedTable, shelf_of
+from mumacro.errors import TableError
+
+from .. import __version__
+from ..errors import accepts
+from ..formats.columns import dump
+from ..openapi import problems
+from ..schemas import TableAnswer, TableChoice
+from ..tables import LoadedTable, TablesDep, signature
+from . import etag_matches, once_each
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["table"])
 
 
-def _chosen(request: Request) -> LoadedTable:
-    identity, tolerance = table_choice_from_query(request)
-    shelf = shelf_of(request)
-    return shelf.pick(tolerance, "parameter") if identity is None else shelf.named(identity)
+accepts("/v1/table", TableChoice.model_fields)
+accepts("/v1/table.nc", TableChoice.model_fields)
+
+
+def _chosen(choice: Annotated[TableChoice, Query()], tables: TablesDep) -> LoadedTable:
+    return tables.pick(choice.tolerance, "parameter") if choice.id is None else tables.named(choice.id)
+
+
+ChosenTable = Annotated[LoadedTable, Depends(_chosen)]
 
 
 @router.head("/v1/table", include_in_schema=False)
@@ -29,15 +37,13 @@ def _chosen(request: Request) -> LoadedTable:
     "/v1/table",
     operation_id="get_table",
     summary="What is known of a table",
-    response_class=Response,
-    openapi_extra={"parameters": table_parameters()},
-    responses=describe_json("TableAnswer", 401, 422, 503),
+    response_model=TableAnswer,
+    responses=problems(401, 422, 503),
+    dependencies=[Depends(once_each)],
 )
-async def get_table(request: Request) -> Response:
+async def get_table(table: ChosenTable, tables: TablesDep) -> Response:
     """Describe the default table, or the one chosen by ``id`` or ``tolerance``; list all that are loaded."""
-    table = _chosen(request)
     surrogate = table.surrogate
-    shelf = shelf_of(request)
     answer = {
         "id": surrogate.id,
         "tolerance": surrogate.tolerance,
@@ -48,11 +54,11 @@ async def get_table(request: Request) -> Response:
         "max_rel_error": surrogate.max_rel_error,
         "attributes": surrogate.attributes,
         "blocks": surrogate.blocks,
-        "loaded": [other.label for other in shelf.tables],
+        "loaded": [other.label for other in tables.loaded],
         "service_version": __version__,
         **signature(table),
     }
-    return Response(encode(answer), media_type="application/json")
+    return Response(dump(answer), media_type="application/json")
 
 
 @router.head("/v1/table.nc", include_in_schema=False)
@@ -61,22 +67,21 @@ async def get_table(request: Request) -> Response:
     operation_id="get_table_file",
     summary="The table as a netCDF-4 file",
     response_class=Response,
-    openapi_extra={"parameters": table_parameters()},
     responses={
-        **describe_json("TableAnswer", 401, 422, 503),
+        **problems(401, 422, 503),
         200: {
             "description": "The file",
             "content": {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}},
         },
     },
+    dependencies=[Depends(once_each)],
 )
-async def get_table_file(request: Request) -> Response:
+async def get_table_file(table: ChosenTable, request: Request) -> Response:
     """Stream the file from disk; ranges are supported.  It is the very file that the answers come from."""
-    table = _chosen(request)
     # A file that was replaced after loading would be another table under this one's name.
     table.check()
     path = table.surrogate.path
-    etag = f'"{table.surrogate.seal}"'
+    etag = f'"{table.kernel.checksum}"'
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)

@@ -14,11 +14,12 @@ from pydantic_core import from_json
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
-from friction.errors import MumacroError
-from service.errors import BodyTooLargeError
-from service.openapi import describe_umbridge, umbridge_body
-from service.shelf import shelf_of
-from service.umbridge import INFO, MODELS, OPERATIONS, UmBridgeError, model_of
+from mumacro.errors import MumacroError
+
+from ..errors import BodyTooLargeError
+from ..openapi import describe_umbridge, umbridge_body
+from ..tables import tables_of
+from ..umbridge import INFO, MODELS, OPERATIONS, UmBridgeError, model_of
 
 __all__ = ["PATHS", "router", "umbridge_error"]
 
@@ -63,7 +64,7 @@ def _endpoint(name: str) -> Callable[[Request], Awaitable[Response]]:
         try:
             body = await _parsed(request)
             model = model_of(body)
-            return _write(operation(shelf_of(request).pick().surrogate, model, body))
+            return _write(operation(tables_of(request).pick().surrogate, model, body))
         except UmBridgeError as error:
             return _write(error.as_json(), error.status)
         except MumacroError as error:  # no table, or a body over the limit

@@ -1,0 +1,93 @@
+"""Rows a second of ``mumacro eval`` on one core, by format, beside the cost of reading and writing alone.
+
+    python benchmarks/files.py [--rows 4000000]
+
+The floor copies the same Parquet file with the same columns added as constants: read, write, nothing computed.  Figures
+are processor time, so that other work on the machine counts little; ratios hold better than rates.
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mumacro import Surrogate
+from mumacro.bundled import bundled_tables
+from mumacro.files import answer, evaluate_files
+from mumacro.files.answering import added_fields
+from mumacro.files.writing import parquet_writer
+
+NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
+STEPS = (("parquet", "parquet"), ("csv", "csv"), ("ndjson", "ndjson"), ("csv", "parquet"), ("parquet", "csv"))
+
+
+def cases(n: int) -> pa.Table:
+    """Random cases and a number for each."""
+    rng = np.random.default_rng(1)
+    low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
+    values = 10.0 ** rng.uniform(low, high, (n, 6))
+    return pa.table({**dict(zip(NAMES, values.T, strict=True)), "id": pa.array(np.arange(n), pa.int32())})
+
+
+def floor(source: Path, out: Path) -> None:
+    """Read and write, with as many bytes as the answers take."""
+    with pq.ParquetFile(source, pre_buffer=False) as file:
+        schema = pa.schema([*file.schema_arrow, *added_fields()])
+        noise = np.random.default_rng(0).random(2**19)
+        with parquet_writer(out, schema) as writer:
+            for batch in file.iter_batches(262_144):
+                n = batch.num_rows
+                words = pa.DictionaryArray.from_arrays(
+                    pa.array(np.arange(n) % 12, pa.int8()), [str(i) for i in range(12)]
+                )
+                plain = pa.array(noise[:n])
+                added = [words if pa.types.is_dictionary(field.type) else plain for field in added_fields()]
+                writer.write_batch(pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema))
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rows", type=int, default=4_000_000)
+    rows = parser.parse_args().rows
+    pa.set_cpu_count(1)
+    pa.set_io_thread_count(1)
+    surrogate = Surrogate.open(next(path for path in bundled_tables() if "1e-10" in path.name))
+    table = cases(rows)
+    answer(table.slice(0, 9).to_batches()[0], surrogate)  # kernels are loaded or compiled before anything is timed
+    print(f"{'from':8} {'to':8} {'M rows/s':>9}")
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "cases.parquet"
+        pq.write_table(table, source)
+        for kind in ("csv", "ndjson"):
+            few = table.slice(0, max(rows // 8, 1))
+            pq.write_table(few, source.with_name("few.parquet"))
+            evaluate_files([source.with_name("few.parquet")], Path(folder) / f"made.{kind}", surrogate, force=True)
+            _drop_answers(Path(folder) / f"made.{kind}", Path(folder) / f"cases.{kind}")
+        started = time.process_time()
+        floor(source, Path(folder) / "floor.parquet")
+        print(f"{'parquet':8} {'floor':8} {rows / (time.process_time() - started) / 1e6:9.2f}")
+        for start, end in STEPS:
+            name = "few.parquet" if (start, end) == ("parquet", "csv") else f"cases.{start}"
+            given = source.with_name(name)
+            started = time.process_time()
+            summary = evaluate_files([given], Path(folder) / f"out.{end}", surrogate, force=True)
+            rate = summary.rows / (time.process_time() - started) / 1e6
+            print(f"{start:8} {end:8} {rate:9.2f}")
+
+
+def _drop_answers(made: Path, cases: Path) -> None:
+    with made.open() as source, cases.open("w") as out:
+        for line in source:
+            if made.suffix == ".csv":
+                out.write(",".join(line.rstrip("\n").split(",")[:7]) + "\n")
+            else:
+                out.write(line[: line.index(', "mu_macro"')] + "}\n")
+
+
+if __name__ == "__main__":
+    main()

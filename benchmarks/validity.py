@@ -1,0 +1,102 @@
+"""The numbers of docs/validity.md: what leaving out partial slip, inertia and rate costs, and where rigs lie.
+
+python benchmarks/validity.py [--write]
+"""
+
+from __future__ import annotations
+
+import measuring  # isort: split
+
+import argparse
+import math
+from collections.abc import Callable
+
+import numpy as np
+from measuring import ROOT, markdown, quantity
+
+from mumacro import Surrogate
+from mumacro.settling import settling
+from mumacro.stiffness import Material, ball_on_flat, flat_punch
+
+PAGE = ROOT / "docs" / "validity.md"
+TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
+STEEL = Material(E=210e9, nu=0.3)
+RANGES = ((0.01, 0.1), (0.1, 0.3), (0.3, 0.67), (0.67, 1.6), (1.6, 5.0), (5.0, 20.0), (20.0, 1000.0))
+
+
+def partial_slip() -> str:
+    """Largest change of mu~ between k and 2/3 k, by amplitude and regime."""
+    s = Surrogate.open(TABLE)
+    rows = []
+    for low, high in RANGES:
+        y = np.geomspace(low, high, 121)
+        share = np.geomspace(1e-4, 1e3, 561)[:, None]
+        v = s.v_tilde_crit(y) * share
+        change = np.abs(s.mu_ratio(v, y) - s.mu_ratio(v * 2.0 / 3.0, y * 2.0 / 3.0))
+        slides = share[:, 0] >= 1.0
+        cells = [quantity(float(change[part].max())) for part in (~slides, slides)]
+        rows.append([f"{low:g} to {high:g}", *cells])
+    return markdown(("y~ with k", "mu~ in stick-slip changes by", "in continuous sliding by"), rows)
+
+
+def inertia() -> str:
+    """Amplitude at the contact over the imposed one, by frequency over the natural one of mass on spring."""
+    rows = [[f"{ratio:g}", f"{1.0 / (1.0 - ratio * ratio):.4f}"] for ratio in (0.05, 0.1, 0.2, 0.3, 0.5)]
+    return markdown(("omega / omega_n", "amplitude at the contact over the imposed one"), rows, 0)
+
+
+def rate() -> str:
+    """Spread of the local coefficient over a period by the logarithmic law."""
+    rows = [
+        [f"{spread:g}", *(f"{100.0 * 0.01 * math.log(spread) / mu0:.0f}" for mu0 in (0.2, 0.4, 0.8))]
+        for spread in (10.0, 1e2, 1e3)
+    ]
+    return markdown(("fastest over slowest slip", *(f"change of mu0 = {m} [%]" for m in (0.2, 0.4, 0.8))), rows)
+
+
+def rigs() -> str:
+    """Where contacts of the usual kind lie on the map, with assumed, not published, numbers."""
+    s = Surrogate.open(TABLE)
+    mu0, omega = 0.3, 2.0 * math.pi * 20e3
+    rows = []
+    for name, force, contact in (
+        ("steel ball, R = 5 mm", 1.0, ball_on_flat(5e-3, 1.0, STEEL, STEEL)),
+        ("steel ball, R = 5 mm", 10.0, ball_on_flat(5e-3, 10.0, STEEL, STEEL)),
+        ("steel ball, R = 5 mm", 100.0, ball_on_flat(5e-3, 100.0, STEEL, STEEL)),
+        ("steel pin, flat, 1 mm radius", 100.0, flat_punch(1e-3, 100.0, STEEL, STEEL)),
+    ):
+        for y0, v0 in ((0.1e-6, 0.01), (5e-6, 0.01), (5e-6, 0.5)):
+            case = {"mu0": mu0, "Fz": force, "k": contact.k, "y0": y0, "omega": omega, "v0": v0}
+            answer = s.evaluate(**case)
+            found = settling(s, **case)
+            cells = [f"{contact.k:.2g}", f"{1e6 * contact.length_scale(mu0, force):.3g}", f"{1e6 * y0:g}", f"{v0:g}"]
+            groups = [f"{answer.v_tilde:.2g}", f"{answer.y_tilde:.2g}", f"{answer.mu_ratio:.3f}", answer.regime]
+            rows.append([name, f"{force:g}", *cells, *groups, f"{found.periods:.2g}"])
+    header = (
+        "contact", "Fz [N]", "k [N/m]", "l0 [um]", "y0 [um]", "v0 [m/s]", "v~", "y~", "mu~", "regime", "periods to 1 %",
+    )  # fmt: skip
+    return markdown(header, rows)
+
+
+SECTIONS: dict[str, Callable[[], str]] = {
+    "partial_slip": partial_slip,
+    "inertia": inertia,
+    "rate": rate,
+    "rigs": rigs,
+}
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="put the numbers into docs/validity.md")
+    given = parser.parse_args()
+    for name, section in SECTIONS.items():
+        text = section()
+        print(f"## {name}\n\n{text}\n", flush=True)
+        if given.write:
+            measuring.write_section(name, text, PAGE)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,23 @@
+"""What friction does a contact show that is dragged and shaken sideways?  Surrogate of the full stick-slip model."""
+
+import sys as _sys
+
+try:
+    from mumacro.answer import Answer
+    from mumacro.charts import REGIMES, SOURCES
+    from mumacro.errors import InputError, MumacroError, TableError
+    from mumacro.surrogate import Surrogate
+    from mumacro.version import __version__
+except ModuleNotFoundError as _error:
+    # "python -m mumacro", "-m builder" and "-m service" say in one line what is missing; argv[0] is "-m" meanwhile.
+    if _sys.argv[:1] != ["-m"]:
+        raise
+    from mumacro.extras import missing as _missing
+
+    raise SystemExit(_missing("", _error)) from None
+
+open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)
+
+__all__ = [
+    "REGIMES", "SOURCES", "Answer", "InputError", "MumacroError", "Surrogate", "TableError", "__version__", "open",
+]  # fmt: skip

@@ -1,0 +1,126 @@
+"""What the surrogate says about one case or many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
+
+__all__ = ["Answer"]
+
+# by code; the last entry is that of -1, an illegal case
+_REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
+_SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
+_REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
+
+
+class Answer:
+    """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the broadcast shape else.
+
+    Attributes
+    ----------
+    mu_macro : float or ndarray
+        Macroscopic friction coefficient [-]; NaN at an illegal case of an array.
+    mu_ratio : float or ndarray
+        mu_macro / mu0 [-].
+    error_bound : float or ndarray
+        Verified bound of the absolute error of ``mu_macro`` [-].
+    source_code : int or ndarray of int8
+        Block or closed form that answered, index into :data:`mumacro.SOURCES`; -1 for an illegal case.
+    gradient : dict of str to float or ndarray, or None
+        d mu_macro / d input by field name, where it was asked for; infinite for v0 at v0 = 0 on y~ = 1.
+    gradient_bound : dict of str to float or ndarray, or None
+        Verified bounds of the absolute errors of ``gradient``.
+
+    Examples
+    --------
+    >>> from mumacro import Surrogate
+    >>> a = Surrogate.open().evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> f"{a.mu_macro:.6f} {a.regime} {a.source}"
+    '0.240012 stick_slip stick_slip_low'
+    """
+
+    __slots__ = (
+        "_certain", "_groups", "_look_up", "error_bound", "gradient", "gradient_bound", "mu_macro", "mu_ratio",
+        "source_code",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        mu_macro: Any,
+        mu_ratio: Any,
+        error_bound: Any,
+        source_code: Any,
+        groups: tuple[Any, Any, Any] | None = None,
+        certain: Callable[[Any, Any], Any] | None = None,
+        gradient: dict[str, Any] | None = None,
+        gradient_bound: dict[str, Any] | None = None,
+        look_up: Callable[[Any, Any], Any] | None = None,
+    ) -> None:
+        self.mu_macro = mu_macro
+        self.mu_ratio = mu_ratio
+        self.error_bound = error_bound
+        self.source_code = source_code
+        self._groups = groups
+        self._certain = certain
+        self.gradient = gradient
+        self.gradient_bound = gradient_bound
+        self._look_up = look_up
+
+    def _group(self, place: int, name: str) -> Any:
+        if self._groups is None:
+            raise AttributeError(f"{name} was not asked for: evaluate(..., groups=True)")
+        return self._groups[place]
+
+    @property
+    def v_tilde(self) -> Any:
+        """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient were asked for."""
+        return self._group(0, "v_tilde")
+
+    @property
+    def y_tilde(self) -> Any:
+        """Dimensionless amplitude y0 k/(mu0 Fz) [-]; as v_tilde."""
+        return self._group(1, "y_tilde")
+
+    @property
+    def length_scale(self) -> Any:
+        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde."""
+        return self._group(2, "length_scale")
+
+    def _by_source(self, table: Any) -> Any:
+        """``table`` (sources + 1,) looked up at the source code; its last entry is that of -1."""
+        if self._look_up is not None and not isinstance(self.source_code, int):
+            return self._look_up(table, self.source_code)
+        return table[self.source_code]
+
+    @property
+    def regime_code(self) -> Any:
+        """Index into :data:`mumacro.REGIMES`: int, or ndarray of int8; -1 for an illegal case."""
+        codes = self._by_source(_REGIME_CODES)
+        return int(codes) if isinstance(self.source_code, int) else codes
+
+    @property
+    def regime(self) -> Any:
+        """``"continuous"``, ``"stick_slip"`` or ``"static"`` (v0 = 0): str, or ndarray of shared str."""
+        return self._by_source(_REGIME_NAMES[_REGIME_CODES])
+
+    @property
+    def regime_certain(self) -> Any:
+        """Whether the regime holds whatever v~crit is within its bound: bool or ndarray of bool; as v_tilde."""
+        if self._certain is None:
+            raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
+        return self._certain(self.v_tilde, self.y_tilde)
+
+    @property
+    def source(self) -> Any:
+        """Name of the block or closed form that answered: str, or ndarray of shared str, made when asked for."""
+        return self._by_source(_SOURCE_NAMES)
+
+    def __repr__(self) -> str:
+        names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
+        names += ["v_tilde", "y_tilde", "length_scale"] if self._groups is not None else []
+        names += ["gradient", "gradient_bound"] if self.gradient is not None else []
+        return f"Answer({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"

@@ -1,0 +1,30 @@
+"""Where the tables lie that come with the library: inside the package when installed, in ``tables/`` in a checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["bundled_tables"]
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def bundled_tables() -> list[Path]:
+    """Return the table files that come with the library, by name.
+
+    Returns
+    -------
+    list of Path
+        ``mumacro/data/*.nc`` of an installed wheel, else ``tables/*.nc`` of the checkout; empty where there is neither.
+
+    Examples
+    --------
+    >>> sorted(path.name for path in bundled_tables())[0]
+    'mumacro-1e-10.nc'
+    """
+    # A folder "tables" beside the package may belong to another project; ours are named after us.
+    for folder in (_PACKAGE / "data", _PACKAGE.parent / "tables"):
+        found = sorted(folder.glob("mumacro-*.nc"))
+        if found:
+            return found
+    return []

@@ -1,0 +1,300 @@
+"""Closed forms of the model: the paper's under their equation numbers, and this project's own beside them.
+
+Every function takes and returns dimensionless arrays that broadcast: ``v`` = v~ = v0/(l0 omega), ``y`` = y~ = y0/l0,
+l0 = mu0 Fz/k.  With mu0 and l0 omega as factors they are the paper's dimensional equations: (37) is :func:`outer`,
+(38) is :func:`static_limit`, (39) is :func:`border_24`, (40) is :func:`critical`.  :mod:`mumacro.law` offers them in
+SI units by their numbers.
+
+"Off by" is the largest deviation from the full model.  docs/validation.md has all deviations with the ranges within 1,
+5 and 10 %; ``python benchmarks/validation.py`` measures them.
+
+References
+----------
+Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations", Friction (2018).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mumacro.charts import normal_form_root
+from mumacro.outer import outer_expansion
+
+__all__ = [
+    "BORDER_CONSTANT",
+    "agm",
+    "border_23",
+    "border_24",
+    "border_26",
+    "border_27",
+    "border_blend",
+    "border_large_amplitude",
+    "border_small_amplitude",
+    "continuous",
+    "corner_root",
+    "critical",
+    "critical_next",
+    "master_curve",
+    "master_curve_limit",
+    "outer",
+    "second_order",
+    "small_amplitude",
+    "small_angle",
+    "static_limit",
+]
+
+Array = NDArray[np.float64]
+
+BORDER_CONSTANT = 4.402914  # lim y~ / v~crit^2; the paper rounds it to 4.5 in eq. (26)
+# The blend has both ends of the border built in; this one number is fitted, by benchmarks/approximations.py.
+_BLEND = 0.786
+
+
+def _float(x: ArrayLike) -> Array:
+    return np.asarray(x, dtype=np.float64)
+
+
+# --- mu~ over the plane ---
+
+
+def agm(b: ArrayLike) -> Any:
+    """Arithmetic-geometric mean of 1 and ``b`` >= 1 [-], to rounding."""
+    g = _float(b)
+    a: Any = np.ones_like(g)
+    for _ in range(64):
+        if np.all(np.abs(a - g) <= 1e-8 * a):
+            break
+        a, g = 0.5 * (a + g), np.sqrt(a) * np.sqrt(g)
+    return 0.5 * (a + g)
+
+
+def outer(r: ArrayLike) -> Any:
+    """(2/pi) K(i r) with r = y~/v~ [-], eqs. (35), (37): rigid contact, and the limit v~ -> infinity at fixed r.
+
+    K is the complete elliptic integral of the first kind by its modulus, eq. (36).
+
+    Too low in continuous sliding, by up to 0.23 (y~ = 1.6), 0.056 (8), 0.016 (80), 0.0014 (1e4).  For v~ -> 0 it is too
+    high, by less than 0.01, but its ratio to the exact value grows like ln(y~/v~) without bound.
+
+    >>> float(outer(1.0)).hex() == float(1.0 / agm(2.0**0.5)).hex()
+    True
+    """
+    return 1.0 / agm(np.hypot(1.0, _float(r)))
+
+
+def second_order(r: ArrayLike) -> Any:
+    """Coefficient of 1/v~^2 at fixed r = y~/v~ [-], the first correction to eq. (35).
+
+    With D = 1 + r^2 cos^2 tau it is r^2 <sin^2 tau (1/2 - r^2 cos^2 tau) D^(-7/2)>, from the slow manifold of eq. (11)
+    to second order, reduced to complete elliptic integrals.  The error of (35) with this term is O(v~^-4).
+    Absolute accuracy is rounding; for r << 1 the value tends to r^2/4 and its relative accuracy is 1e-16/r^2.
+    """
+    return np.vectorize(lambda x: outer_expansion(x)[1], otypes=[np.float64])(r)
+
+
+def static_limit(y: ArrayLike) -> Any:
+    """mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eqs. (16), (38).  Exact; error O(v~) for y~ != 1.
+
+    >>> float(static_limit(0.6))
+    0.8
+    """
+    inside = np.minimum(_float(y), 1.0)
+    return np.sqrt((1.0 - inside) * (1.0 + inside))
+
+
+def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
+    """mu~ of continuous sliding for y~ << 1 [-]: <cos(kappa cos tau)>, kappa = y~ / sqrt(1 + v~^2), eqs. (29), (30).
+
+    This is the Bessel function J0(kappa), here by the trapezoidal rule on 32 points, to rounding for kappa <= 10.
+    Off by 0.05 % (y~ = 0.3), 0.37 % (0.5), 4.8 % (1), always at the border.
+    """
+    kappa = _float(y) / np.hypot(1.0, _float(v))
+    # the integrand is even about 0 and pi/2: 32 points on the period are 8 in the quarter
+    quarter = np.cos((np.arange(8) + 0.5) * (np.pi / 16.0))
+    return np.cos(kappa[..., None] * quarter).mean(axis=-1)
+
+
+def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
+    """mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31).  Error O(y~^4).
+
+    Off by 0.06 % (y~ = 0.3), 0.47 % (0.5), 6.3 % (1), always at the border.  Meaningless in stick-slip.
+    """
+    v, y = _float(v), _float(y)
+    return 1.0 - y * y / (4.0 * (1.0 + v * v))
+
+
+def continuous(v: ArrayLike, y: ArrayLike) -> Any:
+    """(2/pi) K(i y~ / sqrt(1 + v~^2)) [-]: this project's one formula for continuous sliding.
+
+    Eq. (31) for y~ -> 0 and eq. (35) for v~ -> infinity, both with their order of error; off by less than 0.0401 in
+    all of continuous sliding.  Meaningless in stick-slip.
+    """
+    return outer(_float(y) / np.hypot(1.0, _float(v)))
+
+
+def critical(y: ArrayLike) -> Any:
+    """mu~ at the border for y~ << 1 [-]: 1 - y~^2 / 4, eqs. (32), (40).
+
+    Too low by 0.07 % (y~ = 0.3), 0.55 % (0.5), 9.2 % (1).
+    """
+    y = _float(y)
+    return 1.0 - 0.25 * y * y
+
+
+def critical_next(y: ArrayLike) -> Any:
+    """mu~ at the border with one term more than eq. (32) [-]: 1 - y~^2 / 4 + (5/64) y~^4.  Error O(y~^6).
+
+    Off by -0.0023 % (y~ = 0.3), -0.035 % (0.5), -0.14 % (0.7), +0.24 % (1).
+    """
+    y = _float(y)
+    square = y * y
+    return 1.0 - 0.25 * square + 5.0 / 64.0 * square * square
+
+
+# --- the master curve of stick-slip at small amplitudes ---
+
+
+def master_curve(x: ArrayLike) -> Any:
+    """(mu~ - static) / (critical - static) at x = v~/v~crit for y~ << 1 [-], eq. (28); NaN for x > 1.
+
+    1 - [(3/4)(x - 1)^2 + (1/4)(x - 1)^4] is a fit to :func:`master_curve_limit`, too low by up to 0.0144 (x = 0.104);
+    against the model too low by up to 0.0142 (y~ = 0.1), 0.0166 (0.5), 0.125 (0.9), too high by at most 0.0019 (near
+    the border at y~ = 0.9).  Beyond x = 1 the polynomial falls.
+
+    >>> float(master_curve(0.5))
+    0.796875
+    """
+    x = _float(x)
+    with np.errstate(over="ignore"):
+        square = (x - 1.0) ** 2
+        return np.where(x <= 1.0, 1.0 - square * (0.75 + 0.25 * square), np.nan)
+
+
+def master_curve_limit(x: ArrayLike) -> Any:
+    """Limit of the master curve for y~ -> 0, exact [-]: N_0(x), of which eq. (28) is a fit; 1 for x >= 1.
+
+    The foot is pulled at the speed x under a limit cos t and sticks from t1 to t2: cos t1 = x (t1 < 0),
+    sin t2 - sin t1 = x (t2 - t1), an equation like Kepler's.  With D = t2 - t1
+
+        N_0(x) = 1 + [D sin t1 + x D^2/2 + cos t2 - cos t1] / (2 pi),    N_0'(0) = pi.
+
+    Full relative accuracy down to x = 0.  The curves of the model differ from it by 2e-4 (y~ = 0.1), 1.6e-3 (0.3),
+    5e-3 (0.5).  Derived in docs/model.md.
+
+    >>> round(float(master_curve_limit(1e-12)) / 1e-12, 4)        # the slope at creep, pi
+    3.1416
+    """
+    # b = arcsin x, 2 d = duration of slip: sin d sin(d - b) = (pi - d) sin b has one root in (b, b + pi/2)
+    x = np.minimum(_float(x), 1.0)
+    b = np.arcsin(x)
+    low, high = b, b + 0.5 * np.pi
+    d = np.minimum(0.5 * b + np.sqrt(0.25 * b * b + np.pi * b), 0.5 * (low + high))
+    for _ in range(60):
+        f = np.sin(d) * np.sin(d - b) - (np.pi - d) * x
+        low, high = np.where(f < 0.0, d, low), np.where(f < 0.0, high, d)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = d - f / (2.0 * np.sin(d) * np.cos(d - b))
+        before, d = d, np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
+        if np.all(np.abs(d - before) <= 4e-16 * d):
+            break
+    stick = 2.0 * (np.pi - d)
+    # integrals of 1 + cos t over stick and slip, every term positive
+    pulled = stick * (2.0 * np.sin(0.5 * b) ** 2 + 0.5 * x * stick)
+    followed = 2.0 * _minus_sine(d) + 4.0 * np.sin(d) * np.sin(0.5 * (d - b)) ** 2
+    return (pulled + followed) / (2.0 * np.pi)
+
+
+def _minus_sine(d: Any) -> Any:
+    """D - sin d without cancellation."""
+    q = d * d
+    series = d * q / 6.0 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156)))))
+    return np.where(d < 0.7, series, d - np.sin(d))
+
+
+# --- the border of continuous sliding ---
+
+
+def border_23(y: ArrayLike) -> Any:
+    """v~crit for y~ << 1 [-]: the root of y~^2 = 2 v~ (1 + v~^2) (sqrt(1 + v~^2) + v~), eq. (23).
+
+    With v~ = d / (2 sqrt(1 + d)) it is the cubic d (d + 2)^2 = 4 y~^2 (1 + d), solved by Newton's method.
+    Off by -1.2 % (y~ = 0.5), +0.7 % (1), +12 % (2).
+    """
+    y = _float(y)
+    bounded = np.minimum(y, 1e50)
+    square = bounded * bounded
+    d = np.minimum(square, 2.0 * bounded)  # above the root, from where Newton's method falls towards it
+    for _ in range(60):
+        f = d * ((d + 4.0) * d + 4.0 - 4.0 * square) - 4.0 * square
+        step = f / ((3.0 * d + 8.0) * d + 4.0 * (1.0 - square) + np.where(d == 0.0, 1.0, 0.0))
+        d = d - step
+        if np.all(np.abs(step) <= 1e-15 * d):
+            break
+    return np.where(y < 1e50, 0.5 * d / np.sqrt(1.0 + d), np.sqrt(0.5 * y))
+
+
+def border_24(y: ArrayLike) -> Any:
+    """v~crit for y~ << 1 [-]: sqrt(1/4 + y~^2/2) - 1/2, eqs. (24), (39).
+
+    Off by -0.4 % (y~ = 0.3), +0.4 % (0.5), +12.6 % (1), +61 % (2).
+
+    >>> float(border_24(2.0))
+    1.0
+    """
+    y = _float(y)
+    root = np.hypot(0.5, y * np.sqrt(0.5))
+    return 0.5 * y * (y / (root + 0.5))
+
+
+def border_26(y: ArrayLike) -> Any:
+    """v~crit for y~ >> 1 [-]: sqrt(y~ / 4.5), eq. (26).  Off by -1.08 % for y~ -> infinity, -5 % at y~ = 2.25."""
+    return np.sqrt(_float(y) / 4.5)
+
+
+def border_27(y: ArrayLike) -> Any:
+    """v~crit for every y~ [-]: 0.47 y~^(5/2) / (y~^2 + 0.94 y~^(1/2) / (1 + y~^2)), eq. (27).
+
+    Off by -5.2 % at y~ = 0.413, less elsewhere; -1.38 % for y~ -> infinity.
+    """
+    y = _float(y)
+    root = np.sqrt(y)
+    with np.errstate(over="ignore", divide="ignore"):  # divided through by y~^2, so that large y~ does not overflow
+        return 0.47 * root / (1.0 + 0.94 / (root * y * (1.0 + y * y)))
+
+
+def border_small_amplitude(y: ArrayLike) -> Any:
+    """v~crit for y~ -> 0, exact to two terms [-]: (y~^2 / 2)(1 - 5 y~^2 / 12).  Relative error O(y~^4).
+
+    Eqs. (23) and (24) have 1/2 in place of 5/12.
+    """
+    y = _float(y)
+    return 0.5 * y * y * (1.0 - 5.0 / 12.0 * y * y)
+
+
+def border_large_amplitude(y: ArrayLike) -> Any:
+    """v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.  Relative error 0.07/y~."""
+    return np.sqrt(_float(y) / BORDER_CONSTANT)
+
+
+def border_blend(y: ArrayLike) -> Any:
+    """v~crit for every y~ [-] by one formula of this project, relative error below 0.6 percent.
+
+    v~crit = (y~^2 / 2) [(1 + (5/9 + d) w + c d w^2) / (1 + d w)]^(-3/4) with w = y~^2 and c = (4.402914 / 4)^(2/3): two
+    terms of the small amplitudes, the leading one of the large; d is fitted.
+    """
+    y = _float(y)
+    # in w below 1 and in 1/w above, so that no square overflows that need not
+    low, high = np.minimum(y, 1.0) ** 2, np.maximum(y, 1.0) ** -2.0
+    c = (BORDER_CONSTANT / 4.0) ** (2.0 / 3.0)
+    below = 0.5 * low * ((1.0 + (5.0 / 9.0 + _BLEND) * low + c * _BLEND * low * low) / (1.0 + _BLEND * low)) ** -0.75
+    fraction = (high * high + (5.0 / 9.0 + _BLEND) * high + c * _BLEND) / (high + _BLEND)
+    above = 0.5 * np.sqrt(np.maximum(y, 1.0)) * fraction**-0.75
+    return np.where(y <= 1.0, below, above)
+
+
+def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
+    """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).  eta = y~ - 1."""
+    return np.vectorize(normal_form_root, otypes=[np.float64])(v, eta)

@@ -1,0 +1,39 @@
+"""What to install when a package is missing that only one part of the project needs."""
+
+from __future__ import annotations
+
+__all__ = ["missing"]
+
+_OURS = ("mumacro", "builder", "service")
+
+
+def missing(extra: str, error: ImportError) -> str:
+    """Say in one line what to install.
+
+    Parameters
+    ----------
+    extra : str
+        The extra of the distribution that holds the package, e.g. ``"service"``; empty for the library itself.
+    error : ImportError
+        What the import raised.
+
+    Returns
+    -------
+    str
+        The line.
+
+    Raises
+    ------
+    ImportError
+        ``error`` itself when one of the project's own modules is missing: a fault that must not be hidden.
+
+    Examples
+    --------
+    >>> missing("files", ModuleNotFoundError("No module named 'pyarrow'", name="pyarrow"))
+    "pyarrow is not installed: pip install 'mumacro[files]' (in a checkout: pip install -e '.[files]')"
+    """
+    package = (error.name or "").partition(".")[0]
+    if not package or package in _OURS:
+        raise error
+    brackets = f"[{extra}]" if extra else ""
+    return f"{package} is not installed: pip install 'mumacro{brackets}' (in a checkout: pip install -e '.{brackets}')"

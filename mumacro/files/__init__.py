@@ -1,0 +1,10 @@
+"""Files of cases, answered without a server: Parquet, CSV and NDJSON, in constant memory, resumable.  Needs pyarrow.
+
+``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes files.
+"""
+
+from mumacro.files.answering import ANSWERS, REJECTS, answer
+from mumacro.files.columns import FilesError
+from mumacro.files.run import Summary, evaluate_files
+
+__all__ = ["ANSWERS", "REJECTS", "FilesError", "Summary", "answer", "evaluate_files"]

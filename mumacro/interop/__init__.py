@@ -1,0 +1,1 @@
+"""Containers of other libraries: each module loads its library only where it is used."""

@@ -1,0 +1,228 @@
+"""The friction law: mu_macro over a range of v0, or of any one input, with its marks and the paper's approximations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro import closed_forms
+from mumacro.answer import Answer
+from mumacro.dimensional import FIELDS, POSITIVE
+from mumacro.errors import InputError
+from mumacro.inverse import Crossing, border_crossings, checked_case
+from mumacro.surrogate import Surrogate
+
+__all__ = [
+    "APPROXIMATIONS",
+    "BORDERS",
+    "EQUATIONS",
+    "SCALES",
+    "Law",
+    "approximations",
+    "border_speeds",
+    "friction_law",
+    "sweep_values",
+]
+
+Array = NDArray[np.float64]
+
+SCALES = ("log", "linear")
+
+#: column -> what it is and where it is given; NaN elsewhere.  Without an equation number it is this project's own.
+APPROXIMATIONS = {
+    "static": "eqs. (16), (38), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
+    "creep": "slow sliding, first order: mu0 (sqrt(1 - y~^2) + pi v~ / (2 (1 - y~^2))), or mu0 C(y~) v~ for y~ > 1, C "
+    "from the table; given up to mu0",
+    "master_curve": "eq. (28), stick-slip at y~ << 1, between (38) at v0 = 0 and (40) at the border (27); given for "
+    "y~ <= 1 up to that border",
+    "master_curve_limit": "the limit of (28) for y~ -> 0, between (38) and the table's value at the table's border; "
+    "given for y~ <= 1 up to the border",
+    "critical": "eqs. (32), (40), the value at the border for y~ << 1: mu0 (1 - y~^2 / 4); given for y~ <= 1",
+    "small_amplitude": "eq. (31), continuous sliding at y~ << 1: mu0 (1 - y~^2 / (4 (1 + v~^2))); given for y~ <= 1 "
+    "in continuous sliding",
+    "continuous": "mu0 (2/pi) K(i y~ / sqrt(1 + v~^2)), eqs. (31) and (35) in one; given in continuous sliding",
+    "rigid": "eqs. (35), (37), fast sliding or rigid contact: mu0 (2/pi) K(i y~/v~)",
+    "corner": "slow sliding near y~ = 1, root of mu~^3 + 2 (y~ - 1) mu~ = pi v~; given for |y~ - 1| <= 0.5, mu~ <= 0.7",
+}
+#: v0 at which continuous sliding begins: column -> what it is and where it is given
+BORDERS = {
+    "exact": "the table's border",
+    "eq_23": "l0 omega v~, v~ the root of y~^2 = 2 v~ (1 + v~^2)(sqrt(1 + v~^2) + v~); given for y~ <= 1",
+    "eq_24": "eqs. (24), (39): (omega / 2)(sqrt(l0^2 + 2 y0^2) - l0); given for y~ <= 1",
+    "eq_26": "l0 omega sqrt(y~ / 4.5); given for y~ >= 1",
+    "eq_27": "l0 omega 0.47 y~^(5/2) / (y~^2 + 0.94 y~^(1/2) / (1 + y~^2))",
+    "small_amplitude": "l0 omega (y~^2 / 2)(1 - 5 y~^2 / 12); given for y~ <= 1",
+    "large_amplitude": "l0 omega sqrt(y~ / 4.402914), eq. (26) with the exact constant; given for y~ >= 1",
+    "blend": "one formula for every y~, within 0.6 percent",
+}
+#: the paper's equation -> the column that holds it, in APPROXIMATIONS or BORDERS
+EQUATIONS = {
+    16: "static", 23: "eq_23", 24: "eq_24", 26: "eq_26", 27: "eq_27", 28: "master_curve", 31: "small_amplitude",
+    32: "critical", 35: "rigid", 37: "rigid", 38: "static", 39: "eq_24", 40: "critical",
+}  # fmt: skip
+_CORNER_REACH, _CORNER_TOP = 0.5, 0.7
+
+
+@dataclass(frozen=True)
+class Law:
+    """A sweep of one input.
+
+    Attributes
+    ----------
+    along : str
+        The swept input.
+    values : ndarray
+        Its values [SI], ascending, shape (n,).
+    answer : Answer
+        What the surrogate says at each, arrays (n,).
+    mu_static : ndarray
+        Static limit (v0 -> 0) of each case [-], eq. (38), shape (n,).
+    border : tuple of Crossing
+        Where in the range continuous sliding begins or ends.
+    """
+
+    along: str
+    values: Array
+    answer: Answer
+    mu_static: Array
+    border: tuple[Crossing, ...]
+
+
+def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
+    """``points`` values from ``start`` to ``stop``, both included exactly.
+
+    Raises
+    ------
+    InputError
+        Ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
+    """
+    if along not in FIELDS:
+        raise InputError("along", along, f"one of {', '.join(FIELDS)}")
+    if scale not in SCALES:
+        raise InputError("scale", scale, f"one of {', '.join(SCALES)}")
+    if points < 2:
+        raise InputError("points", points, ">= 2")
+    positive = along in POSITIVE or scale == "log"
+    if not (math.isfinite(start) and (start > 0.0 or (start == 0.0 and not positive))):
+        raise InputError("start", start, "finite and > 0" if positive else "finite and >= 0")
+    if not (math.isfinite(stop) and stop > start):
+        raise InputError("stop", stop, "finite and > start")
+    if scale == "linear":
+        share = np.linspace(0.0, 1.0, points)
+        values: Array = start * (1.0 - share) + stop * share
+    else:
+        values = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))  # decades come out exactly
+    values[0], values[-1] = start, stop
+    np.clip(values, start, stop, out=values)
+    return values
+
+
+def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[str, float | None]) -> Law:
+    """mu_macro at ``values`` (ascending) of the input ``along``; ``case`` holds the other five inputs.
+
+    Raises
+    ------
+    InputError
+        An input that is missing, out of bounds, or given twice.
+    """
+    known = checked_case(case, along)
+    full: dict[str, Any] = {"k": None, **known, along: values}
+    answer = surrogate.evaluate(**full, groups=True)
+    mu0 = np.broadcast_to(np.asarray(full["mu0"], dtype=np.float64), values.shape)
+    at_rest = (np.asarray(full["y0"]) == 0.0) | (np.asarray(full["omega"]) == 0.0)
+    static = np.where(at_rest, mu0, mu0 * closed_forms.static_limit(answer.y_tilde))
+    crossings = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]))
+    return Law(along, values, answer, static, crossings)
+
+
+def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
+    """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN where one is not meant to hold.
+
+    ``case`` holds the other five inputs, as :func:`friction_law` had them.
+    """
+    full: dict[str, Any] = {"k": None, **checked_case(case, law.along), law.along: law.values}
+    mu0 = np.asarray(full["mu0"], dtype=np.float64)
+    v, y = (np.asarray(x, dtype=np.float64) for x in (law.answer.v_tilde, law.answer.y_tilde))
+    elastic = np.isfinite(y) & np.isfinite(v)
+    v_safe, y_safe = np.where(elastic, v, 1.0), np.where(elastic, y, 0.0)
+    low, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
+    y_low = np.minimum(y_safe, 1.0)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        ratio = np.where(v_safe > 0.0, y_safe / v_safe, np.inf)
+        rigid = np.where(np.isfinite(ratio), closed_forms.outer(np.where(np.isfinite(ratio), ratio, 0.0)), 0.0)
+        small = closed_forms.small_amplitude(np.minimum(v_safe, 1e150), y_low)
+    # rigid contact has no v~ and y~ of its own; eq. (37) is then the answer itself
+    rigid = np.where(elastic, rigid, np.asarray(law.answer.mu_ratio))
+    near = elastic & (np.abs(y_safe - 1.0) <= _CORNER_REACH) & (v_safe > 0.0) & (v_safe < 1.0)
+    corner = np.full(v.shape, np.nan)
+    corner[near] = closed_forms.corner_root(v_safe[near], y_safe[near] - 1.0)
+    creep = _creep(surrogate, law, full)
+    critical, border = closed_forms.critical(y_low), surrogate.v_tilde_crit(y_low)
+    fit = closed_forms.master_curve(_share(v_safe, closed_forms.border_27(y_low)))
+    limit = closed_forms.master_curve_limit(_share(v_safe, border))
+    top = surrogate.mu_ratio(border, y_low)
+    static = closed_forms.static_limit(y_low)
+    return {
+        "static": law.mu_static.copy(),
+        "creep": np.where(creep <= mu0, creep, np.nan),
+        "master_curve": np.where(low, mu0 * (static + (critical - static) * fit), np.nan),
+        "master_curve_limit": np.where(low & (v_safe <= border), mu0 * (static + (top - static) * limit), np.nan),
+        "critical": np.where(low, mu0 * critical, np.nan),
+        "small_amplitude": np.where(low & slides, mu0 * small, np.nan),
+        "continuous": np.where(slides, mu0 * closed_forms.continuous(v_safe, y_safe), np.nan),
+        "rigid": mu0 * rigid,
+        "corner": np.where(corner <= _CORNER_TOP, mu0 * corner, np.nan),
+    }
+
+
+def _share(v: Array, border: Array) -> Array:
+    """v~/v~crit [-]; without oscillation there is no border, and every speed but 0 is infinitely far above it."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        out: Array = np.where(v > 0.0, v / border, 0.0)
+    return out
+
+
+def _creep(surrogate: Surrogate, law: Law, full: Mapping[str, Any]) -> Array:
+    """The tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)."""
+    at_rest = surrogate.evaluate(
+        mu0=full["mu0"], Fz=full["Fz"], k=full["k"], y0=full["y0"], omega=full["omega"],
+        v0=np.zeros_like(law.values), gradient=True,
+    )  # fmt: skip
+    slope = np.asarray((at_rest.gradient or {})["v0"])
+    with np.errstate(invalid="ignore", over="ignore"):
+        out: Array = law.mu_static + slope * np.asarray(full["v0"], dtype=np.float64)
+    return out
+
+
+def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
+    """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in :data:`BORDERS`; (n,).
+
+    NaN where an approximation is not meant to hold and where y~ is beyond double range; 0 for rigid contact and without
+    oscillation, which never stick.
+    """
+    full: dict[str, Any] = {"k": None, **checked_case(case, law.along), law.along: law.values}
+    y = np.broadcast_to(np.asarray(law.answer.y_tilde, dtype=np.float64), law.values.shape)
+    omega = np.asarray(full["omega"], dtype=np.float64)
+    rigid = np.isinf(np.asarray(math.inf if full["k"] is None else full["k"], dtype=np.float64))
+    never = np.broadcast_to((np.asarray(full["y0"]) == 0.0) | (omega == 0.0) | rigid, y.shape)
+    usable = np.isfinite(y) & ~never
+    y_safe = np.where(usable, y, 1.0)
+    low, high = np.minimum(y_safe, 1.0), np.maximum(y_safe, 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        unit = np.where(usable, np.asarray(law.answer.length_scale) * omega, np.nan)
+        found = {
+            "exact": surrogate.v_tilde_crit(y_safe),
+            "eq_23": np.where(y_safe <= 1.0, closed_forms.border_23(low), np.nan),
+            "eq_24": np.where(y_safe <= 1.0, closed_forms.border_24(low), np.nan),
+            "eq_26": np.where(y_safe >= 1.0, closed_forms.border_26(high), np.nan),
+            "eq_27": closed_forms.border_27(y_safe),
+            "small_amplitude": np.where(y_safe <= 1.0, closed_forms.border_small_amplitude(low), np.nan),
+            "large_amplitude": np.where(y_safe >= 1.0, closed_forms.border_large_amplitude(high), np.nan),
+            "blend": closed_forms.border_blend(y_safe),
+        }
+        return {name: np.where(never, 0.0, unit * column) for name, column in found.items()}

@@ -1,0 +1,139 @@
+"""How many periods until a disturbed contact is steady again: the kinetics behind the averages, from table quantities.
+
+Two motions of the same contact, steady and disturbed, are two elongations u_a, u_b under the same motion of the upper
+point.  They differ by d = u_b - u_a, in units of l0, and only slip changes d (docs/model.md derives it):
+
+    |d|^2/2 falls at the rate (lam_a + lam_b)(1 - u_a.u_b) >= (lam_a + lam_b)|d|^2/2,    lam = slip speed of the foot
+
+With the slip path S of the steady cycle per period this gives for every disturbance, of any size,
+
+    |d| after n periods <= |d| exp(-n S/2),
+
+and for small ones exp(-n S) in continuous sliding, exp(-n S) cos^(2n)(th1 - th0) in stick-slip, where th0 and th1 are
+the angles at which the contact begins and ends to stick.  S follows from the energy that drive and shaker put in:
+
+    S = 2 pi (v~ mu~ + p),    p = <y~ cos tau u_y>, the oscillation power
+
+Both are tabulated, with bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mumacro.errors import InputError
+from mumacro.surrogate import Surrogate
+
+__all__ = ["Settling", "settling"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How fast a contact forgets; floats for scalar inputs, arrays of the broadcast shape otherwise.
+
+    Attributes
+    ----------
+    periods : float or ndarray
+        Periods [-] until a small disturbance has fallen to ``remaining``; in stick-slip at most as many.
+    periods_any : float or ndarray
+        Periods [-] after which any disturbance has, whatever its size: twice ``periods``.
+    time : float or ndarray
+        ``periods`` in seconds; finite without oscillation, too.
+    slip_path : float or ndarray
+        Path of the foot per period [l0].  exp(-slip_path) is the multiplier of a small disturbance per period.
+    error_bound : float or ndarray
+        Bound of the error of ``periods`` that comes from the table [-]; NaN from a table without bounds of the power.
+    """
+
+    periods: Any
+    periods_any: Any
+    time: Any
+    slip_path: Any
+    error_bound: Any
+
+
+def settling(
+    surrogate: Surrogate,
+    *,
+    mu0: ArrayLike,
+    Fz: ArrayLike,
+    k: ArrayLike | None,
+    y0: ArrayLike,
+    omega: ArrayLike,
+    v0: ArrayLike,
+    remaining: float = 0.01,
+) -> Settling:
+    """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        The table that is asked for mu~ and for the oscillation power.
+    mu0, Fz, k, y0, omega, v0 : array_like
+        The case [-, N, N/m, m, rad/s, m/s], as in :meth:`Surrogate.evaluate`.
+    remaining : float
+        What is left of the disturbance [-], 0 < remaining < 1.
+
+    Returns
+    -------
+    Settling
+        Infinite where nothing slips (v0 = 0 with y~ <= 1, or with omega = 0): such a contact never forgets.  Zero for
+        rigid contact, whose friction follows at once.  NaN at an illegal case of an array, if the surrogate lets it
+        pass.
+
+    Raises
+    ------
+    InputError
+        An input out of bounds.
+
+    Notes
+    -----
+    The force averaged over period n differs from the steady one by at most mu0 Fz |d| of that period.  Source: this
+    project; the paper (Sec. 8) names the kinetics as open.
+
+    Examples
+    --------
+    >>> from mumacro import Surrogate
+    >>> s = Surrogate.open("tables/mumacro-1e-10.nc")
+    >>> found = settling(s, mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> round(found.periods, 2), round(found.slip_path, 3)      # slow sliding forgets slowly
+    (22.86, 0.201)
+    """
+    if not 0.0 < remaining < 1.0:
+        raise InputError("remaining", remaining, "> 0 and < 1")
+    given = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
+    answer = surrogate.evaluate(**given, groups=True)  # type: ignore[arg-type]
+    shape = np.shape(answer.mu_ratio)
+    friction, frequency, speed, amplitude = (
+        np.broadcast_to(np.asarray(x, dtype=np.float64), shape) for x in (mu0, omega, v0, y0)
+    )
+    v, y, l0, mu = (
+        np.asarray(x, dtype=np.float64) for x in (answer.v_tilde, answer.y_tilde, answer.length_scale, answer.mu_ratio)
+    )
+    still = (amplitude == 0.0) | (frequency == 0.0)  # no oscillation: dragged only, mu~ = 1
+    inside = np.isfinite(v) & np.isfinite(y) & ~still
+    power, power_bound = surrogate.power_with_bound(np.where(inside, v, 1.0), np.where(inside, y, 0.0))
+    bound = power_bound
+    decay = math.log(1.0 / remaining)
+    with np.errstate(over="ignore", under="ignore", divide="ignore", invalid="ignore"):
+        # slip speed of the foot in units of l0 omega; infinite for rigid contact and beyond double range
+        rate = np.where(inside, v * mu + power, np.where(still & (speed > 0.0), speed / l0 / frequency, np.inf))
+        rate = np.where(still & (speed == 0.0), 0.0, rate)
+        rate = np.where(np.isnan(mu), np.nan, rate)  # an illegal case of an array
+        off = np.where(inside, (v * np.asarray(answer.error_bound) / friction + bound) / rate, 0.0)
+        slip_path = 2.0 * math.pi * rate
+        periods = decay / slip_path
+        time = np.where(still & ~np.isnan(mu), l0 * (decay / speed), decay / rate / frequency)
+        error = np.where(off >= 1.0, np.inf, periods * off / (1.0 - off))
+        # 0 / 0 in both: rigid contact that stands still slips nowhere
+        time = np.where(rate == 0.0, np.inf, time)
+        error = np.where(rate == 0.0, np.inf, error)
+    found = (periods, 2.0 * periods, time, slip_path, error)
+    return Settling(*(x if shape else float(x) for x in found))

@@ -1,0 +1,287 @@
+"""Tangential contact stiffness from materials and geometry: the input k that every question needs first.
+
+Half-space elasticity, two smooth elastic bodies, small strains:
+
+    1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2          1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,   G = E / (2 (1 + nu))
+
+    circular contact of radius a      k = 8 a G*  (tangential),    2 a E*  (normal)
+    ball of radius R under Fz         a = (3 Fz R / (4 E*))^(1/3)
+    rigid flat punch                  a is its radius
+    cylinder of length L lying        half width b = sqrt(4 Fz R / (pi L E*)), k of an elliptic contact
+
+k is the stiffness of a contact that sticks everywhere.  Under a curved body the rim slips first: gross slip begins at
+the displacement 3/2 mu0 Fz/k, not at mu0 Fz/k, so that 2/3 k is the secant stiffness (docs/validity.md says what
+that does to mu_macro).  Under a flat punch with full contact all of it slips at once, and one spring is exact.
+
+Not included: roughness, which adds compliance in series (:func:`in_series`); layers; plastic flow, which begins below
+the surface at a Hertz pressure of about 1.6 times the yield strength; the compliance of the holder, in series as well.
+
+References
+----------
+R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16 (1949) 259.
+K. L. Johnson, "Contact Mechanics", Cambridge University Press (1985), Secs. 4.2 (Hertz), 7.2 (tangential loading).
+V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2, 8.2; its G* is four times the one here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mumacro.errors import InputError
+
+__all__ = ["Contact", "Material", "ball_on_flat", "cylinder_on_flat", "flat_punch", "in_series"]
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not 0.0 < value < math.inf:
+            raise InputError(name, value, "finite and > 0")
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic elastic body.
+
+    Parameters
+    ----------
+    E : float
+        Young's modulus [Pa], > 0; ``math.inf`` for a rigid body.
+    nu : float
+        Poisson's ratio [-], -1 < nu <= 0.5.
+
+    Raises
+    ------
+    InputError
+        A value out of bounds.
+
+    Examples
+    --------
+    >>> steel = Material(E=210e9, nu=0.3)
+    >>> round(steel.G / 1e9, 2)
+    80.77
+    """
+
+    E: float
+    nu: float
+
+    def __post_init__(self) -> None:
+        if not self.E > 0.0:
+            raise InputError("E", self.E, "> 0")
+        if not -1.0 < self.nu <= 0.5:
+            raise InputError("nu", self.nu, "> -1 and <= 0.5")
+
+    @property
+    def G(self) -> float:
+        """Shear modulus [Pa]."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What a contact of two bodies is.
+
+    Attributes
+    ----------
+    k : float
+        Tangential stiffness [N/m] while it sticks everywhere: the input of the model.
+    k_normal : float
+        Normal stiffness [N/m].
+    half_width : float
+        Radius of a circular contact, half width of a line contact [m].
+    pressure : float
+        Largest pressure [Pa]: Hertz's, or the mean one under a flat punch.
+    """
+
+    k: float
+    k_normal: float
+    half_width: float
+    pressure: float
+
+    def length_scale(self, mu0: float, Fz: float) -> float:
+        """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
+        _positive(mu0=mu0, Fz=Fz)
+        return mu0 * (Fz / self.k)
+
+
+def _moduli(first: Material, second: Material) -> tuple[float, float]:
+    """E* and G* [Pa]."""
+    compliance = (1.0 - first.nu**2) / first.E + (1.0 - second.nu**2) / second.E
+    shear = (2.0 - first.nu) / first.G + (2.0 - second.nu) / second.G
+    if not compliance > 0.0:
+        raise InputError("E", math.inf, "finite in at least one of the two bodies")
+    return 1.0 / compliance, 1.0 / shear
+
+
+def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) -> Contact:
+    """A ball on a flat, or two balls: Hertz's radius, Mindlin's stiffness.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the ball [m]; of two balls 1/(1/R1 + 1/R2).
+    Fz : float
+        Normal force [N].
+    first, second : Material
+        The two bodies.
+
+    Returns
+    -------
+    Contact
+        k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
+
+    Raises
+    ------
+    InputError
+        A value out of bounds, or two rigid bodies.
+
+    Notes
+    -----
+    Johnson (1985), eqs. (4.22), (7.42).  Holds for half_width << radius, below 0.3 of it to about 10 %.  The normal
+    stiffness is the tangent dFz/dz.
+
+    Examples
+    --------
+    >>> steel = Material(E=210e9, nu=0.3)
+    >>> contact = ball_on_flat(radius=5e-3, Fz=10.0, first=steel, second=steel)
+    >>> f"{contact.k:.3g} N/m, {1e6 * contact.half_width:.1f} um, {contact.pressure / 1e9:.2f} GPa"
+    '1.31e+07 N/m, 68.8 um, 1.01 GPa'
+    >>> f"{1e6 * contact.length_scale(mu0=0.3, Fz=10.0):.2f} um"
+    '0.23 um'
+    """
+    _positive(radius=radius, Fz=Fz)
+    modulus, shear = _moduli(first, second)
+    a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
+    return Contact(8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a))
+
+
+def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> Contact:
+    """A flat circular end in full contact, such as a pin that has run in.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the face [m].
+    Fz : float
+        Normal force [N]; sets the pressure only, k does not depend on it.
+    first, second : Material
+        The two bodies; exact for a rigid punch on a half-space.
+
+    Returns
+    -------
+    Contact
+        ``pressure`` is the mean one; at the edge it is singular in elasticity.
+
+    Raises
+    ------
+    InputError
+        A value out of bounds, or two rigid bodies.
+
+    Examples
+    --------
+    >>> steel, rigid = Material(E=210e9, nu=0.3), Material(E=float("inf"), nu=0.3)
+    >>> contact = flat_punch(radius=1e-3, Fz=10.0, first=rigid, second=steel)
+    >>> f"{contact.k:.3g} N/m"
+    '3.8e+08 N/m'
+    """
+    _positive(radius=radius, Fz=Fz)
+    modulus, shear = _moduli(first, second)
+    return Contact(8.0 * radius * shear, 2.0 * radius * modulus, radius, Fz / (math.pi * radius * radius))
+
+
+def cylinder_on_flat(
+    radius: float, length: float, Fz: float, first: Material, second: Material, along: bool = False
+) -> Contact:
+    """A cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact.
+
+    A line contact of unlimited length has no stiffness of its own, since its displacement grows with the logarithm of
+    the size of the bodies.  Here the contact is finite, and is replaced by the ellipse of the same area and
+    proportions, which under a tangential force moves as one.  An estimate: right to about 10 % as far as the bodies are
+    large beside ``length``.
+
+    Parameters
+    ----------
+    radius, length : float
+        Of the cylinder [m].
+    Fz : float
+        Normal force [N].
+    first, second : Material
+        The two bodies.
+    along : bool
+        True for a displacement along the cylinder's axis, False across it.
+
+    Returns
+    -------
+    Contact
+        With nu > 0 the contact is stiffer across the axis, by up to 1/(1 - nu).
+
+    Raises
+    ------
+    InputError
+        A value out of bounds, two rigid bodies, or a contact wider than long, which is no line contact.
+
+    Notes
+    -----
+    Half width: Johnson (1985), eq. (4.43).  Stiffness: Mindlin (1949), by integrating Cerruti's solution
+    under the traction that moves an ellipse as one.
+
+    Examples
+    --------
+    >>> steel = Material(E=210e9, nu=0.3)
+    >>> contact = cylinder_on_flat(radius=5e-3, length=5e-3, Fz=100.0, first=steel, second=steel)
+    >>> f"{contact.k:.2g} N/m, {1e6 * contact.half_width:.1f} um"
+    '1.7e+08 N/m, 33.2 um'
+    """
+    _positive(radius=radius, length=length, Fz=Fz)
+    modulus, _ = _moduli(first, second)
+    b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
+    if 2.0 * b > length:
+        raise InputError("length", length, f">= {2.0 * b:.3g}, the width of the contact; a shorter one is a punch")
+    scale = 2.0 / math.sqrt(math.pi)  # of the ellipse whose area is that of the rectangle
+    narrow, wide = scale * b, scale * 0.5 * length
+    shear = 1.0 / sum(_ellipse_compliance(narrow, wide, body, along) for body in (first, second))
+    normal = 1.0 / sum(_ellipse_compliance(narrow, wide, Material(body.E, 0.0), along) * (1.0 - body.nu**2)
+                       for body in (first, second))  # fmt: skip
+    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length))
+
+
+def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool) -> float:
+    """Tangential displacement over force [m/N] of a half-space under q ~ (1 - x^2/narrow^2 - y^2/wide^2)^(-1/2).
+
+    At the middle it is (1/(8 pi G narrow wide)) times the integral over all directions of R ((1 - nu) + nu c^2), R the
+    half chord, c the cosine with the force.  In t with tan(phi) = (wide/narrow) tan(t) R dphi is
+    narrow wide dt / sqrt(wide^2 sin^2 + narrow^2 cos^2), smoothed further by sinh at its peak.
+    """
+    # t = 0 points along the narrow axis, where the integrand has a peak of width narrow/wide
+    span = math.asinh(0.5 * math.pi * wide / narrow)
+    nodes, weights = np.polynomial.legendre.leggauss(80)
+    s = 0.5 * span * (nodes + 1.0)
+    t = (narrow / wide) * np.sinh(s)
+    dt = 0.5 * span * weights * (narrow / wide) * np.cosh(s)
+    x, y = narrow * np.cos(t), wide * np.sin(t)
+    square = (y if along else x) ** 2 / (x * x + y * y)
+    # R dphi = narrow wide dt / R(t) with R(t) = |(x, y)|
+    total = 4.0 * float((dt / np.hypot(x, y) * ((1.0 - body.nu) + body.nu * square)).sum())
+    return total / (8.0 * math.pi * body.G)
+
+
+def in_series(*stiffnesses: float) -> float:
+    """Stiffness [N/m] of springs one behind the other, such as contact, roughness and holder: 1/k = sum of 1/k_i.
+
+    Raises
+    ------
+    InputError
+        A stiffness that is not > 0; ``math.inf`` is a rigid part.
+
+    Examples
+    --------
+    >>> round(in_series(3e6, 6e6))
+    2000000
+    """
+    for value in stiffnesses:
+        if not value > 0.0:
+            raise InputError("stiffness", value, "> 0")
+    total = sum(1.0 / value for value in stiffnesses)
+    return math.inf if total == 0.0 else 1.0 / total

@@ -1,0 +1,575 @@
+"""The surrogate: what users hold.  Value, regime, source, gradient, power and stick fraction, each with its bound."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mumacro import batch, charts, closed_forms, dimensional, evaluate
+from mumacro.answer import Answer
+from mumacro.border import Border
+from mumacro.bundled import bundled_tables
+from mumacro.cells import block_rows, cells_2d, joined
+from mumacro.errors import InputError, TableError
+from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
+
+__all__ = ["Surrogate"]
+
+Array = NDArray[np.float64]
+_PLACED = charts.CORNER, charts.FAST, charts.OTHER  # sources that common_ratio leaves to be answered
+
+
+class Surrogate:
+    """mu~(v~, y~) from one table; open it once, share it between threads and processes.
+
+    One policy for all methods: a scalar that is out of bounds raises :class:`InputError`; in an array it gives NaN,
+    with the source code -1.  What is no real number raises in either case.
+
+    Examples
+    --------
+    >>> s = Surrogate.open()
+    >>> answer = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+    >>> round(answer.mu_macro, 6), answer.regime
+    (0.240012, 'stick_slip')
+    """
+
+    def __init__(self, table: Table, path: str | Path, threads: int | None = None, image: bytes | None = None) -> None:
+        cores = os.cpu_count() or 1
+        if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
+            raise InputError("threads", threads, "None (all cores) or a whole number from 1 to 1024")
+        self.threads = cores if threads is None else threads
+        self._asked_threads = threads
+        self._image = image
+        self.path = Path(path)
+        self.table = table
+        self.attributes = json_attributes(table)
+        self.tolerance = float(table.attributes["tolerance"])
+        self.checksum = str(table.attributes.get("content_sha256", ""))
+        self.max_abs_error = float(table.attributes.get("verified_max_abs_error", math.nan))
+        self.max_rel_error = float(table.attributes.get("verified_max_rel_error", math.nan))
+        self.border = Border(table.border)
+        _check_border(table.border, self.path)
+        pairs = list(zip(charts.CHARTS, table.blocks, strict=True))
+        coef = joined([cells_2d(chart.a, chart.b, block.values, block.cells) for chart, block in pairs])
+        self._data: batch.Data = (coef, block_rows(table.blocks), *self.border.arrays)
+        self._other_coef: dict[int, Array] = {}
+
+    @classmethod
+    def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Surrogate:
+        """Read, check and prepare a table.
+
+        Parameters
+        ----------
+        table : str, Path, float or None
+            A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it; or None for the
+            tightest bundled table.
+        threads : int, optional
+            Threads that large arrays are shared out to; all cores by default.  1 never starts one.
+
+        Raises
+        ------
+        TableError
+            The file is missing, damaged or of another format.
+        InputError
+            No bundled table meets the tolerance; ``threads`` is not a whole number from 1 to 1024.
+
+        Examples
+        --------
+        >>> Surrogate.open(1e-8).id
+        'mumacro-1e-10'
+        """
+        path = Path(table) if isinstance(table, (str, Path)) else _bundled(table)
+        image = read_image(path)
+        return cls(parse_table(image, path), path, threads, image)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle small: a bundled table by name and checksum, which also fits elsewhere; another with its bytes."""
+        if self.path.resolve() in (path.resolve() for path in bundled_tables()):
+            return _reopen, (self.path.name, self.checksum, self._asked_threads, None)
+        image = read_image(self.path) if self._image is None else self._image
+        return _reopen, (str(self.path), self.checksum, self._asked_threads, image)
+
+    def on_one_thread(self) -> Surrogate:
+        """The same table, whose calls start no thread."""
+        other = Surrogate(self.table, self.path, 1, self._image)
+        other._other_coef = self._other_coef
+        return other
+
+    @property
+    def id(self) -> str:
+        """Name of the table: the file's stem."""
+        return self.path.stem
+
+    @property
+    def blocks(self) -> list[dict[str, object]]:
+        """JSON-able description of the blocks."""
+        return [
+            {
+                "name": chart.name,
+                "regime": charts.REGIMES[chart.regime],
+                "coordinates": [chart.a.name, chart.b.name],
+                "ranges": [[chart.a.low, chart.a.high], [chart.b.low, chart.b.high]],
+                "shape": list(block.values.shape),
+                "cells": list(block.cells),
+                "quantity": chart.quantity,
+                "verified_max_abs_error": block.max_abs_error,
+                "verified_max_rel_error": block.max_rel_error,
+                "errors": {name: row.tolist() for name, row in zip(charts.QUANTITIES, block.errors, strict=True)},
+            }
+            for chart, block in zip(charts.CHARTS, self.table.blocks, strict=True)
+        ]
+
+    @property
+    def memory(self) -> int:
+        """Bytes of the cells that an evaluation of mu~ reads."""
+        return sum(array.nbytes for array in self._data)
+
+    def warm_up(self, arrays: bool = True) -> None:
+        """Load or compile the kernels of scalar calls, and of calls with ``arrays``, before they are needed."""
+        case: dict[str, Any] = dict.fromkeys(dimensional.FIELDS, 1.0)
+        self.evaluate(**case)
+        if arrays:
+            self.mu_ratio(np.array([0.1, 1e4]), 2.0)
+            self.evaluate(**{**case, "v0": np.array([0.0, 0.01])}, gradient=True)
+            self.v_tilde_crit(np.array([0.5]))
+            self.power_with_bound(0.1, 0.5)
+
+    def self_check(self) -> None:
+        """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
+        for v, y, expected in ((0.1, 0.5, KNOWN_STICK_SLIP), (2.0, 1.0, KNOWN_CONTINUOUS)):
+            mu, bound, _ = evaluate.common_ratio(v, y, *self._data)
+            if not abs(mu - expected) <= bound + 1e-15:
+                raise TableError(self.path, f"known answer at v~={v}, y~={y} is {expected!r}, the table says {mu!r}")
+
+    # --- dimensionless --------------------------------------------------------------------------------
+
+    def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
+        """mu~ = mu_macro/mu0 [-], eq. (15): the fast path.
+
+        Parameters
+        ----------
+        v_tilde, y_tilde : float or array_like
+            Dimensionless speed [-], >= 0, and amplitude [-], finite and >= 0, broadcast together.
+
+        Returns
+        -------
+        float or ndarray of float64
+            Of the broadcast shape; NaN where a value of an array is out of bounds.
+
+        Raises
+        ------
+        InputError
+            A scalar out of bounds, something that is no real number, shapes that do not broadcast.
+
+        Examples
+        --------
+        >>> s = Surrogate.open()
+        >>> round(s.mu_ratio(0.1, 0.5), 9)
+        0.94200429
+        """
+        if type(v_tilde) is float and type(y_tilde) is float:
+            mu, _, source = evaluate.common_ratio(v_tilde, y_tilde, *self._data)
+            if source < charts.FAST and source != charts.CORNER:
+                return mu
+        v, y, shape = _points(v_tilde, y_tilde)
+        if not shape:
+            mu, _, source = evaluate.answer(charts.MU, float(v[0]), float(y[0]), *self._data)
+            _refuse_illegal(source, v, y, "finite and >= 0")
+            return mu
+        return batch.ratios(self._data, v, y, self.threads, bounds=False)[0].reshape(shape)
+
+    def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+        """:meth:`mu_ratio`, the bound of its absolute error, and the source code; as there."""
+        v, y, shape = _points(v_tilde, y_tilde)
+        found = batch.ratios(self._data, v, y, self.threads, bounds=True)
+        if not shape:
+            _refuse_illegal(int(found[2][0]), v, y, "finite and >= 0")
+        return _shaped(found[0], shape), _shaped(found[1], shape), _shaped(found[2], shape)
+
+    def v_tilde_crit(self, y_tilde: ArrayLike) -> Any:
+        """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
+
+        Scalar in, float out; infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.
+        """
+        if type(y_tilde) is float and y_tilde >= 0.0:
+            return float(self.border(np.array((y_tilde,)))[0])
+        _, y, shape = _points(0.0, y_tilde)
+        found = self.border(y)
+        if not shape and math.isnan(found[0]):
+            raise InputError("y_tilde", float(y[0]), ">= 0")
+        return _shaped(found, shape)
+
+    def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
+        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
+
+        The slip dissipates v~ mu~ plus this power.  Tabulated at the nodes of mu~; the cells are prepared on first use.
+        ``v_tilde`` and ``y_tilde`` as in :meth:`mu_ratio`; an infinite amplitude gives infinite power.
+        """
+        return self.power_with_bound(v_tilde, y_tilde)[0]
+
+    def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
+        """Share of the period during which the contact sticks [-]; as :meth:`power`."""
+        return self.stick_fraction_with_bound(v_tilde, y_tilde)[0]
+
+    def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+        """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
+        return self._quantity(charts.POWER, v_tilde, y_tilde)
+
+    def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+        """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
+
+        At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
+        distance to v~crit, and v~crit is known to some digits only.
+        """
+        return self._quantity(charts.STICK, v_tilde, y_tilde)
+
+    def slopes(
+        self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
+    ) -> tuple[Any, ...]:
+        """A quantity, and its slopes v~ d/d v~ and y~ d/d y~ [-].
+
+        Parameters
+        ----------
+        v_tilde, y_tilde : float or array_like
+            As in :meth:`mu_ratio`.
+        of : str
+            "mu_ratio", "power" or "stick_fraction".
+        bounds : bool
+            Also return the bounds of the two slopes' absolute errors.
+
+        Returns
+        -------
+        tuple of float or ndarray
+            Value, slope along ln v~, slope along ln y~, and with ``bounds`` the bounds of both.
+
+        Examples
+        --------
+        >>> mu, along_v, along_y = Surrogate.open().slopes(2.0, 0.01)
+        >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
+        '-1.000e-05'
+        """
+        if of not in charts.QUANTITIES:
+            raise InputError("of", of, f"one of {', '.join(charts.QUANTITIES)}")
+        which = charts.QUANTITIES.index(of)
+        v, y, shape = _points(v_tilde, y_tilde)
+        rows = batch.slopes(which, self._of(which), v, y, self.threads)
+        if not shape and math.isnan(rows[0, 0]):
+            _refuse_illegal(-1, v, y, "finite and >= 0")
+        return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
+
+    def _of(self, which: int) -> batch.Data:
+        """What the kernels read for a quantity; its cells are cut on first use."""
+        if which == charts.MU:
+            return self._data
+        coef = self._other_coef.get(which)
+        if coef is None:
+            patches = []
+            for chart, block in zip(charts.CHARTS, self.table.blocks, strict=True):
+                values = block.power if which == charts.POWER else block.stick
+                none = np.zeros((block.a.size, block.b.size))
+                patches.append(cells_2d(chart.a, chart.b, values if values.size else none, block.cells))
+            coef = self._other_coef[which] = joined(patches)
+        return (coef, *self._data[1:])
+
+    def _quantity(self, which: int, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+        v, y, shape = _points(v_tilde, y_tilde)
+        value, bound, source = batch.quantity(which, self._of(which), v, y, self.threads)
+        if not shape:
+            _refuse_illegal(int(source[0]), v, y, ">= 0")
+        return _shaped(value, shape), _shaped(bound, shape)
+
+    # --- dimensional ----------------------------------------------------------------------------------
+
+    def evaluate(
+        self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan", **inputs: Any
+    ) -> Answer:
+        """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
+
+        Parameters
+        ----------
+        cases : mapping, pandas.DataFrame or xarray.Dataset, optional
+            The inputs by name, in place of keywords; other columns are passed by.
+        mu0 : array_like
+            Coulomb friction coefficient [-], > 0.
+        Fz : array_like
+            Normal force [N], > 0.
+        k : array_like or None
+            Tangential stiffness [N/m], > 0; None or inf is rigid contact, eq. (37).  It is always said.
+        y0 : array_like
+            Amplitude of the transverse oscillation [m], >= 0.
+        omega : array_like
+            Angular frequency [rad/s], >= 0; or
+        f : array_like
+            frequency [Hz], >= 0, in its place.
+        v0 : array_like
+            Sliding speed [m/s], >= 0.
+        gradient : bool
+            Also differentiate with respect to every input, with bounds.
+        groups : bool
+            Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and gradients have them.
+        illegal : str
+            What an illegal value of an array does: "nan" answers its case with NaN and the source -1, "raise" raises.
+
+        Returns
+        -------
+        Answer
+            Or the container of the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
+            (see :mod:`mumacro.interop.labels`).
+
+        Raises
+        ------
+        InputError
+            A scalar out of bounds; an input that is missing, unknown, said twice or no number; shapes that do not
+            broadcast.
+
+        Notes
+        -----
+        y0 = 0 or omega = 0 gives mu0.  v0 = 0 with y0, omega > 0 gives the static limit, eq. (16).
+
+        Examples
+        --------
+        >>> s = Surrogate.open()
+        >>> a = s.evaluate(mu0=0.3, Fz=10, k=[1e6, None][0], y0=[0.0, 2e-6, -1.0], f=20e3, v0=0.01)
+        >>> a.source_code.tolist()
+        [13, 5, -1]
+        """
+        if cases is None and len(inputs) == 6 and illegal in ("nan", "raise"):
+            try:
+                found = self._scalar_if_plain(inputs, gradient)
+            except KeyError:
+                found = None
+            if found is not None:
+                return found
+        answer: Answer = self._evaluate(cases, inputs, gradient, groups, illegal)
+        return answer
+
+    def evaluate_case(
+        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
+    ) -> tuple[float, float, int]:
+        """(mu~, bound of mu~, source code) of one case in plain floats, k = inf for rigid contact; -1 if illegal."""
+        mu, bound, source, _, _ = self._case(mu0, Fz, k, y0, omega, v0)
+        return mu, bound, source
+
+    def evaluate_columns(
+        self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None
+    ) -> tuple[Array, Array, Array, NDArray[np.int8]]:
+        """(mu_macro, mu~, bound of mu_macro, source code) of columns of float64, each of shape (n,) or (1,).
+
+        On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` says how many cases
+        there are where all columns have length 1.
+        """
+        columns = [_contiguous(c) for c in (mu0, Fz, k, y0, omega, v0)]
+        if n is None:
+            n = max(c.size for c in columns) if all(c.size for c in columns) else 0
+        if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
+            raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
+        macro, mu, bound, source, _, _ = batch.cases(self._data, columns, n, 1, groups=False)
+        return macro, mu, bound, source
+
+    def _case(
+        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
+    ) -> tuple[float, float, int, float, float]:
+        found: tuple[float, float, int, float, float] = dimensional.evaluate_case(
+            mu0, Fz, k, y0, omega, v0, *self._data
+        )
+        if found[2] in _PLACED:
+            return dimensional.evaluate_unusual(mu0, Fz, k, y0, omega, v0, *self._data)
+        return found
+
+    def _scalar_if_plain(self, inputs: Mapping[str, Any], gradient: bool) -> Answer | None:
+        """The answer to six legal plain floats, which need no arrays; anything else takes the careful way."""
+        a, b, c, d, e, f = (
+            inputs["mu0"], inputs["Fz"], inputs["k"], inputs["y0"], inputs["omega"], inputs["v0"],
+        )  # fmt: skip
+        if type(a) is type(b) is type(c) is type(d) is type(e) is type(f) is float:
+            found = self._case(a, b, c, d, e, f)
+            return self._scalar(a, b, c, d, e, f, found, gradient) if found[2] >= 0 else None
+        return None
+
+    def _scalar(
+        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float,
+        found: tuple[float, float, int, float, float], gradient: bool,
+    ) -> Answer:  # fmt: skip
+        mu, bound, source, v, y = found
+        quotient = Fz / k
+        length = mu0 * quotient
+        if not (1e-290 < quotient < 1e290 and 1e-290 < length < 1e290):
+            length = float(dimensional.length_scale(*(np.array(x) for x in (mu0, Fz, k))))
+        answer = Answer(mu0 * mu, mu, mu0 * bound, source, (v, y, length), self._certain)
+        if gradient:
+            out = np.empty((2, 6))
+            dimensional.gradient(mu0, Fz, k, y0, omega, v0, mu, bound, source, v, y, *self._data, out)
+            answer.gradient, answer.gradient_bound = (
+                dict(zip(dimensional.FIELDS, r, strict=True)) for r in out.tolist()
+            )
+        return answer
+
+    def _evaluate(self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str) -> Any:
+        if illegal not in ("nan", "raise"):
+            raise InputError("illegal", illegal, '"nan" or "raise"')
+        unknown = inputs.keys() - {*dimensional.FIELDS, "f"}
+        if unknown:
+            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(dimensional.FIELDS)} or f")
+        if cases is not None:
+            picked = _picked(cases)
+            if twice := picked.keys() & inputs.keys():
+                raise InputError(min(twice), inputs[min(twice)], "said once: in the cases or as a keyword")
+            inputs = {**picked, **inputs}
+        if _labelled(inputs, cases):
+            from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
+
+            return evaluate_labelled(self, cases, inputs, gradient=gradient, groups=groups, illegal=illegal)
+        columns = dimensional.as_columns(inputs)
+        try:
+            shape = np.broadcast_shapes(*(c.shape for c in columns.values()))
+        except ValueError as error:
+            shapes = {name: column.shape for name, column in columns.items()}
+            raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
+        if not shape or illegal == "raise":
+            dimensional.check_inputs(columns, inputs.get("f"))
+        if not shape:
+            a, b, c, d, e, f = (float(column) for column in columns.values())
+            return self._scalar(a, b, c, d, e, f, self._case(a, b, c, d, e, f), gradient)
+        return self._arrays(list(columns.values()), shape, gradient, gradient or groups)
+
+    def _arrays(self, columns: list[Array], shape: tuple[int, ...], gradient: bool, groups: bool) -> Answer:
+        n = math.prod(shape)
+        # a value that holds for all cases stays one value
+        flat = [_flat(c, shape) if c.size != 1 else _contiguous(c.reshape(1)) for c in columns]
+        macro, mu, bound, source, v, y = batch.cases(self._data, flat, n, self.threads, groups)
+        answer = Answer(macro.reshape(shape), mu.reshape(shape), bound.reshape(shape), source.reshape(shape))
+        if groups:
+            length = dimensional.length_scale(*columns[:3])
+            length = np.where(answer.source_code == -1, np.nan, length)
+            answer._groups, answer._certain = (v.reshape(shape), y.reshape(shape), length), self._certain
+        if gradient:
+            with np.errstate(all="ignore"):
+                ratio_bound = bound / flat[0]
+            slopes = batch.gradients(self._data, flat, mu, ratio_bound, source, v, y, self.threads)
+            parts = [np.moveaxis(slopes[:, i, :], 1, 0).reshape(6, *shape) for i in (0, 1)]
+            answer.gradient, answer.gradient_bound = (dict(zip(dimensional.FIELDS, p, strict=True)) for p in parts)
+        return answer
+
+    def _certain(self, v_tilde: Any, y_tilde: Any) -> Any:
+        """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and y~."""
+        v, y = np.asarray(v_tilde), np.asarray(y_tilde)
+        crit = self.border(np.atleast_1d(np.asarray(y, dtype=np.float64))).reshape(y.shape)
+        margin = self.border.max_rel_error + 4.0 * charts.ROUNDING
+        with np.errstate(all="ignore"):
+            # where the groups have left double range nothing is near the border but what cannot be told
+            extreme = (y == 0.0) | ~np.isfinite(y) | ~np.isfinite(v) | (v == 0.0)
+            certain = np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit)
+        return certain if certain.ndim else bool(certain)
+
+
+# mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits (tests/test_surrogate.py solves them anew)
+KNOWN_STICK_SLIP = 0.9420042895137095
+KNOWN_CONTINUOUS = 0.9545954718694023
+
+
+def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
+    """Refuse a stored border whose nodes are not near the formula for every y~: blocks are found with it."""
+    for (name, axis, _), piece in zip(charts.BORDER_PIECES, pieces, strict=True):
+        y = charts.amplitude(axis, piece.nodes)
+        crit = piece.values * (0.5 * y * y if name == "low" else np.sqrt(y))
+        if not np.all(np.abs(crit / closed_forms.border_blend(y) - 1.0) < 0.01):
+            raise TableError(path, f"the nodes of border/{name} are not v~crit(y~)")
+
+
+def _bundled(tolerance: float | None) -> Path:
+    """The tightest bundled table, or the smallest that meets ``tolerance``."""
+    tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
+    if not tables:
+        raise TableError("mumacro-*.nc", "no table is bundled with this installation; name a file")
+    if tolerance is None:
+        return tables[min(tables)]
+    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not tolerance > 0.0:
+        raise InputError("tolerance", tolerance, "a path, a tolerance > 0, or None")
+    fit = [found for found in tables if found <= tolerance]
+    if not fit:
+        raise InputError(
+            "tolerance", tolerance, f">= {min(tables):g}, the tightest bundled table, or the path of another"
+        )
+    return tables[max(fit)]
+
+
+def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
+    """Unpickle: from the bytes, or from the bundled table of that name."""
+    key = path, checksum, threads
+    if key not in _reopened:  # a worker gets the same surrogate with every task
+        _reopened[key] = _reopen_anew(path, checksum, threads, image)
+    return _reopened[key]
+
+
+_reopened: dict[tuple[str, str, int | None], Surrogate] = {}
+
+
+def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
+    if image is not None:
+        return Surrogate(parse_table(image, path), path, threads, image)
+    found = next((table for table in bundled_tables() if table.name == path), Path(path))
+    surrogate = Surrogate.open(found, threads)
+    if surrogate.checksum != checksum:
+        raise TableError(
+            found, f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}: "
+            "install the same release on both sides"
+        )  # fmt: skip
+    return surrogate
+
+
+def _picked(cases: Any) -> dict[str, Any]:
+    """The inputs among the columns of a mapping, DataFrame or Dataset."""
+    try:
+        names = list(cases.keys())
+        picked = {name: cases[name] for name in (*dimensional.FIELDS, "f") if name in names}
+    except (AttributeError, TypeError, KeyError) as error:
+        raise InputError(
+            "cases", type(cases).__name__, "a mapping, DataFrame or Dataset with the inputs by name"
+        ) from error
+    return picked
+
+
+def _labelled(inputs: Mapping[str, Any], cases: Any) -> bool:
+    """Whether labels or chunks are to be kept."""
+    return any(type(x).__module__.partition(".")[0] in ("pandas", "xarray", "dask") for x in (cases, *inputs.values()))
+
+
+def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:
+    if source == -1:
+        if not v[0] >= 0.0:
+            raise InputError("v_tilde", float(v[0]), ">= 0")
+        raise InputError("y_tilde", float(y[0]), bound)
+
+
+def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    return flat.reshape(shape) if shape else flat[0].item()
+
+
+def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
+    """Both broadcast together, flat, contiguous and writable (one numba signature), and their shape."""
+    v, y = dimensional.real("v_tilde", v_tilde), dimensional.real("y_tilde", y_tilde)
+    try:
+        shape = np.broadcast_shapes(v.shape, y.shape)
+    except ValueError as error:
+        raise InputError("y_tilde", y.shape, f"of a shape that broadcasts with that of v_tilde, {v.shape}") from error
+    return _flat(v, shape), _flat(y, shape), shape
+
+
+def _contiguous(a: Array) -> Array:
+    """``a`` as numba's one signature has it: contiguous, aligned, writable float64."""
+    return np.require(a, np.float64, ["C", "A", "W"])
+
+
+def _flat(a: Array, shape: tuple[int, ...]) -> Array:
+    """``a`` broadcast to ``shape``, flat, contiguous and writable."""
+    if a.shape == shape:
+        return _contiguous(a).reshape(-1)
+    full = np.empty(shape)
+    full[...] = a
+    return full.reshape(-1)

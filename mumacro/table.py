@@ -1,0 +1,379 @@
+"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, read with suspicion.
+
+Layout (all quantities dimensionless, units "1"):
+
+* root: the plain log-spaced grid a person plots first, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
+  ``error_estimate`` and ``v_tilde_crit(y_tilde)``, and the provenance as attributes;
+* group ``border``: one sub-group a piece of v~crit (:data:`mumacro.charts.BORDER_PIECES`);
+* group ``border/blocks``: one sub-group a block (:data:`mumacro.charts.CHARTS`): node coordinates, node values of
+  mu~, power and stick fraction, the chart by name and range, the number of cells, the verified errors.
+
+The netCDF library is not safe for threads: one lock holds while it works.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro import charts
+from mumacro.cells import nodes
+from mumacro.errors import TableError
+
+__all__ = [
+    "FORMAT_VERSION",
+    "Block",
+    "BorderPiece",
+    "Table",
+    "json_attributes",
+    "parse_table",
+    "read_table",
+    "write_table",
+]
+
+FORMAT_VERSION = 3
+MOST_BYTES = 64 * 2**20  # of a file; the largest that the builder makes has half a megabyte
+MOST_NUMBERS = 200_000  # of a variable: refused before memory is taken
+MOST_CELLS = 4096  # along an axis
+Array = NDArray[np.float64]
+
+_one_at_a_time = threading.Lock()
+
+_PLAIN = {
+    "v_tilde": ("dimensionless sliding speed, v0 k/(mu0 Fz omega)", ()),
+    "y_tilde": ("dimensionless oscillation amplitude, y0 k/(mu0 Fz)", ()),
+    "mu_ratio": ("macroscopic over Coulomb friction coefficient, mu_macro/mu0", ("v_tilde", "y_tilde")),
+    "stick_fraction": ("share of the period during which the contact sticks", ("v_tilde", "y_tilde")),
+    "error_estimate": ("estimated absolute error of mu_ratio", ("v_tilde", "y_tilde")),
+    "v_tilde_crit": ("border of continuous sliding: smallest dimensionless speed without stick", ("y_tilde",)),
+}  # fmt: skip
+_NODES = {"power": "mean power of the shaker over mu0 Fz l0 omega", "stick": "stick fraction"}
+FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
+
+
+@dataclass
+class BorderPiece:
+    """One piece of v~crit: Chebyshev ``nodes`` (n,) of its coordinate, ``values`` (n,), cells for evaluation."""
+
+    nodes: Array
+    values: Array
+    cells: int
+    max_rel_error: float = 0.0
+
+
+@dataclass
+class Block:
+    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), node values (m, n), cells for evaluation, verified errors.
+
+    ``values``, ``power`` and, in stick-slip, ``stick`` hold what :mod:`mumacro.charts` tabulates for mu~, oscillation
+    power and stick fraction.  ``errors`` (3, 3), a row a quantity, bounds the errors of the tabulated value and of the
+    slopes along ln v~ and ln y~, both as :func:`mumacro.evaluate.answer_with_slopes` scales them.
+    ``max_abs_error`` and ``max_rel_error`` are the largest found of mu~.
+    """
+
+    a: Array
+    b: Array
+    values: Array
+    cells: tuple[int, int]
+    power: Array
+    stick: Array = field(default_factory=lambda: np.empty(0))
+    errors: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    max_abs_error: float = 0.0
+    max_rel_error: float = 0.0
+
+
+@dataclass
+class Table:
+    """Everything that a table file holds."""
+
+    border: list[BorderPiece]
+    blocks: list[Block]
+    v_tilde: Array
+    y_tilde: Array
+    mu_ratio: Array
+    stick_fraction: Array
+    error_estimate: Array
+    v_tilde_crit: Array
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+def _digest(table: Table) -> str:
+    """SHA-256 over every number that takes part in an answer or its bound, the geometry, and the tolerance."""
+    h = hashlib.sha256()
+
+    def put(*parts: object) -> None:
+        for part in parts:
+            h.update(
+                np.ascontiguousarray(part, dtype="<f8").tobytes()
+                if isinstance(part, np.ndarray)
+                else repr(part).encode()
+            )
+
+    put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
+    put(*(getattr(table, name) for name in _PLAIN))
+    for geometry, piece in zip(charts.BORDER_PIECES, table.border, strict=True):
+        put(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
+    for chart, block in zip(charts.CHARTS, table.blocks, strict=True):
+        put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
+        put(block.errors, block.a, block.b, block.values, block.power, block.stick)
+    return h.hexdigest()
+
+
+# --- writing --------------------------------------------------------------------------------------------
+
+
+def _put(group: Any, name: str, data: Array, long_name: str, axes: tuple[str, ...] = (), **attributes: Any) -> None:
+    """A float64 variable over ``axes``; without them it is a coordinate itself."""
+    if not axes:
+        group.createDimension(name, data.size)
+    filters = {"compression": "zlib", "complevel": 9, "shuffle": True, "chunksizes": data.shape}
+    extra = filters if data.size > FEW else {"contiguous": True}
+    variable = group.createVariable(name, "f8", axes or (name,), fill_value=False, **extra)
+    variable.setncatts({"long_name": long_name, "units": "1", **attributes})
+    variable[...] = data
+
+
+def _geometry(chart: charts.Chart) -> dict[str, Any]:
+    return {
+        "regime": charts.REGIMES[chart.regime],
+        "quantity": chart.quantity,
+        "range_of_a": np.array([chart.a.low, chart.a.high]),
+        "range_of_b": np.array([chart.b.low, chart.b.high]),
+    }
+
+
+def _fill(root: Any, table: Table) -> None:
+    root.setncatts(table.attributes)
+    for name, (long_name, axes) in _PLAIN.items():
+        extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
+        _put(root, name, getattr(table, name), long_name, axes, **extra)
+    border = root.createGroup("border")
+    for (name, axis, quantity), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
+        group = border.createGroup(name)
+        _put(group, axis.name, piece.nodes, charts.COORDINATES[axis.name])
+        _put(group, "value", piece.values, quantity, (axis.name,))
+        group.setncatts({"cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error,
+                         "range": np.array([axis.low, axis.high])})  # fmt: skip
+    # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
+    blocks = border.createGroup("blocks")
+    for chart, block in zip(charts.CHARTS, table.blocks, strict=True):
+        group = blocks.createGroup(chart.name)
+        axes = (chart.a.name, chart.b.name)
+        _put(group, axes[0], block.a, charts.COORDINATES[axes[0]])
+        _put(group, axes[1], block.b, charts.COORDINATES[axes[1]])
+        _put(group, "value", block.values, chart.quantity, axes)
+        _put(group, "power", block.power, _NODES["power"] + ", scaled as in mumacro.charts", axes)
+        if chart.regime == charts.STICK_SLIP:
+            _put(group, "stick", block.stick, _NODES["stick"] + ", scaled as in mumacro.charts", axes)
+        # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
+        group.setncatts({
+            **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32), "errors": block.errors.ravel(),
+            "verified_max_abs_error": block.max_abs_error, "verified_max_rel_error": block.max_rel_error,
+        })  # fmt: skip
+
+
+def write_table(table: Table, path: str | Path) -> str:
+    """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
+
+    Raises
+    ------
+    TableError
+        When the folder does not exist or cannot be written, or the disk is full; nothing is left behind.
+    """
+    path = Path(path)
+    table.attributes["format_version"] = np.int32(FORMAT_VERSION)
+    table.attributes["content_sha256"] = _digest(table)
+    try:
+        image = _image(table)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+            partial = Path(folder) / path.name
+            with partial.open("wb") as stream:
+                stream.write(image)
+                stream.flush()
+                os.fsync(stream.fileno())
+            partial.chmod(0o644)
+            os.replace(partial, path)
+    except (OSError, RuntimeError) as error:  # the netCDF library says RuntimeError where it cannot write
+        raise TableError(path, f"cannot be written: {getattr(error, 'strerror', None) or error}") from error
+    return str(table.attributes["content_sha256"])
+
+
+def _image(table: Table) -> bytes:
+    """The bytes of a file that holds ``table``.
+
+    Made among the temporary files: where the disk is full the netCDF library says little and keeps the file open.  What
+    it makes in memory holds the time of day.
+    """
+    with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
+        path = Path(folder) / "table.nc"
+        with _one_at_a_time, netCDF4.Dataset(str(path), "w", format="NETCDF4") as root:
+            _fill(root, table)
+        return path.read_bytes()
+
+
+# --- reading --------------------------------------------------------------------------------------------
+
+
+class _Reader:
+    """One open file; every refusal names it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def refuse(self, reason: str) -> TableError:
+        return TableError(self.path, reason)
+
+    def group(self, parent: Any, name: str) -> Any:
+        if name not in parent.groups:
+            raise self.refuse(f"group {name!r} is missing")
+        return parent.groups[name]
+
+    def array(self, group: Any, name: str, shape: tuple[int, ...] | None = None) -> Array:
+        if name not in group.variables:
+            raise self.refuse(f"variable {name!r} is missing in {group.path}")
+        variable = group.variables[name]
+        if variable.dtype != np.float64 or variable.size > MOST_NUMBERS:
+            raise self.refuse(
+                f"variable {name!r} in {group.path} is no float64 array of at most {MOST_NUMBERS} numbers"
+            )
+        variable.set_auto_maskandscale(False)
+        values: Array = np.ascontiguousarray(variable[...], dtype=np.float64)
+        if not np.all(np.isfinite(values)):
+            raise self.refuse(f"variable {name!r} in {group.path} holds non-finite values")
+        if shape is not None and values.shape != shape:
+            raise self.refuse(f"{group.path}: shapes of nodes and values disagree")
+        return values
+
+    def numbers(self, group: Any, name: str, count: int) -> Array:
+        values = np.atleast_1d(np.asarray(group.getncattr(name), dtype=np.float64))
+        if values.shape != (count,) or not np.all(np.isfinite(values)):
+            raise self.refuse(f"attribute {name!r} of {group.path} is not {count} finite numbers")
+        return values
+
+    def nodes(self, group: Any, axis: charts.Axis) -> Array:
+        """The nodes of an axis, which must be those of the running atlas."""
+        found = self.array(group, axis.name)
+        if found.ndim != 1 or found.size < 2 or not np.array_equal(found, nodes(found.size, axis.low, axis.high)):
+            raise self.refuse(f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart")
+        return found
+
+    def cells(self, group: Any, count: int) -> tuple[int, ...]:
+        cells = self.numbers(group, "cells", count)
+        if not np.all((cells >= 1) & (cells <= MOST_CELLS) & (cells == np.round(cells))):
+            raise self.refuse(f"{group.path}: cells must be whole numbers from 1 to {MOST_CELLS}")
+        return tuple(int(n) for n in cells)
+
+    def errors(self, group: Any, *names: str, count: int = 1) -> list[Array]:
+        found = [self.numbers(group, name, count) for name in names]
+        if any(np.any(error < 0.0) for error in found):
+            raise self.refuse(f"{group.path}: an error is negative")
+        return found
+
+    def same(self, group: Any, name: str, wanted: object) -> None:
+        if not np.array_equal(group.getncattr(name), np.asarray(wanted)):
+            raise self.refuse(f"{group.path}: {name} is {group.getncattr(name)!r}, this program's atlas has {wanted!r}")
+
+
+def _read(root: Any, reader: _Reader) -> Table:
+    attributes = {key: root.getncattr(key) for key in root.ncattrs()}
+    if not {"format_version", "content_sha256", "tolerance"} <= attributes.keys():
+        raise reader.refuse("not a mumacro table: format_version, tolerance or content_sha256 is missing")
+    if attributes["format_version"] != FORMAT_VERSION:
+        raise reader.refuse(f"format version {attributes['format_version']}, this program reads {FORMAT_VERSION}")
+    border_group = reader.group(root, "border")
+    blocks_group = reader.group(border_group, "blocks")
+    strange = sorted(set(blocks_group.groups) - set(charts.NAMES))
+    if strange:
+        raise reader.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
+    border, blocks = [], []
+    for name, axis, _ in charts.BORDER_PIECES:
+        group = reader.group(border_group, name)
+        reader.same(group, "range", [axis.low, axis.high])
+        at = reader.nodes(group, axis)
+        (error,) = reader.errors(group, "max_rel_error")
+        (cells,) = reader.cells(group, 1)
+        border.append(BorderPiece(at, reader.array(group, "value", at.shape), cells, float(error[0])))
+    for chart in charts.CHARTS:
+        group = reader.group(blocks_group, chart.name)
+        for name, wanted in _geometry(chart).items():
+            reader.same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
+        a, b = reader.nodes(group, chart.a), reader.nodes(group, chart.b)
+        shape = (a.size, b.size)
+        stick = reader.array(group, "stick", shape) if chart.regime == charts.STICK_SLIP else np.empty(0)
+        largest = reader.errors(group, "verified_max_abs_error", "verified_max_rel_error")
+        na, nb = reader.cells(group, 2)
+        blocks.append(
+            Block(
+                a, b, reader.array(group, "value", shape), (na, nb), reader.array(group, "power", shape), stick,
+                reader.errors(group, "errors", count=9)[0].reshape(3, 3), *(float(error[0]) for error in largest),
+            )
+        )  # fmt: skip
+    plain = {name: reader.array(root, name) for name in _PLAIN}
+    return Table(border=border, blocks=blocks, attributes=attributes, **plain)
+
+
+def parse_table(image: bytes, path: str | Path) -> Table:
+    """Read and check the bytes of a table file; ``path`` names it in errors.  See :func:`read_table`."""
+    path = Path(path)
+    try:
+        with _one_at_a_time, netCDF4.Dataset(path.name, "r", memory=image) as root:
+            table = _read(root, _Reader(path))
+        digest = _digest(table)
+    except TableError:
+        raise
+    except Exception as error:
+        raise TableError(path, f"not a readable netCDF-4 table ({error})") from error
+    if digest != table.attributes["content_sha256"]:
+        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
+    return table
+
+
+def read_table(path: str | Path) -> Table:
+    """Read and check a table file; several threads may.
+
+    Raises
+    ------
+    TableError
+        Missing, truncated or foreign file, another format version, a missing group or variable, another geometry than
+        the running atlas, non-finite values, a checksum that does not fit; the message names the file and the reason.
+    """
+    return parse_table(read_image(path), path)
+
+
+def read_image(path: str | Path) -> bytes:
+    """The bytes of a table file.
+
+    Raises
+    ------
+    TableError
+        Missing, unreadable, or larger than any table.
+    """
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise TableError(path, "no such file")
+        if path.stat().st_size > MOST_BYTES:
+            raise TableError(path, f"has {path.stat().st_size} bytes, more than any table ({MOST_BYTES})")
+        return path.read_bytes()
+    except OSError as error:
+        raise TableError(path, f"cannot be read: {error.strerror or error}") from error
+
+
+def json_attributes(table: Table) -> dict[str, object]:
+    """Root attributes as plain Python scalars and strings; ``builder_options`` parsed."""
+    out: dict[str, object] = {}
+    for key, value in table.attributes.items():
+        out[key] = value.item() if isinstance(value, np.generic) else value
+    if isinstance(out.get("builder_options"), str):
+        out["builder_options"] = json.loads(str(out["builder_options"]))
+    return out

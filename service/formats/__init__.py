@@ -1,0 +1,105 @@
+"""Wire formats of batches, one file each: a reader, a writer, and what OpenAPI says of them.
+
+A format is an object with the members of :class:`Format`, given to :func:`register`.  The endpoint, content
+negotiation and the description follow from the registry.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Protocol
+
+from ..errors import BatchTooLargeError
+from ..evaluation import Answers, Batch
+
+__all__ = ["FORMATS", "Format", "choose", "limit_values", "media_types", "register", "too_large"]
+
+
+class Format(Protocol):
+    """One wire format.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in OpenAPI.
+    media_type : str
+    aliases : tuple of str
+        Other media types that mean the same.
+    streams : bool
+        Whether a body is answered line by line while it comes.
+    body, answer : dict
+        The media type objects of OpenAPI for request and response.
+    """
+
+    name: str
+    media_type: str
+    aliases: tuple[str, ...]
+    streams: bool
+    body: ClassVar[dict[str, Any]]
+    answer: ClassVar[dict[str, Any]]
+
+    def matches(self, text: memoryview) -> bool:
+        """Whether a body of the media type is in this form; for forms that share one."""
+
+    def read(self, text: bytearray, max_batch: int) -> tuple[Batch, dict[str, Any]]:
+        """The cases of a body, and the options that it holds beside them.  May append to ``text``.
+
+        Raises
+        ------
+        MalformedBodyError, InvalidFieldsError, BatchTooLargeError
+        """
+
+    def write(self, answers: Answers, label: Mapping[str, Any]) -> Iterator[bytes]:
+        """The answer, piece by piece."""
+
+
+FORMATS: list[Format] = []
+
+
+def register(made: Format) -> None:
+    """Offer one more format."""
+    FORMATS.append(made)
+
+
+def media_types() -> tuple[str, ...]:
+    """All media types, in the order of registration."""
+    return tuple(dict.fromkeys(entry.media_type for entry in FORMATS))
+
+
+def choose(media_type: str, text: memoryview) -> Format:
+    """The format of a body of that media type."""
+    fitting = [entry for entry in FORMATS if entry.media_type == media_type]
+    return next((entry for entry in fitting if entry.matches(text)), fitting[0])
+
+
+def too_large(max_batch: int) -> BatchTooLargeError:
+    """More cases than the settings allow."""
+    return BatchTooLargeError(
+        f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON",
+        max_batch=max_batch,
+    )
+
+
+def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:
+    """Refuse what holds more values than a batch may have, before anything is made of it.
+
+    Every value of JSON but the first of its list or object has a comma before it, and every list or object a bracket:
+    counting those takes a millisecond a megabyte and bounds what decoding can make.
+
+    Raises
+    ------
+    BatchTooLargeError
+    """
+    room = max_batch + 64
+    if text.count(b",") > per_case * room or text.count(b"[") + text.count(b"{") > room:
+        raise too_large(max_batch)
+
+
+def _load() -> None:
+    from importlib.util import find_spec
+
+    from . import columns, csv, lines, rows  # noqa: F401
+
+    if find_spec("pyarrow"):
+        from . import arrow  # noqa: F401
+
+
+_load()

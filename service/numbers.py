@@ -1,0 +1,299 @@
+"""Plain numeric columns, compiled: JSON text straight into arrays, without the interpreter's lock.
+
+Accepts only the ordinary: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one number,
+``null`` for ``k``.  Everything else it leaves to :mod:`service.formats.columns`.  Why it is here and no library is:
+docs/decisions/0011-wire.md.
+
+Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at a gigabyte per second", Software:
+Practice and Experience 51 (2021), exactly rounded for up to 19 significant digits; numbers with more are not ordinary.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro.kernel_cache import kernel, part
+
+from .kernel import FIELDS, MOST_HZ, RAD_PER_CYCLE, Array
+
+__all__ = ["NO_ROOM", "read_columns"]
+
+Bytes = NDArray[np.uint8]
+#: what :func:`read_columns` returns where there is no room for the cases
+NO_ROOM = -1
+
+_U = np.uint64
+_SMALLEST, _LARGEST = -342, 308  # decimal exponents
+_0, _1, _3, _9, _10, _32, _52, _63 = (_U(n) for n in (0, 1, 3, 9, 10, 32, 52, 63))
+_LOW32, _NINE, _HIDDEN, _FRACTION = _U(2**32 - 1), _U(0x1FF), _U(1 << 52), _U((1 << 52) - 1)
+_SIGN = _U(1 << 63)
+_NAMES = np.array([int.from_bytes(name.encode(), "little") for name in (*FIELDS, "f")], dtype=np.uint64)
+_K, _OMEGA, _F = FIELDS.index("k"), FIELDS.index("omega"), len(FIELDS)
+
+
+def _powers_of_five() -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """5^q, 128 bits with the first one set: truncated, reciprocals one unit above."""
+    rows = []
+    for q in range(_SMALLEST, _LARGEST + 1):
+        power = 5 ** abs(q)
+        if q < 0:
+            bits = (power - 1).bit_length()
+            value = 2 ** (bits + 127 if q >= -27 else 2 * bits + 128) // power + 1
+        else:
+            value = power << 128 >> 1
+        value = value << 128 >> value.bit_length() if value.bit_length() < 128 else value >> (value.bit_length() - 128)
+        rows.append((value >> 64, value & (2**64 - 1)))
+    table = np.array(rows, dtype=np.uint64)
+    return table[:, 0].copy(), table[:, 1].copy()
+
+
+_FIVE_HIGH, _FIVE_LOW = _powers_of_five()
+_compiled = kernel(fuse=False, beside=Path(__file__).resolve().parent)
+_inlined = part(inline=True, fuse=False)
+
+
+@_inlined
+def _high(a: np.uint64, b: np.uint64) -> np.uint64:
+    """Upper 64 bits of the product."""
+    a0, a1, b0, b1 = a & _LOW32, a >> _32, b & _LOW32, b >> _32
+    middle = a1 * b0 + (a0 * b0 >> _32)
+    return a1 * b1 + (middle >> _32) + (((middle & _LOW32) + a0 * b1) >> _32)
+
+
+@_inlined
+def _double(w: np.uint64, q: int) -> tuple[np.uint64, bool]:
+    """Bits of w 10^q, w > 0, rounded to nearest even; False where it is beyond double range."""
+    if q < _SMALLEST:
+        return _0, True
+    if q > _LARGEST:
+        return _0, False
+    shift = 0
+    for step in (32, 16, 8, 4, 2, 1):
+        if w < _1 << _U(64 - step):
+            w = w << _U(step)
+            shift += step
+    row = _U(q - _SMALLEST)
+    low, high = w * _FIVE_HIGH[row], _high(w, _FIVE_HIGH[row])
+    if high & _NINE == _NINE:  # only then can the lower half of the power matter
+        more = _high(w, _FIVE_LOW[row])
+        low = low + more
+        if more > low:
+            high = high + _1
+    upper = high >> _63
+    down = upper + _9
+    mantissa = high >> down
+    exponent = ((217706 * q) >> 16) + 63 + int(upper) - shift + 1023
+    if exponent <= 0:
+        if exponent <= -63:
+            return _0, True
+        mantissa = mantissa >> _U(1 - exponent)
+        return (mantissa + (mantissa & _1)) >> _1, True
+    if low <= _1 and -4 <= q <= 23 and mantissa & _3 == _1 and mantissa << down == high:
+        mantissa = mantissa ^ _1  # exactly between two doubles: to the even one
+    mantissa = (mantissa + (mantissa & _1)) >> _1
+    if mantissa >= _HIDDEN << _1:
+        mantissa = _HIDDEN
+        exponent += 1
+    if exponent >= 0x7FF:
+        return _0, False
+    return (mantissa & _FRACTION) | (_U(exponent) << _52), True
+
+
+@_inlined
+def _space(text: Bytes, i: int) -> int:
+    """Index of the next byte that is no white space."""
+    while text[_U(i)] == 32 or text[_U(i)] == 10 or text[_U(i)] == 13 or text[_U(i)] == 9:
+        i += 1
+    return i
+
+
+@_inlined
+def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
+    """(w followed by the digits at ``i``, index behind them)."""
+    c = text[_U(i)] - np.uint8(48)
+    while c < 10:
+        w = w * _10 + _U(c)
+        i += 1
+        c = text[_U(i)] - np.uint8(48)
+    return w, i
+
+
+@_inlined
+def _number(text: Bytes, i: int) -> tuple[np.uint64, int]:
+    """(bits of the JSON number at ``i``, index behind it), or (0, -1) for anything else."""
+    start = i
+    negative = text[_U(i)] == 45
+    if negative:
+        i += 1
+    first = i
+    w, i = _digits(text, i, _0)
+    if i == first or (text[_U(first)] == 48 and i - first > 1):
+        return _0, -1
+    count, q = i - first, 0
+    if text[_U(i)] == 46:
+        point = i + 1
+        w, i = _digits(text, point, w)
+        if i == point:
+            return _0, -1
+        q = point - i
+        count += i - point
+    if count > 19:  # zeros in front do not count; they are rare
+        leading = first
+        while text[_U(leading)] == 48 or text[_U(leading)] == 46:
+            count -= int(text[_U(leading)] == 48)
+            leading += 1
+        if count > 19:
+            return _0, -1
+    if text[_U(i)] == 101 or text[_U(i)] == 69:
+        i += 1
+        minus = text[_U(i)] == 45
+        if minus or text[_U(i)] == 43:
+            i += 1
+        power, end = _digits(text, i, _0)
+        if end == i or end - i > 6:
+            return _0, -1
+        i = end
+        q += -int(power) if minus else int(power)
+    bits, finite = (_0, True) if w == _0 else _double(w, q)
+    if not finite:
+        return _0, -1
+    if negative:
+        bits = bits | _SIGN
+    return bits, i if i > start else -1
+
+
+@_inlined
+def _is_null(text: Bytes, i: int) -> bool:
+    found: bool = text[_U(i)] == 110 and text[_U(i + 1)] == 117 and text[_U(i + 2)] == 108 and text[_U(i + 3)] == 108
+    return found
+
+
+@_compiled
+def _list(text: Bytes, i: int, row: NDArray[np.uint64], nullable: bool) -> tuple[int, int]:
+    """(index behind the list whose first entry is due at ``i``, entries), or (-1, _); (-2, _): no room."""
+    n = 0
+    i = _space(text, i)
+    if text[_U(i)] == 93:
+        return i + 1, 0
+    while True:
+        if n == row.size:
+            return -2, n
+        bits, end = _number(text, i)
+        if end < 0:
+            if not (nullable and _is_null(text, i)):
+                return -1, n
+            bits, end = _U(0x7FF0_0000_0000_0000), i + 4
+        row[_U(n)] = bits
+        n += 1
+        i = _space(text, end)
+        if text[_U(i)] == 93:
+            return i + 1, n
+        if text[_U(i)] != 44:
+            return -1, n
+        i = _space(text, i + 1)
+
+
+@_inlined
+def _field(text: Bytes, i: int) -> tuple[int, int]:
+    """(index of the name in quotes at ``i``, index behind it), or (-1, i)."""
+    if text[_U(i)] != 34:
+        return -1, i
+    word, shift, j = _0, _0, i + 1
+    while text[_U(j)] != 34:
+        if j - i > 5 or text[_U(j)] < 32:
+            return -1, i
+        word = word | (_U(text[_U(j)]) << shift)
+        shift = shift + _U(8)
+        j += 1
+    for field in range(7):
+        if word == _NAMES[field]:
+            return field, j + 1
+    return -1, i
+
+
+@_compiled
+def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: int) -> tuple[int, int, int]:
+    """(cases, bits of the inputs that came as lists, whether f is there); 0 cases for what is not ordinary."""
+    size, seen, listed = -1, 0, 0
+    i = _space(text, i)
+    if text[_U(i)] != 123:
+        return 0, 0, 0
+    while True:
+        field, i = _field(text, _space(text, i + 1))
+        row = _OMEGA if field == _F else field
+        if field < 0 or seen >> row & 1:
+            return 0, 0, 0
+        seen |= 1 << row | (int(field == _F) << 6)
+        i = _space(text, i)
+        if text[_U(i)] != 58:
+            return 0, 0, 0
+        i = _space(text, i + 1)
+        if text[_U(i)] == 91:
+            i, n = _list(text, i + 1, words[row, first:], row == _K)
+            if i == -2:
+                return NO_ROOM, 0, 0
+            if i < 0 or n == 0 or (listed and n != size):
+                return 0, 0, 0
+            size = n
+            listed |= 1 << row
+        else:
+            bits, end = _number(text, i)
+            if end < 0:
+                if row != _K or not _is_null(text, i):
+                    return 0, 0, 0
+                bits, end = _U(0x7FF0_0000_0000_0000), i + 4
+            elif bits >= _SIGN or (bits == _0 and row < 3):
+                return 0, 0, 0  # a bad number that would hold for every case is for others to refuse
+            if first == words.shape[1]:
+                return NO_ROOM, 0, 0
+            words[row, first] = bits
+            i = end
+        i = _space(text, i)
+        if text[_U(i)] == 125:
+            break
+        if text[_U(i)] != 44:
+            return 0, 0, 0
+    i += 1
+    while i < stop and (text[_U(i)] == 32 or text[_U(i)] == 13 or text[_U(i)] == 9 or text[_U(i)] == 10):
+        i += 1  # not beyond stop: what stands there may be a newline and the next line
+    if i != stop or listed == 0 or seen & 63 != 63:
+        return 0, 0, 0
+    return size, listed, seen >> 6
+
+
+@_compiled
+def _spread(words: NDArray[np.uint64], first: int, size: int, listed: int) -> None:
+    """Repeat what holds for all cases."""
+    for row in range(6):
+        if not listed >> row & 1:
+            words[row, first : first + size] = words[row, first]
+
+
+def read_columns(text: Bytes, start: int, stop: int, columns: Array, first: int = 0) -> int:
+    """Read text[start:stop], behind which stands one byte that is no part of it, from case ``first`` on.
+
+    Parameters
+    ----------
+    text : NDArray[uint8]
+        Ends in a 0 byte, or in what stops a number.
+    start, stop : int
+        White space in front is skipped; the one behind has to be cut off.
+    columns : ndarray
+        Shape (6, room); gets the six inputs, k = inf for rigid contact.
+    first : int
+
+    Returns
+    -------
+    int
+        Number of cases; 0: not ordinary; NO_ROOM: too many.
+    """
+    size, listed, frequency = _object(text, start, stop, columns.view(np.uint64), first)
+    if size > 0:
+        _spread(columns.view(np.uint64), first, size, listed)
+        if frequency:
+            omega = columns[_OMEGA, first : first + size]
+            if omega.max() > MOST_HZ:
+                return 0
+            omega *= RAD_PER_CYCLE
+    return int(size)

@@ -1,0 +1,369 @@
+"""What ``include`` can add to an answer: one registry.
+
+A quantity is one entry here: its name, its parts with units and texts, what it costs, and how it is computed.  JSON,
+CSV, Arrow, the models of answers and so OpenAPI, the costs that decide on admission, and the warm-up follow from it.
+
+Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations"
+(Friction, 2018).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import FIELDS, REGIME_OF_SOURCE, ROUNDING, STATIC, UNITS, Array, Details, Kernel
+
+__all__ = ["QUANTITIES", "Cases", "Part", "Quantity", "compute", "cost_of", "nested", "parts_of", "register"]
+
+SAMPLES = 256  # of the inputs, for std_sampled
+ENOUGH = 0.1  # relative difference of std_sampled and std up to which first order counts as enough
+
+
+@dataclass(frozen=True)
+class Part:
+    """One column that a quantity adds.  ``path`` is its name in flat formats; in JSON the dot makes an object."""
+
+    path: str
+    unit: str
+    text: str
+    kind: type = float
+
+
+@dataclass
+class Cases:
+    """Legal cases that quantities are computed for: six columns (n,), k = inf is rigid, and what is known of them."""
+
+    kernel: Kernel
+    columns: Mapping[str, Array]
+    mu_macro: Array
+    error_bound: Array
+    source: NDArray[np.int8]
+    std: Mapping[str, float]
+    slopes: bool
+
+    @cached_property
+    def details(self) -> Details:
+        """Groups, and slopes where some quantity asked for needs them."""
+        return self.kernel.details(self.columns, self.slopes)
+
+    @cached_property
+    def at_rest(self) -> NDArray[np.bool_]:
+        """Where nothing oscillates."""
+        resting: NDArray[np.bool_] = (self.columns["y0"] == 0.0) | (self.columns["omega"] == 0.0)
+        return resting
+
+    @cached_property
+    def usable(self) -> NDArray[np.bool_]:
+        """Where the contact is elastic, oscillates, and its groups are within double range."""
+        known: NDArray[np.bool_] = np.isfinite(self.details.y_tilde) & ~self.at_rest
+        return known
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One name that ``include`` may hold.
+
+    Attributes
+    ----------
+    name : str
+    text : str
+        What it is, in one sentence.
+    parts : tuple of Part
+        The columns that it adds.
+    compute : callable
+        From :class:`Cases` to one column (n,) a part, in their order; NaN where there is no value.
+    cost : float
+        Time of a case, in times of a plain answer.
+    slopes : bool
+        Whether it needs the gradient.
+    """
+
+    name: str
+    text: str
+    parts: tuple[Part, ...]
+    compute: Callable[[Cases], Sequence[Array]]
+    cost: float
+    slopes: bool = False
+
+
+QUANTITIES: dict[str, Quantity] = {}
+
+
+def register(quantity: Quantity) -> None:
+    """Offer one more quantity."""
+    QUANTITIES[quantity.name] = quantity
+
+
+def parts_of(include: Sequence[str]) -> list[Part]:
+    """The columns that these names add, in order."""
+    return [part for name in include for part in QUANTITIES[name].parts]
+
+
+def cost_of(include: Sequence[str]) -> float:
+    """Time of a case with these names, in times of a plain answer."""
+    return 1.0 + sum(QUANTITIES[name].cost for name in include)
+
+
+def compute(cases: Cases, include: Sequence[str]) -> dict[str, Array]:
+    """The columns that these names add, by path."""
+    found: dict[str, Array] = {}
+    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+        for name in include:
+            quantity = QUANTITIES[name]
+            for part, column in zip(quantity.parts, quantity.compute(cases), strict=True):
+                found[part.path] = column
+    return found
+
+
+def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns by path as JSON has them: ``power.saved`` becomes ``power: {saved: ...}``."""
+    out: dict[str, Any] = {}
+    for path, column in columns.items():
+        name, _, key = path.partition(".")
+        if key:
+            out.setdefault(name, {})[key] = column
+        else:
+            out[name] = column
+    return out
+
+
+# --- groups and marks on the friction law -------------------------------------------------------------
+
+
+def _groups(cases: Cases) -> Sequence[Array]:
+    return cases.details.v_tilde, cases.details.y_tilde, cases.details.length_scale
+
+
+register(
+    Quantity(
+        "groups",
+        "Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double range)",
+        (
+            Part("groups.v_tilde", "-", "v0/(l0 omega)"),
+            Part("groups.y_tilde", "-", "y0/l0"),
+            Part("groups.l0", "m", "Length scale mu0 Fz/k; 0 for rigid contact"),
+        ),
+        _groups,
+        cost=2,
+    )
+)
+
+
+def _limits(cases: Cases) -> Sequence[Array]:
+    # Rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0, with mu_crit -> 0.
+    mu0, omega = cases.columns["mu0"], cases.columns["omega"]
+    y_tilde, surrogate = cases.details.y_tilde, cases.kernel.surrogate
+    y = np.where(cases.usable, y_tilde, 1.0)
+    v = np.asarray(surrogate.v_tilde_crit(y))
+    ratio = np.asarray(surrogate.mu_ratio(v, y))
+    below = np.minimum(y_tilde, 1.0)
+    static = mu0 * np.sqrt((1.0 - below) * (1.0 + below))  # keeps the digits that 1 - y^2 loses near y~ = 1
+    rest, rigid = cases.at_rest, np.isinf(cases.columns["k"])
+    speed = np.where(cases.usable, cases.details.length_scale * v * omega, np.nan)
+    crit = np.where(cases.usable, mu0 * ratio, np.nan)
+    return (
+        np.where(rest, mu0, np.where(rigid, 0.0, static)),
+        np.where(rest | rigid, 0.0, speed),
+        np.where(rest, mu0, np.where(rigid, 0.0, crit)),
+    )
+
+
+register(
+    Quantity(
+        "limits",
+        "Marks on the friction law of this case; null: beyond double range",
+        (
+            Part("limits.mu_static", "-", "Static limit, v0 -> 0, eq. (38): mu0 sqrt(1 - y~^2), or 0 for y~ >= 1"),
+            Part("limits.v0_crit", "m/s", "Velocity at the border of continuous sliding"),
+            Part("limits.mu_crit", "-", "mu_macro at that border"),
+        ),
+        _limits,
+        cost=4,
+    )
+)
+
+
+def _regime_certain(cases: Cases) -> Sequence[Array]:
+    y = np.where(cases.usable, cases.details.y_tilde, 1.0)
+    crit = np.asarray(cases.kernel.surrogate.v_tilde_crit(y))
+    distance = np.abs(cases.details.v_tilde / crit - 1.0)
+    clear = ~cases.usable | (REGIME_OF_SOURCE[cases.source] == STATIC) | (distance > cases.kernel.border_error)
+    return (clear.astype(np.float64),)
+
+
+register(
+    Quantity(
+        "regime_certain",
+        "Whether the regime is beyond doubt",
+        (Part("regime_certain", "-", "false: closer to the border than this table knows it", bool),),
+        _regime_certain,
+        cost=3,
+    )
+)
+
+# --- sensitivity and uncertainty ----------------------------------------------------------------------
+
+_PER = {name: "-" if unit == "-" else f"1/({unit})" for name, unit in UNITS.items()}
+
+
+def _gradient(cases: Cases) -> Sequence[Array]:
+    slopes, bounds = cases.details.gradient, cases.details.gradient_bound
+    return [slopes[name] for name in FIELDS] + [bounds[name] for name in FIELDS]
+
+
+register(
+    Quantity(
+        "gradient",
+        "d mu_macro / d input; null: not finite, or no such input (k of rigid contact)",
+        (
+            *(Part(f"gradient.{name}", _PER[name], f"d mu_macro / d {name}") for name in FIELDS),
+            *(
+                Part(f"gradient_bound.{name}", _PER[name], "Bound of its absolute error; null: not in this table")
+                for name in FIELDS
+            ),
+        ),
+        _gradient,
+        cost=6,
+        slopes=True,
+    )
+)
+
+
+@cache
+def _normal_samples() -> Array:
+    """Points of a six-dimensional rank-1 lattice as standard normal deviates, (SAMPLES, 6), with mean 0."""
+    root = 1.0
+    for _ in range(64):  # the positive root of x^7 = x + 1, whose powers fill six dimensions most evenly
+        root = (1.0 + root) ** (1.0 / 7.0)
+    half = SAMPLES // 2
+    shares = (0.5 + np.outer(np.arange(1, half + 1), root ** -np.arange(1.0, 7.0))) % 1.0
+    inverse = NormalDist().inv_cdf
+    points = np.array([[inverse(min(max(x, 1e-9), 1.0 - 1e-9)) for x in row] for row in shares.tolist()])
+    points /= np.sqrt(np.mean(points**2, axis=0))
+    return np.concatenate((points, -points))
+
+
+def _sampled(cases: Cases) -> Array:
+    """Standard deviation of mu_macro over normal inputs; samples out of bounds are left out."""
+    n = cases.mu_macro.size
+    total, squares, count = np.zeros(n), np.zeros(n), np.zeros(n)
+    deviations = np.array([cases.std.get(name, 0.0) for name in FIELDS])
+    for point in _normal_samples():
+        shifted = [
+            cases.columns[name] + shift if shift else cases.columns[name]
+            for name, shift in zip(FIELDS, (point * deviations).tolist(), strict=True)
+        ]
+        mu, _, _, _ = cases.kernel.columns(n, shifted)
+        off = np.where(np.isnan(mu), 0.0, mu - cases.mu_macro)
+        total += off
+        squares += off * off
+        count += ~np.isnan(mu)
+    mean = total / count
+    spread: Array = np.sqrt(np.maximum(squares / count - mean * mean, 0.0))
+    return spread
+
+
+def _std(cases: Cases) -> Sequence[Array]:
+    n = cases.mu_macro.size
+    terms, doubts = {}, {}
+    for name in FIELDS:
+        deviation = cases.std.get(name, 0.0)
+        slope, bound = cases.details.gradient[name], cases.details.gradient_bound[name]
+        if name == "k":  # means nothing where contact is rigid
+            rigid = np.isinf(cases.columns["k"])
+            slope, bound = np.where(rigid, 0.0, slope), np.where(rigid, 0.0, bound)
+        # an infinite slope does no harm where the input is exact
+        terms[name] = slope * deviation if deviation else np.zeros(n)
+        doubts[name] = bound * deviation if deviation else np.zeros(n)
+    std = np.zeros(n)
+    doubt = np.zeros(n)
+    for name in FIELDS:
+        std, doubt = np.hypot(std, terms[name]), np.hypot(doubt, doubts[name])
+    shares = [np.where(std > 0.0, (terms[name] / std) ** 2, 0.0) for name in FIELDS]
+    sampled = _sampled(cases) if any(cases.std.values()) else np.zeros(n)
+    enough = np.abs(sampled - std) <= ENOUGH * sampled + np.nan_to_num(doubt) + 4.0 * cases.error_bound
+    return [std, doubt, *shares, sampled, enough.astype(np.float64)]
+
+
+register(
+    Quantity(
+        "std",
+        "Standard deviation of mu_macro from independent standard deviations of the inputs",
+        (
+            Part("std", "-", "To first order, from the gradient"),
+            Part("std_bound", "-", "The part of std that comes from the gradient's own bound; null: not in this table"),
+            *(Part(f"std_share.{name}", "-", f"Share of {name} in the variance, 0 to 1") for name in FIELDS),
+            Part("std_sampled", "-", f"Over {SAMPLES} evenly spread samples of normal inputs, those in bounds"),
+            Part(
+                "std_first_order_enough", "-",
+                f"false: std and std_sampled differ by more than {ENOUGH:.0%}, so believe the samples", bool,
+            ),
+        ),
+        _std,
+        cost=SAMPLES + 6,
+        slopes=True,
+    )
+)  # fmt: skip
+
+# --- stick fraction and power -------------------------------------------------------------------------
+
+
+def _stick_fraction(cases: Cases) -> Sequence[Array]:
+    v, y = cases.details.v_tilde, cases.details.y_tilde
+    value, error = cases.kernel.surrogate.stick_fraction_with_bound(v, y)
+    bound = np.full(v.shape, np.nan) if error is None else np.asarray(error)
+    # y~ below double range: whether such a contact sticks, the groups no longer tell
+    lost = (y == 0.0) & (v < np.inf) & ~cases.at_rest
+    return np.asarray(value), np.where(lost, 1.0, bound)
+
+
+register(
+    Quantity(
+        "stick_fraction",
+        "Share of the period during which the contact sticks",
+        (
+            Part("stick_fraction", "-", "Share of the period during which the contact sticks"),
+            Part("stick_fraction_bound", "-", "Bound of its absolute error, larger at the border; null: not known"),
+        ),
+        _stick_fraction,
+        cost=4,
+    )
+)  # fmt: skip
+
+
+def _power(cases: Cases) -> Sequence[Array]:
+    columns, details = cases.columns, cases.details
+    mu0, load, omega, v0 = (columns[name] for name in ("mu0", "Fz", "omega", "v0"))
+    usable = cases.usable & np.isfinite(details.v_tilde)
+    v, y = (np.where(usable, group, 1.0) for group in (details.v_tilde, details.y_tilde))
+    unit = mu0 * load * (details.length_scale * omega)
+    value, error = cases.kernel.surrogate.power_with_bound(v, y)
+    bound = np.nan if error is None else np.asarray(error) * unit
+    saved = (mu0 - cases.mu_macro) * load * v0
+    return (
+        np.where(cases.at_rest, 0.0, np.where(usable, np.asarray(value) * unit, np.nan)),
+        saved,
+        np.where(cases.at_rest, 0.0, np.where(usable, bound, np.nan)),
+        cases.error_bound * load * v0 + ROUNDING * np.abs(saved),
+    )
+
+
+register(
+    Quantity(
+        "power",
+        "Mean powers; null: not finite in double precision",
+        (
+            Part("power.oscillation", "W", "What the shaker puts in: mu0 Fz l0 omega <y~ cos tau u_y>; null for rigid"),
+            Part("power.saved", "W", "What the drive is spared: (mu0 - mu_macro) Fz v0"),
+            Part("power.oscillation_bound", "W", "Bound of the absolute error; null also where not in this table"),
+            Part("power.saved_bound", "W", "Bound of the absolute error of saved"),
+        ),
+        _power,
+        cost=5,
+    )
+)

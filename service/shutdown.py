@@ -1,0 +1,62 @@
+"""Stopping in order: first the service says that it is not ready, a while later it stops listening, then it ends."""
+
+import asyncio
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from .settings import Settings
+from .tables import Tables
+
+__all__ = ["draining", "end_with_parent"]
+
+_MARGIN_S = 2.0  # for the server's own end, after drain and grace
+
+
+def end_with_parent() -> None:
+    """Stop this worker when the process that started it is gone: nobody else would, and it would hold the port."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def wait() -> None:
+        parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=wait, daemon=True, name="parent").start()
+
+
+@contextmanager
+def draining(tables: Tables, settings: Settings) -> Iterator[None]:
+    """Between SIGTERM and what the server does about it, answer as before for ``drain_s``, but not ``/readyz``.
+
+    Answers of that time end their connections.  A second SIGTERM, or any other signal, is the server's at once.  The
+    process ends when drain and grace are over, whatever a thread is doing.
+    """
+    usual = signal.getsignal(signal.SIGTERM)
+    if not callable(usual) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    loop = asyncio.get_running_loop()
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if tables.draining or settings.drain_s <= 0:
+            usual(number, frame)
+        else:
+            loop.call_soon_threadsafe(loop.call_later, settings.drain_s, usual, number, None)
+        if not tables.draining:
+            tables.draining = True
+            last = threading.Timer(settings.drain_s + settings.shutdown_grace_s + _MARGIN_S, os._exit, (0,))
+            last.daemon = True
+            last.start()
+
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGTERM) is stop:
+            signal.signal(signal.SIGTERM, usual)

@@ -1,0 +1,260 @@
+"""The command ``mumacro``: answers with units, remedies for wrong words, exit codes."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from mumacro import Surrogate
+from mumacro.__main__ import COMMANDS, main
+from mumacro.input_names import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
+
+CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
+VALUES = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
+
+
+@pytest.fixture(scope="module")
+def tightest():
+    return Surrogate.open()
+
+
+def said(capsys, code, *words):
+    """What ``mumacro WORDS`` prints; on stderr, in one line, when it fails."""
+    assert main(words) == code
+    found = capsys.readouterr()
+    if code:
+        lines = [line for line in found.err.splitlines() if not line.startswith("compiling")]
+        assert len(lines) == 1, found.err
+        assert found.out == ""
+        return lines[0]
+    return found.out
+
+
+def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightest):
+    text = said(capsys, 0, CASE)
+    expected = tightest.evaluate(**VALUES)
+    row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
+    assert float(row.split()[1]) == pytest.approx(expected.mu_macro, rel=1e-14)
+    assert "[-]" in row
+    assert f"+- {expected.error_bound:.2g}" in row
+    for part in (expected.regime, expected.source, tightest.id):
+        assert part in text
+
+
+def test_json_holds_every_bit_and_the_words_may_stand_apart(capsys, tightest):
+    expected = tightest.evaluate(**VALUES, gradient=True)
+    for words in ((CASE, "--json", "--gradient"), (*CASE.split()[:3], "--json", *CASE.split()[3:], "--gradient")):
+        answer = json.loads(said(capsys, 0, *words))
+        assert answer["mu_macro"] == expected.mu_macro
+        assert answer["error_bound"] == expected.error_bound
+        assert answer["gradient"] == expected.gradient
+        assert answer["table"] == {"id": tightest.id, "tolerance": tightest.tolerance}
+    spaced = json.loads(said(capsys, 0, CASE.replace("=", " = "), "--json"))
+    assert spaced["mu_macro"] == expected.mu_macro
+
+
+def test_a_rigid_contact_is_said_and_json_knows_no_infinity(capsys, tightest):
+    answer = json.loads(said(capsys, 0, CASE.replace("1e6", "rigid"), "--json"), parse_constant=pytest.fail)
+    assert answer["mu_macro"] == tightest.evaluate(**{**VALUES, "k": None}).mu_macro
+    assert answer["v_tilde"] is None
+
+
+@pytest.mark.parametrize("name", ["mumacro-1e-4.nc", "mumacro-1e-10.nc"])
+def test_a_table_is_picked_by_path_or_tolerance(capsys, tables_dir, name):
+    tolerance = name.removeprefix("mumacro-").removesuffix(".nc")
+    for which in (str(tables_dir / name), tolerance):
+        assert json.loads(said(capsys, 0, CASE, "--json", "--table", which))["table"]["tolerance"] == float(tolerance)
+    loose = str(3.0 * float(tolerance))
+    assert json.loads(said(capsys, 0, CASE, "--json", "--table", loose))["table"]["tolerance"] == float(tolerance)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "parts"),
+    [
+        (CASE.replace("Fz", "Fzz"), 2, "unknown input 'Fzz': did you mean Fz?"),
+        (CASE.replace("k=", "K="), 2, "did you mean k?"),
+        (CASE.replace("k=1e6", "stiffness=1e6"), 2, "did you mean k?"),
+        (CASE.replace("k=1e6 ", ""), 2, "missing: k [N/m] (k=rigid for a rigid contact)"),
+        (CASE.replace("f=20690", ""), 2, "missing: omega [rad/s] or f [Hz]"),
+        (CASE + " omega=1", 2, "exactly one of omega [rad/s] and f [Hz]"),
+        (CASE + " Fz=11", 2, "Fz is given twice"),
+        (CASE + " fast", 2, "'fast' is no name=value"),
+        (CASE.replace("2e-6", "2um"), 2, "y0=2um: give metres, 2e-6"),
+        (CASE.replace("1e6", "1000N/mm"), 2, "k=1000N/mm: give newtons per metre, 1000000"),
+        (CASE.replace("20690", "20.69kHz"), 2, "f=20.69kHz: give hertz, 20690"),
+        (CASE.replace("0.3", "0,3"), 2, "the decimal sign is a point, 0.3"),
+        (CASE.replace("0.3", "0_3"), 2, "give a plain number"),
+        (CASE.replace("0.3", "-0.3"), 2, "mu0 must be finite and > 0, got -0.3"),
+        (CASE.replace("0.3", "nan"), 2, "mu0 must be finite and > 0"),
+        (CASE.replace("0.01", "1e999"), 2, "v0 must be finite and >= 0"),
+    ],
+)
+def test_wrong_words_get_the_remedy_in_one_line(capsys, words, code, parts):
+    assert parts in said(capsys, code, words)
+
+
+def test_a_table_that_cannot_be_read_or_does_not_exist(capsys, tmp_path):
+    (tmp_path / "text.nc").write_text("no table")
+    assert "text.nc" in said(capsys, 1, CASE, "--table", str(tmp_path / "text.nc"))
+    assert "no such file" in said(capsys, 1, CASE, "--table", str(tmp_path / "none.nc"))
+    assert "tolerance must be >=" in said(capsys, 2, CASE, "--table", "1e-30")
+    assert "tolerance" in said(capsys, 2, CASE, "--table", "-1")
+
+
+@pytest.mark.parametrize("word", [*COMMANDS, ""])
+def test_every_command_explains_itself(capsys, word):
+    if word == "serve":
+        pytest.importorskip("uvicorn")
+    with pytest.raises(SystemExit) as caught:
+        main([*([word] if word else []), "--help"])
+    assert caught.value.code == 0
+    text = capsys.readouterr().out
+    assert "usage: " in text
+    if word in ("", "law", "solve-for"):
+        assert all(f"[{unit}]" in text for unit, _ in SI.values())
+    if word not in ("serve",):
+        assert "mumacro " + word in text
+
+
+@pytest.mark.parametrize("words", [("--sideways",), ("law", CASE), ("solve-for", "mass", CASE), ("solve-for",)])
+def test_wrong_options_are_told_in_one_line(capsys, words):
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_a_law_runs_along_any_input_and_marks_the_border(capsys, tightest):
+    known = CASE.replace("v0=0.01", "")
+    words = ("law", known, "--along", "v0", "--from", "1e-4", "--to", "1", "--points", "9")
+    found = json.loads(said(capsys, 0, *words, "--json"))
+    assert found["v0"][0] == 1e-4
+    assert found["v0"][-1] == 1.0
+    for v0, mu, regime in zip(found["v0"], found["mu_macro"], found["regime"], strict=True):
+        answer = tightest.evaluate(**{**VALUES, "v0": v0})
+        assert (mu, regime) == (answer.mu_macro, answer.regime)
+    (border,) = found["border"]
+    assert tightest.evaluate(**{**VALUES, "v0": border["v0"]}).regime == "continuous"
+    assert tightest.evaluate(**{**VALUES, "v0": math.nextafter(border["v0"], 0.0)}).regime == "stick_slip"
+    text = said(capsys, 0, *words)
+    assert "v0 [m/s]" in text
+    assert "border of continuous sliding at v0" in text
+
+
+def test_a_law_along_the_frequency_is_one_along_omega(capsys):
+    known = CASE.replace("f=20690", "")
+    over_f = json.loads(said(capsys, 0, "law", known, "--along", "f", "--from", "100", "--to", "1e5", "--json"))
+    ends = (repr(math.tau * 100), repr(math.tau * 1e5))
+    over_omega = json.loads(
+        said(capsys, 0, "law", known, "--along", "omega", "--from", ends[0], "--to", ends[1], "--json")
+    )
+    assert over_f["mu_macro"] == over_omega["mu_macro"]
+    np.testing.assert_allclose(np.array(over_f["f"]) * math.tau, over_omega["omega"], rtol=1e-15)
+    assert over_f["border"][0]["f"] * math.tau == pytest.approx(over_omega["border"][0]["omega"])
+    text = said(capsys, 0, "law", known, "--along", "f", "--from", "100", "--to", "1e5", "--approximations")
+    assert "small_amplitude" in text
+
+
+@pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])
+def test_solve_for_finds_what_gives_the_target(capsys, unknown):
+    known = " ".join(w for w in CASE.split() if not w.startswith("f=" if unknown in ("f", "omega") else f"{unknown}="))
+    found = json.loads(said(capsys, 0, "solve-for", unknown, known, "--target", "0.24", "--json"))
+    assert found["roots"]
+    for root in found["roots"]:
+        again = json.loads(said(capsys, 0, f"{known} {unknown}={root[unknown]!r}", "--json"))
+        assert again["mu_macro"] == pytest.approx(0.24, abs=1e-11)
+        assert root["low"] <= root[unknown] <= root["high"]
+
+
+def test_solve_for_says_what_can_be_reached(capsys):
+    known = CASE.replace("v0=0.01", "")
+    message = said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
+    assert "out of reach" in message
+    assert "to 0.3" in message
+    assert "leave v0 out" in said(capsys, 2, "solve-for", "v0", CASE, "--target", "0.2")
+    still = CASE.replace("y0=2e-6", "y0=0").replace("v0=0.01", "")
+    assert "no influence" in said(capsys, 1, "solve-for", "v0", still, "--target", "0.2")
+    ratio = json.loads(said(capsys, 0, "solve-for", "v0", known, "--target", "0.8", "--ratio", "--json"))
+    assert ratio["target"] == pytest.approx(0.24)
+    narrow = said(capsys, 1, "solve-for", "v0", known, "--target", "0.24", "--between", "1e-4", "1e-3")
+    assert "v0 from 0.0001 to 0.001 m/s" in narrow
+
+
+def test_the_table_in_use_is_described(capsys, tightest):
+    found = json.loads(said(capsys, 0, "table", "--json"))
+    assert found["path"] == str(tightest.path)
+    assert found["checksum"] == tightest.checksum
+    assert found["verified_max_abs_error"] == tightest.max_abs_error
+    text = said(capsys, 0, "table")
+    assert tightest.checksum in text
+    assert text.count(".nc") > len(found["bundled"])
+
+
+def test_export_is_that_of_the_builder(capsys, tmp_path, tables_dir):
+    out = tmp_path / "grid.csv"
+    with pytest.raises(SystemExit) as caught:
+        main(["export", "--format", "csv", "--out", str(out), "--table", "1e-4"])
+    assert caught.value.code == 0
+    assert json.loads(capsys.readouterr().out)["table"] == str(tables_dir / "mumacro-1e-4.nc")
+    assert out.read_text().startswith("v_tilde,")
+
+
+def test_a_reader_that_has_enough_is_no_error(repository):
+    command = [sys.executable, "-m", "mumacro", "law", CASE.replace("v0=0.01", ""), "--from", "1e-4", "--to", "1"]
+    process = subprocess.Popen(
+        [*command, "--points", "20000"], cwd=repository, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith(b"v0 [m/s]")
+    process.stdout.close()
+    assert process.wait(timeout=120) == 0
+    assert process.stderr is not None
+    assert b"Traceback" not in process.stderr.read()
+    process.stderr.close()
+
+
+# --- names and units ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name):
+    assert suggestion(name) == suggestion(f" {name.lower()} ") == name
+    assert suggestion(name.upper()) == ("Fz" if name == "f" else name)  # a capital F is a force
+    assert scale_of(name, SI[name][0]) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "given", "si"),
+    [("k", "N/mm", 1e3, 1e6), ("k", "N/um", 1.0, 1e6), ("k", "kN/m", 7.0, 7e3), ("y0", "um", 2.0, 2e-6),
+     ("y0", "nm", 3.0, 3e-9), ("v0", "mm/s", 10.0, 0.01), ("f", "kHz", 20.69, 20690.0), ("Fz", "mN", 5.0, 5e-3),
+     ("v0", "km/h", 36.0, 10.0), ("mu0", "%", 30.0, 0.3)],
+)  # fmt: skip
+def test_units_are_turned_into_si_and_powers_of_ten_exactly(name, unit, given, si):
+    assert scale_of(name, unit).si(given) == si
+
+
+def test_turns_a_minute_are_an_angular_frequency():
+    assert scale_of("omega", "rpm").si(60.0) == pytest.approx(math.tau, rel=1e-15)
+
+
+def test_a_unit_of_another_quantity_is_none():
+    assert scale_of("omega", "Hz") is None
+    assert scale_of("y0", "N") is None
+    assert all(scale.si(1.0) > 0.0 for units in UNITS_OF.values() for scale in units.values())
+
+
+def test_headings_are_split_into_name_and_unit():
+    assert split_unit("k [N/mm]") == ("k", "N/mm")
+    assert split_unit(" v0(mm/s) ") == ("v0", "mm/s")
+    assert split_unit("mu0") == ("mu0", None)
+    assert split_unit("a[0][1]") == ("a[0]", "1")
+
+
+def test_numbers_are_read_as_python_reads_them():
+    assert read_number("y0", " 2e-6 ") == 2e-6
+    assert read_number("k", "Rigid") == math.inf
+    with pytest.raises(ValueError, match="plain number"):
+        read_number("y0", "0x10")

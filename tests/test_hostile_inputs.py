@@ -1,0 +1,250 @@
+"""One policy, safe to call: a bad scalar is refused by name, a bad value of an array is NaN, and nothing crashes."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mumacro import InputError, Surrogate
+from mumacro.charts import QUANTITIES
+
+#: methods of (v~, y~)
+PLANE = {
+    "mu_ratio": lambda s, v, y: s.mu_ratio(v, y),
+    "ratio_with_bound": lambda s, v, y: s.ratio_with_bound(v, y),
+    "power": lambda s, v, y: s.power(v, y),
+    "stick_fraction": lambda s, v, y: s.stick_fraction(v, y),
+    "power_with_bound": lambda s, v, y: s.power_with_bound(v, y),
+    "stick_fraction_with_bound": lambda s, v, y: s.stick_fraction_with_bound(v, y),
+    **{f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITIES},
+}
+NO_NUMBERS = {
+    "text": "0.1", "bytes": b"0.1", "complex": 1j, "None": None, "object": object(), "a set": {1.0},
+    "a mapping": {"a": 1.0}, "a type": float, "ragged": [[1.0], [1.0, 2.0]], "texts": ["0.1", "0.2"],
+    "bytes in a list": [b"1"], "complex array": np.array([1j, 2.0]), "too large": 10**400,
+    "too large in a list": [10**400],
+    "times": np.array(["2020-01-01"], dtype="datetime64[s]"), "durations": np.array([1], dtype="timedelta64[s]"),
+    "a time": np.datetime64("2020-01-01"), "text array": np.array(["0.1"]), "None in an array": [0.1, None],
+    "records": np.zeros(3, dtype=[("a", "f8")]), "objects": np.array([object()]), "void": np.void(b"12345678"),
+}  # fmt: skip
+OUT_OF_BOUNDS = [-1.0, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
+
+
+@pytest.fixture(scope="module")
+def table() -> Surrogate:
+    return Surrogate.open(1e-4)
+
+
+def first(found: Any) -> Any:
+    return found[0] if isinstance(found, tuple) else found
+
+
+@pytest.mark.parametrize("method", PLANE)
+@pytest.mark.parametrize("bad", NO_NUMBERS)
+def test_what_is_no_number_is_refused_by_name(table: Surrogate, method: str, bad: str) -> None:
+    for v, y, field in ((NO_NUMBERS[bad], 0.5, "v_tilde"), (0.1, NO_NUMBERS[bad], "y_tilde")):
+        with pytest.raises(InputError) as caught:
+            PLANE[method](table, v, y)
+        assert caught.value.field == field
+        assert len(str(caught.value)) < 400
+    with pytest.raises(InputError):
+        table.v_tilde_crit(NO_NUMBERS[bad])
+
+
+@pytest.mark.parametrize("method", PLANE)
+@pytest.mark.parametrize("bad", OUT_OF_BOUNDS, ids=repr)
+def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate, method: str, bad: Any) -> None:
+    ask = PLANE[method]
+    for v, y, field in ((bad, 0.5, "v_tilde"), (0.1, bad, "y_tilde")):
+        with pytest.raises(InputError) as caught:
+            ask(table, v, y)
+        assert caught.value.field == field
+        many = ask(table, np.array([0.1, float(v), 0.1]), np.array([0.5, float(y), 0.5]))
+        sound = ask(table, 0.1, 0.5)
+        for one, column in zip(
+            sound if isinstance(sound, tuple) else (sound,), many if isinstance(many, tuple) else (many,), strict=True
+        ):
+            assert column[0] == column[2] == one
+            assert column[1] == -1 if column.dtype == np.int8 else math.isnan(column[1])
+
+
+@pytest.mark.parametrize(("v", "y"), [(0.1, -1e6), (0.1, -2.0), (-1e6, 0.1), (math.nan, -1e6), (-0.1, -math.inf)])
+def test_quantities_beyond_the_quadrant_are_refused_not_read(table: Surrogate, v: float, y: float) -> None:
+    for method, ask in PLANE.items():
+        with pytest.raises(InputError):
+            ask(table, v, y)
+        assert np.isnan(first(ask(table, [v], y))).all(), method
+        assert np.isnan(first(ask(table, np.full(5000, v), np.full(5000, y)))).all(), method
+
+
+@pytest.mark.parametrize("method", PLANE)
+def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -> None:
+    ask = PLANE[method]
+    rng = np.random.default_rng(3)
+    v = np.round(10.0 ** rng.uniform(-2.0, 2.0, (6, 10)) * 64.0) / 64.0 + 1.0 / 64.0  # exact in half precision
+    v = v.astype(np.float16).astype(np.float64)
+    y = 10.0 ** rng.uniform(-2.0, 2.0, (6, 10))
+    expected = ask(table, v, y)
+    read_only = v.copy()
+    read_only.flags.writeable = False
+    spread = np.zeros((12, 30))
+    spread[::2, ::3] = v
+    unaligned = np.frombuffer(b"x" + v.tobytes(), dtype=np.uint8)[1:].view(np.float64).reshape(v.shape)
+    layouts: dict[str, Any] = {
+        "order": np.asfortranarray(v), "read only": read_only, "strided": spread[::2, ::3], "list": v.tolist(),
+        "big endian": v.astype(">f8"), "half": v.astype(np.float16), "single": v.astype(np.float32),
+        "long": v.astype(np.longdouble), "objects": v.astype(object), "reversed": v[::-1][::-1],
+        "unaligned": unaligned, "tuple": tuple(map(tuple, v)), "masked": np.ma.masked_array(v, mask=False),
+        "memory": memoryview(np.ascontiguousarray(v)),
+    }  # fmt: skip
+    for name, layout in layouts.items():
+        found = ask(table, layout, y)
+        for one, two in zip(
+            found if isinstance(found, tuple) else (found,),
+            expected if isinstance(expected, tuple) else (expected,),
+            strict=True,
+        ):
+            np.testing.assert_array_equal(one, two, err_msg=name)
+    assert np.array_equal(spread[::2, ::3], v)
+    for one in (True, np.True_, np.float16(1), np.longdouble(1), np.uint64(1), np.array(1), 1):
+        assert first(ask(table, one, 0.5)) == first(ask(table, 1.0, 0.5))
+    for empty in (np.empty(0), [], np.empty((0, 3))):
+        assert np.shape(first(ask(table, empty, 0.5))) == np.shape(empty)
+    assert isinstance(first(ask(table, np.array(0.1), np.array(0.5))), float)
+    assert first(ask(table, np.broadcast_to(0.1, (3, 4)), 0.5)).shape == (3, 4)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
+def test_what_is_masked_has_no_answer(table: Surrogate, kind: type) -> None:
+    """A masked value is unknown: it is not answered with whatever lies beneath the mask."""
+    masked = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
+    found = table.mu_ratio(masked, 0.5)
+    assert np.isnan(found).tolist() == [False, True, False]
+    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+    assert table.evaluate({**case, "v0": masked}).source_code.tolist()[1] == -1
+    assert masked.data.tolist() == [1, 2, 3]
+    with pytest.raises(InputError, match="v_tilde"):
+        table.mu_ratio(np.ma.masked, 0.5)
+
+
+def test_the_callers_floating_point_errors_are_left_alone(table: Surrogate) -> None:
+    with np.errstate(all="raise"):
+        table.mu_ratio(np.array([1e-304, math.nan, 0.1]), np.array([1.4e5, 0.5, 0.5]))
+        columns = {"mu0": [1e-300, 0.3], "Fz": 1e-300, "k": [math.inf, 1.0], "y0": 1e-300, "omega": 1e-300}
+        table.evaluate({**columns, "v0": [1e-310, -1.0]}, gradient=True).regime_certain  # noqa: B018
+        assert np.geterr()["under"] == "raise"
+
+
+@pytest.mark.parametrize("method", PLANE)
+def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate, method: str) -> None:
+    with pytest.raises(InputError, match="broadcasts with that of v_tilde"):
+        PLANE[method](table, np.ones(3), np.ones(2))
+
+
+def test_of_must_be_a_quantity(table: Surrogate) -> None:
+    for bad in ("mu", "", None, 3, ["power"]):
+        with pytest.raises(InputError, match=r"^of must be one of mu_ratio, power, stick_fraction"):
+            table.slopes(0.1, 0.5, of=bad)
+
+
+@pytest.mark.parametrize("bad", NO_NUMBERS)
+@pytest.mark.parametrize("field", ["mu0", "k", "omega", "f", "v0"])
+def test_evaluate_refuses_what_is_no_number_by_name(table: Surrogate, field: str, bad: str) -> None:
+    case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+    if field == "f":
+        del case["omega"]
+    case[field] = NO_NUMBERS[bad]
+    if bad == "None":
+        if field == "k":
+            assert table.evaluate(**case).source == "rigid"
+            return
+        with pytest.raises(InputError):
+            table.evaluate(**case)
+        return
+    for asked in ({}, {"gradient": True}, {"illegal": "raise"}):
+        with pytest.raises(InputError) as caught:
+            table.evaluate(**case, **asked)
+        assert caught.value.field == field
+    with pytest.raises(InputError):
+        table.evaluate(case)
+
+
+SCRIPT = """
+import itertools, json, math, sys
+import numpy as np
+from mumacro import InputError, Surrogate
+from mumacro.charts import QUANTITIES
+s = Surrogate.open(1e-4)
+extremes = [0.0, -0.0, 5e-324, 2.2e-308, 1e-300, 1e-160, 1e-150, 1e-15, 0.75, 1.0, 1.5, 3.0, 32.0, 2.0**17, 1e15, 1e150,
+            1e160, 1e300, 1.7976931348623157e308, math.inf, -math.inf, math.nan, -1.0, -1e300, -5e-324]
+rng = np.random.default_rng(0)
+bits = rng.integers(0, 2**64, 200_000, dtype=np.uint64).view(np.float64)
+pairs = np.array(list(itertools.product(extremes, extremes)))
+v = np.concatenate([pairs[:, 0], bits[:100_000]])
+y = np.concatenate([pairs[:, 1], bits[100_000:]])
+asks = [s.mu_ratio, s.ratio_with_bound, s.power_with_bound, s.stick_fraction_with_bound]
+asks += [lambda v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITIES]
+legal = (v >= 0.0) & (y >= 0.0)
+for ask in asks:
+    found = ask(v, y)
+    value = found[0] if isinstance(found, tuple) else found
+    assert np.isnan(value[~legal]).all()
+    inside = legal & np.isfinite(y)
+    assert not np.isnan(value[inside]).any()
+    for i in range(0, pairs.shape[0]):
+        try:
+            one = ask(float(v[i]), float(y[i]))
+        except InputError:
+            assert math.isnan(value[i]), (v[i], y[i])
+        else:
+            one = one[0] if isinstance(one, tuple) else one
+            assert one == value[i], (v[i], y[i], one, value[i])
+crit = s.v_tilde_crit(y)
+assert np.array_equal(np.isnan(crit), ~(y >= 0.0))
+columns = [rng.permutation(bits)[:50_000] for _ in range(6)]
+for column in columns:
+    column[: len(extremes) * 40] = rng.permutation(np.repeat(extremes, 40))
+    column[::3] = np.abs(column[::3])
+names = ("mu0", "Fz", "k", "y0", "omega", "v0")
+found = s.evaluate(dict(zip(names, columns)), gradient=True)
+legal = found.source_code >= 0
+assert legal.any() and not legal.all()
+assert np.isnan(found.mu_macro[~legal]).all() and not np.isnan(found.mu_macro[legal]).any()
+assert np.all(found.error_bound[legal] >= 0.0)
+for i in range(0, 50_000, 25):
+    case = [float(c[i]) for c in columns]
+    one = s.evaluate_case(*case)
+    assert one[2] == found.source_code[i]
+    try:
+        answer = s.evaluate(dict(zip(names, case)), gradient=True)
+    except InputError:
+        assert one[2] == -1
+    else:
+        assert (answer.mu_macro, answer.error_bound) == (found.mu_macro[i], found.error_bound[i])
+        for name in names:
+            a, b = answer.gradient[name], found.gradient[name][i]
+            assert a == b or (math.isnan(a) and math.isnan(b)), (name, a, b, case)
+print("survived")
+"""
+
+
+def test_any_bits_at_all_do_no_harm(repository: Path) -> None:
+    """In a process of its own, which would be gone if a kernel read where it must not."""
+    command = [sys.executable, "-X", "faulthandler", "-W", "error", "-c", SCRIPT]
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "survived"
+
+
+def test_errors_of_bad_input_are_short_whatever_was_given(table: Surrogate) -> None:
+    with pytest.raises(InputError) as caught:
+        table.mu_ratio(["x" * 100_000] * 100, 0.5)
+    assert len(str(caught.value)) < 400
+    assert json.dumps(str(caught.value))

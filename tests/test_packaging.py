@@ -1,0 +1,64 @@
+"""What is shipped: one version, tables beside the library, one line where something is missing."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+import mumacro
+import service
+from mumacro import bundled
+from mumacro.extras import missing
+
+
+def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository):
+    version = mumacro.__version__
+    assert service.__version__ == version
+    for name, pattern in (
+        ("CITATION.cff", r"^version: (.+)$"),
+        ("Dockerfile", r'image\.version="(.+?)"'),
+        ("deploy/compose.yaml", r"image: mumacro:(\S+)"),
+        ("deploy/kubernetes.yaml", r'(?:image: mumacro:|kubernetes\.io/version: ")([^"\s]+)'),
+    ):
+        found = re.findall(pattern, (repository / name).read_text("utf-8"), re.MULTILINE)
+        assert found, name
+        assert set(found) == {version}, name
+
+
+def test_a_name_that_the_service_does_not_have_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = service.nothing
+
+
+def test_a_checkout_finds_its_committed_tables(repository, tables_dir):
+    assert bundled.bundled_tables() == sorted(tables_dir.glob("*.nc"))
+    assert repository / "tables" / "mumacro-1e-10.nc" in bundled.bundled_tables()
+
+
+def test_an_installed_package_finds_the_tables_inside_it_and_no_strangers(tmp_path, monkeypatch):
+    package, stranger = tmp_path / "mumacro", tmp_path / "tables"
+    package.mkdir()
+    stranger.mkdir()
+    (stranger / "hdf5-table.nc").touch()
+    monkeypatch.setattr(bundled, "_PACKAGE", package)
+    assert bundled.bundled_tables() == []
+    (package / "data").mkdir()
+    (package / "data" / "mumacro-1e-10.nc").touch()
+    assert bundled.bundled_tables() == [package / "data" / "mumacro-1e-10.nc"]
+
+
+@pytest.mark.parametrize("module", ["service", "builder", "mumacro"])
+def test_a_bare_interpreter_is_told_in_one_line_what_to_install(repository, module):
+    # -S leaves site-packages out: nothing but the standard library is there
+    done = subprocess.run(
+        [sys.executable, "-S", "-m", module], cwd=repository, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert re.fullmatch(r".*(\w+) is not installed: pip install 'mumacro.*", done.stderr.strip())
+
+
+def test_a_missing_module_of_the_project_itself_is_not_explained_away():
+    with pytest.raises(ModuleNotFoundError):
+        missing("builder", ModuleNotFoundError("No module named 'builder.nothing'", name="builder.nothing"))

@@ -1,0 +1,140 @@
+"""How fast a contact forgets: the multiplier and the bound against marching, limits, bad input."""
+
+import doctest
+import math
+
+import numpy as np
+import pytest
+
+from builder.steady import solve, solve_raw, workspace
+from mumacro import InputError
+from mumacro import settling as module
+from mumacro.settling import settling
+
+STEPS = 40_000
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+UNIT = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "omega": 1.0}
+SLIDING = [(0.3, 0.3), (0.1, 0.2), (0.6, 1.0), (1.0, 0.5)]
+STICKING = [(0.02, 0.3), (0.1, 0.6), (0.05, 1.2), (0.3, 1.0), (0.2, 2.0)]
+
+
+def of(surrogate, v, y, **more):
+    return settling(surrogate, **UNIT, y0=y, v0=v, **more)
+
+
+def at_rest_angles(v: float, y: float) -> tuple[float, float]:
+    """Cosine of the angle that the spring turns through while the contact sticks, and the stick's share."""
+    w, out, orbit, res = workspace()
+    assert solve_raw(v, y, y - 1.0, w, out, orbit, res) == 0
+    duration, start = orbit[0], orbit[4]
+    # the foot rests: the spring's end moves with the upper point; both ends are on the unit circle
+    across = y * (math.cos(start + duration) - math.cos(start))
+    return 1.0 - 0.5 * ((v * duration) ** 2 + across * across), res[3]
+
+
+def test_the_example_runs() -> None:
+    assert doctest.testmod(module).failed == 0
+
+
+@pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
+def test_the_slip_path_is_the_solvers(surrogate, v, y) -> None:
+    found = of(surrogate, v, y)
+    exact = 2.0 * math.pi * solve(v, y).slip_speed
+    assert found.slip_path == pytest.approx(exact, rel=1e-10)
+    assert abs(found.periods - math.log(100.0) / exact) <= found.error_bound
+    assert found.periods_any == 2.0 * found.periods
+    assert found.time == pytest.approx(found.periods * 2.0 * math.pi)
+    assert of(surrogate, v, y, remaining=0.1).periods == pytest.approx(0.5 * found.periods)
+
+
+@pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
+def test_a_small_disturbance_decays_as_promised(surrogate, naive, v, y) -> None:
+    start = naive.march(v, y, STEPS, naive.periods_until_steady(v, y))[-1]
+    size = 1e-5
+    here = start / np.hypot(*start) if np.hypot(*start) > 1.0 - 1e-9 else start
+    beside = here + size * np.array([-here[1], here[0]])
+    beside *= min(1.0, 1.0 / np.hypot(*beside))
+    apart = [
+        float(np.hypot(*(naive.march(v, y, STEPS, n, *beside)[-1] - naive.march(v, y, STEPS, n, *start)[-1])))
+        for n in (1, 2)
+    ]
+    cosine, share = at_rest_angles(v, y) if (v, y) in STICKING else (1.0, 0.0)
+    assert (share > 0.0) == ((v, y) in STICKING)
+    multiplier = math.exp(-of(surrogate, v, y).slip_path) * cosine**2
+    assert apart[1] / apart[0] == pytest.approx(multiplier, rel=5e-3)
+
+
+@pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (0.004, 0.5), (0.01, 0.95)])
+def test_any_disturbance_is_gone_in_time(surrogate, naive, v, y) -> None:
+    found = of(surrogate, v, y)
+    steady = naive.march(v, y, 4000, naive.periods_until_steady(v, y))[-1]
+    rng = np.random.default_rng(1)
+    angle, radius = rng.uniform(0.0, 2.0 * math.pi, 12), np.sqrt(rng.uniform(0.0, 1.0, 12))
+    starts = [(0.0, 0.0), (-1.0, 0.0), *zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)]
+    for start in starts:
+        first = float(np.hypot(*(np.array(start) - steady)))
+        for n in (1, 3, math.ceil(found.periods_any)):
+            left = float(np.hypot(*(naive.march(v, y, 4000, n, *start)[-1] - steady)))
+            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3  # the steps of the march
+            if n >= found.periods_any:
+                assert left <= 0.01 * first + 2e-3
+
+
+def test_nothing_that_stands_still_settles(surrogate) -> None:
+    for changed in ({"v0": 0.0}, {"v0": 0.0, "y0": 0.0}, {"v0": 0.0, "omega": 0.0}, {"k": None, "v0": 0.0, "y0": 0.0}):
+        found = settling(surrogate, **{**CASE, **changed})
+        assert (found.periods, found.time, found.slip_path) == (math.inf, math.inf, 0.0)
+
+
+def test_rigid_contact_settles_at_once(surrogate) -> None:
+    for stiffness in (None, math.inf):
+        found = settling(surrogate, **{**CASE, "k": stiffness})
+        assert (found.periods, found.time, found.slip_path) == (0.0, 0.0, math.inf)
+
+
+def test_without_oscillation_the_drag_decides(surrogate) -> None:
+    l0 = 3e-6
+    for changed in ({"y0": 0.0}, {"omega": 0.0}):
+        found = settling(surrogate, **{**CASE, **changed})
+        assert found.time == pytest.approx(l0 * math.log(100.0) / 0.01, rel=1e-14)
+    dragged = settling(surrogate, **{**CASE, "y0": 0.0})
+    assert dragged.slip_path == pytest.approx(2.0 * math.pi * 0.01 / (l0 * 1.3e5), rel=1e-14)
+    # the limit of small amplitudes is the same
+    assert settling(surrogate, **{**CASE, "y0": 1e-12}).periods == pytest.approx(dragged.periods, rel=1e-5)
+
+
+def test_at_zero_speed_only_large_amplitudes_settle(surrogate) -> None:
+    for y, slips in ((0.5, False), (1.0, False), (1.5, True)):
+        found = of(surrogate, 0.0, y)
+        # slip in every half period is what the stroke 2 y~ exceeds the diameter by
+        assert found.slip_path == pytest.approx(4.0 * (y - 1.0) if slips else 0.0, rel=1e-9)
+
+
+def test_arrays_broadcast_and_extremes_give_no_warning(surrogate) -> None:
+    found = settling(
+        surrogate, **{**CASE, "v0": np.array([[0.0], [1e-300], [0.01], [1e300]]), "y0": np.array([0.0, 2e-6, 1e300])}
+    )
+    assert found.periods.shape == found.time.shape == found.error_bound.shape == (4, 3)
+    assert not np.isnan(found.periods).any()
+    assert not np.isnan(found.time).any()
+    assert found.periods[2, 1] == settling(surrogate, **CASE).periods
+
+
+@pytest.mark.parametrize("remaining", [0.0, 1.0, -1.0, math.nan, 2.0])
+def test_a_bad_remainder_is_named(surrogate, remaining) -> None:
+    with pytest.raises(InputError) as caught:
+        settling(surrogate, **CASE, remaining=remaining)
+    assert caught.value.field == "remaining"
+
+
+def test_a_bad_input_is_named(surrogate) -> None:
+    with pytest.raises(InputError) as caught:
+        settling(surrogate, **{**CASE, "Fz": -1.0})
+    assert caught.value.field == "Fz"
+
+
+def test_an_illegal_case_spoils_only_itself(surrogate) -> None:
+    found = settling(surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.array([0.3, 0.3, 0.3])})
+    assert found.periods[0] == settling(surrogate, **CASE).periods
+    for column in (found.periods, found.periods_any, found.time, found.slip_path, found.error_bound):
+        assert np.isnan(column[1:]).all()

@@ -1,0 +1,313 @@
+"""Threads, processes and pickles: the same bits everywhere, nothing waits, nothing is left over that a fork misses."""
+
+import multiprocessing
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mumacro import InputError, Surrogate, TableError, batch
+from mumacro.table import read_table
+
+Array = NDArray[np.float64]
+TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+N = 200_000
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+
+
+@pytest.fixture(scope="module")
+def table() -> Surrogate:
+    return Surrogate.open(1e-7, threads=4)
+
+
+def points(n: int, seed: int = 1) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    return 10.0 ** rng.uniform(-3.0, 3.0, n), 10.0 ** rng.uniform(-3.0, 3.0, n)
+
+
+def everything(table: Surrogate, n: int = N, seed: int = 1) -> bytes:
+    """The bits of all that a table says of some points."""
+    v, y = points(n, seed)
+    inputs = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": y, "omega": 1.0, "v0": v}
+    answer = table.evaluate(inputs, gradient=True)
+    parts = [table.mu_ratio(v, y), *table.power_with_bound(v, y), *table.stick_fraction_with_bound(v, y)]
+    parts += [*table.slopes(v, y, "power", bounds=True), answer.mu_macro, answer.error_bound, answer.source_code]
+    parts += [*(answer.gradient or {}).values(), *(answer.gradient_bound or {}).values()]
+    return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
+
+
+# --- threads ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 7])
+def test_the_number_of_threads_changes_nothing_but_the_time(table: Surrogate, threads: int) -> None:
+    other = Surrogate.open(table.path, threads=threads)
+    assert other.threads == threads
+    assert everything(other) == everything(table)
+
+
+def test_one_thread_means_that_none_is_started(table: Surrogate, monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = Surrogate.open(table.path, threads=1)
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise AssertionError("a thread was started")
+
+    expected = everything(table)
+    monkeypatch.setattr(batch, "ThreadPoolExecutor", refuse)
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    assert everything(alone) == expected
+    assert everything(table.on_one_thread()) == expected
+    with pytest.raises(AssertionError, match="a thread was started"):
+        table.mu_ratio(*points(N))
+    # columns are answered on the calling thread, whatever the table was opened with
+    v, y = points(N)
+    one = np.ones(1)
+    table.evaluate_columns(0.5 * one, 2.0 * one, one, y, one, v)
+
+
+def test_no_thread_outlives_its_call(table: Surrogate) -> None:
+    before = set(threading.enumerate())
+    everything(table)
+    assert set(threading.enumerate()) == before
+
+
+def test_eight_threads_may_ask_everything_at_once(table: Surrogate) -> None:
+    expected = everything(table, 70_000)
+    fresh = Surrogate.open(table.path, threads=2)  # power and stick fraction are not prepared yet
+    with ThreadPoolExecutor(8) as pool:
+        for found in pool.map(lambda _: everything(fresh, 70_000), range(8)):
+            assert found == expected
+
+
+def test_tables_are_read_by_many_threads_at_once() -> None:
+    expected = {path: read_table(path).attributes["content_sha256"] for path in TABLES}
+    start = threading.Barrier(8)
+
+    def work(i: int) -> list[tuple[Path, str]]:
+        start.wait()
+        return [
+            (path, str(read_table(path).attributes["content_sha256"])) for path in TABLES[i % 4 :] + TABLES[: i % 4]
+        ]
+
+    with ThreadPoolExecutor(8) as pool:
+        for found in pool.map(work, range(8)):
+            assert dict(found) == expected
+
+
+def test_tables_are_opened_while_others_evaluate(table: Surrogate, tmp_path: Path) -> None:
+    (tmp_path / "damaged.nc").write_bytes(table.path.read_bytes()[:50_000])
+    expected, stop, wrong = everything(table, 20_000), threading.Event(), []
+
+    def evaluate() -> None:
+        while not stop.is_set():
+            if everything(table, 20_000) != expected:
+                wrong.append("other numbers")
+
+    workers = [threading.Thread(target=evaluate) for _ in range(2)]
+    for worker in workers:
+        worker.start()
+    try:
+        for _ in range(5):
+            assert everything(Surrogate.open(table.path, threads=1), 20_000) == expected
+            with pytest.raises(TableError):
+                Surrogate.open(tmp_path / "damaged.nc")
+    finally:
+        stop.set()
+        for worker in workers:
+            worker.join()
+    assert wrong == []
+
+
+def test_a_small_call_does_not_wait_for_a_large_one(table: Surrogate) -> None:
+    v, y = points(2_000_000)
+    v, y = np.tile(v, 10), np.tile(y, 10)
+    begun, ended = threading.Event(), threading.Event()
+
+    def large() -> None:
+        begun.set()
+        table.mu_ratio(v, y)
+        ended.set()
+
+    small_v, small_y = points(100)
+    expected = table.mu_ratio(small_v, small_y)
+    table.evaluate(**CASE)  # kernels are loaded
+    worker = threading.Thread(target=large)
+    worker.start()
+    begun.wait()
+    answered = 0
+    while not ended.is_set() and answered < 50:
+        assert np.array_equal(table.mu_ratio(small_v, small_y), expected)
+        assert table.evaluate(**CASE).mu_macro > 0.0
+        answered += not ended.is_set()
+    worker.join()
+    assert answered >= 10
+
+
+# --- processes ----------------------------------------------------------------------------------------
+
+
+_here: Surrogate | None = None  # what a forked child finds
+
+
+def _ask(seed: int) -> bytes:
+    assert _here is not None
+    return everything(_here, N, seed)
+
+
+@pytest.fixture
+def inherited(table: Surrogate) -> Surrogate:
+    """The table after a large call, where a forked child finds it."""
+    global _here
+    table.mu_ratio(*points(N))
+    _here = table
+    return table
+
+
+def child(work: Callable[[], bytes]) -> bytes:
+    """What ``work`` gives in a forked child; the child has a minute."""
+    read, write = os.pipe()
+    number = os.fork()
+    if number == 0:
+        try:
+            os.close(read)
+            with os.fdopen(write, "wb") as out:
+                out.write(work())
+            os._exit(0)
+        finally:
+            os._exit(1)
+    os.close(write)
+    timer = threading.Timer(60.0, os.kill, (number, 9))
+    timer.start()
+    with os.fdopen(read, "rb") as stream:
+        found = stream.read()
+    _, status = os.waitpid(number, 0)
+    timer.cancel()
+    assert status == 0
+    return found
+
+
+@forks
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
+    assert child(lambda: _ask(1)) == everything(inherited)
+    # a child of the child, and the parent afterwards
+    assert child(lambda: child(lambda: _ask(2))) == everything(inherited, N, 2)
+
+
+@forks
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_pool_gives_the_same_bits(inherited: Surrogate) -> None:
+    expected = [everything(inherited, N, seed) for seed in range(4)]
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(_ask, range(4)).get(timeout=120) == expected
+
+
+@forks
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_executor_gives_the_same_bits(inherited: Surrogate) -> None:
+    expected = [everything(inherited, N, seed) for seed in range(4)]
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
+        assert list(pool.map(_ask, range(4), timeout=120)) == expected
+
+
+def _fail(what: str) -> None:
+    if what == "input":
+        Surrogate.open(1e-4).evaluate({**CASE, "v0": [0.1, -1.0]}, illegal="raise")
+    Surrogate.open("no-such-table.nc")
+
+
+@forks
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_errors_of_workers_reach_their_caller() -> None:
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
+        with pytest.raises(InputError) as caught:
+            pool.submit(_fail, "input").result(timeout=60)
+        assert (caught.value.field, caught.value.value, caught.value.index) == ("v0", -1.0, 1)
+        assert str(caught.value) == "v0 at index 1 must be finite and >= 0, got -1.0"
+        with pytest.raises(TableError, match=r"no-such-table\.nc: no such file") as broken:
+            pool.submit(_fail, "table").result(timeout=60)
+        assert broken.value.path == Path("no-such-table.nc")
+        assert pool.submit(len, "alive").result(timeout=60) == 5
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_errors_come_out_of_a_pickle_as_they_went_in(protocol: int) -> None:
+    for error in (InputError("Fz", -1.0, "finite and > 0", 7), TableError("a.nc", "no such file")):
+        again = pickle.loads(pickle.dumps(error, protocol))  # noqa: S301 (our own bytes)
+        assert type(again) is type(error)
+        assert (str(again), vars(again)) == (str(error), vars(error))
+
+
+# --- pickles ------------------------------------------------------------------------------------------
+
+
+def in_another_process(data: bytes, folder: Path, repository: Path) -> str:
+    program = (
+        "import pickle, sys; s = pickle.load(sys.stdin.buffer);"
+        "print(s.threads, s.checksum, float(s.mu_ratio(0.1, 0.5)).hex())"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    done = subprocess.run(
+        [sys.executable, "-c", program], input=data, cwd=folder, env=environment, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    return done.stdout.decode().strip()
+
+
+def told(table: Surrogate) -> str:
+    return f"{table.threads} {table.checksum} {table.mu_ratio(0.1, 0.5).hex()}"
+
+
+def test_a_bundled_table_is_pickled_by_name_and_checksum(tmp_path: Path, repository: Path) -> None:
+    opened = Surrogate.open(1e-10, threads=3)
+    data = pickle.dumps(opened)
+    assert len(data) < 500
+    assert str(opened.path.parent).encode() not in data  # it may be installed elsewhere over there
+    assert opened.checksum.encode() in data
+    assert in_another_process(data, tmp_path, repository) == told(opened)
+
+
+def test_another_table_carries_its_bytes(tmp_path: Path, repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine").mkdir()
+    shutil.copy(TABLES[-2], tmp_path / "mine" / "own.nc")
+    monkeypatch.chdir(tmp_path / "mine")
+    opened = Surrogate.open("own.nc", threads=2)
+    data = pickle.dumps(opened)
+    assert len(data) > TABLES[-2].stat().st_size
+    monkeypatch.chdir(tmp_path)
+    shutil.rmtree(tmp_path / "mine")
+    assert in_another_process(data, tmp_path, repository) == told(opened)
+    again = pickle.loads(data)  # noqa: S301 (our own bytes)
+    assert everything(again, 1000) == everything(opened, 1000)
+    assert len(pickle.dumps(again)) == pytest.approx(len(data), rel=0.01)
+
+
+def test_a_table_replaced_after_it_was_opened_is_pickled_as_it_was_opened(tmp_path: Path) -> None:
+    path = tmp_path / "mine.nc"
+    shutil.copy(TABLES[0], path)
+    opened = Surrogate.open(path)
+    shutil.copy(TABLES[1], path)
+    assert pickle.loads(pickle.dumps(opened)).checksum == opened.checksum  # noqa: S301 (our own bytes)
+
+
+def test_a_bundled_table_of_another_release_is_refused() -> None:
+    opened = Surrogate.open(1e-4)
+    data = pickle.dumps(opened).replace(opened.checksum.encode(), b"0" * 64)
+    with pytest.raises(TableError, match="install the same release on both sides"):
+        pickle.loads(data)  # noqa: S301 (our own bytes)
+
+
+def test_a_worker_that_gets_a_table_twice_prepares_it_once() -> None:
+    data = pickle.dumps(Surrogate.open(1e-4, threads=5))
+    assert pickle.loads(data) is pickle.loads(data)  # noqa: S301 (our own bytes)

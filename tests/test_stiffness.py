@@ -1,0 +1,112 @@
+"""Contact stiffness: the textbook's relations, the ellipse by brute force, bounds."""
+
+import doctest
+import math
+
+import numpy as np
+import pytest
+
+from mumacro import InputError, stiffness
+from mumacro.stiffness import Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
+
+STEEL, RUBBER, RIGID = Material(210e9, 0.3), Material(5e6, 0.5), Material(math.inf, 0.3)
+
+
+def test_the_examples_run() -> None:
+    assert doctest.testmod(stiffness).failed == 0
+
+
+@pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.5])
+def test_equal_bodies_have_mindlins_ratio(nu: float) -> None:
+    body = Material(1e9, nu)
+    for contact in (ball_on_flat(1e-2, 5.0, body, body), flat_punch(1e-3, 5.0, body, body)):
+        assert contact.k / contact.k_normal == pytest.approx(2.0 * (1.0 - nu) / (2.0 - nu), rel=1e-14)
+
+
+def test_the_ball_follows_hertz() -> None:
+    found = ball_on_flat(5e-3, 10.0, STEEL, RIGID)
+    modulus = 210e9 / (1.0 - 0.09)
+    depth = found.half_width**2 / 5e-3
+    assert 4.0 / 3.0 * modulus * math.sqrt(5e-3) * depth**1.5 == pytest.approx(10.0, rel=1e-13)
+    # the normal stiffness is the tangent of that law
+    assert found.k_normal == pytest.approx(2.0 * modulus * math.sqrt(5e-3 * depth), rel=1e-13)
+    assert found.pressure * 2.0 / 3.0 * math.pi * found.half_width**2 == pytest.approx(10.0, rel=1e-13)
+    assert ball_on_flat(5e-3, 80.0, STEEL, RIGID).k == pytest.approx(2.0 * found.k, rel=1e-13)
+
+
+def test_a_soft_body_decides() -> None:
+    assert ball_on_flat(1e-2, 1.0, RUBBER, STEEL).k == pytest.approx(ball_on_flat(1e-2, 1.0, RUBBER, RIGID).k, rel=1e-3)
+
+
+def test_a_round_ellipse_is_the_circle() -> None:
+    for along in (False, True):
+        compliance = stiffness._ellipse_compliance(1e-3, 1e-3, STEEL, along)
+        assert 1.0 / compliance == pytest.approx(flat_punch(1e-3, 1.0, STEEL, RIGID).k, rel=1e-12)
+
+
+@pytest.mark.parametrize(("narrow", "wide"), [(1.0, 3.0), (0.02, 1.0), (1e-4, 1.0)])
+@pytest.mark.parametrize("along", [False, True])
+def test_the_ellipse_is_the_integral_over_all_directions(narrow: float, wide: float, along: bool) -> None:
+    phi = (np.arange(4_000_000) + 0.5) * (2.0 * math.pi / 4_000_000)  # smooth and periodic
+    chord = 1.0 / np.hypot(np.cos(phi) / narrow, np.sin(phi) / wide)
+    cosine = (np.sin(phi) if along else np.cos(phi)) ** 2
+    brute = (chord * ((1.0 - 0.3) + 0.3 * cosine)).mean() / (4.0 * STEEL.G * narrow * wide)
+    assert stiffness._ellipse_compliance(narrow, wide, STEEL, along) == pytest.approx(brute, rel=1e-10)
+
+
+def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_load() -> None:
+    across = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL)
+    along = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL, along=True)
+    assert 1.0 < across.k / along.k < 1.0 / (1.0 - 0.3)
+    assert 1.0 < cylinder_on_flat(5e-3, 5e-3, 400.0, STEEL, STEEL).k / across.k < 1.3
+    assert across.pressure == pytest.approx(2.0 * 100.0 / (math.pi * across.half_width * 5e-3), rel=1e-14)
+    incompressible = Material(1e9, 0.0)
+    same = cylinder_on_flat(1e-2, 1e-2, 10.0, incompressible, incompressible)
+    assert same.k == pytest.approx(same.k_normal, rel=1e-14)
+
+
+def test_stiffness_scales_as_it_must() -> None:
+    # lengths times 2, forces times 4: the same strains, k twice
+    small = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL)
+    large = cylinder_on_flat(1e-2, 1e-2, 400.0, STEEL, STEEL)
+    assert large.k == pytest.approx(2.0 * small.k, rel=1e-13)
+    assert large.pressure == pytest.approx(small.pressure, rel=1e-13)
+
+
+def test_springs_in_series() -> None:
+    assert in_series(4.0) == 4.0
+    assert in_series(4.0, math.inf) == 4.0
+    assert in_series(math.inf) == math.inf
+    assert Contact(2.0, 1.0, 1.0, 1.0).length_scale(0.5, 8.0) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: Material(0.0, 0.3), "E"),
+        (lambda: Material(math.nan, 0.3), "E"),
+        (lambda: Material(1e9, 0.6), "nu"),
+        (lambda: Material(1e9, math.nan), "nu"),
+        (lambda: ball_on_flat(-1.0, 1.0, STEEL, STEEL), "radius"),
+        (lambda: ball_on_flat(1.0, math.inf, STEEL, STEEL), "Fz"),
+        (lambda: ball_on_flat(1.0, 1.0, RIGID, RIGID), "E"),
+        (lambda: flat_punch(0.0, 1.0, STEEL, STEEL), "radius"),
+        (lambda: cylinder_on_flat(1.0, 1e-6, 1e3, STEEL, STEEL), "length"),
+        (lambda: in_series(1.0, -1.0), "stiffness"),
+        (lambda: Contact(1.0, 1.0, 1.0, 1.0).length_scale(0.0, 1.0), "mu0"),
+    ],
+)
+def test_a_bad_value_is_named(call, field) -> None:
+    with pytest.raises(InputError) as caught:
+        call()
+    assert caught.value.field == field
+
+
+def test_the_numbers_of_the_validity_page() -> None:
+    contact = ball_on_flat(5e-3, 10.0, STEEL, STEEL)
+    stiffer = contact.k_normal / contact.k
+    assert stiffer == pytest.approx(1.21, abs=0.005)
+    for y, change in ((1.0, 0.004), (100.0, 0.36)):  # of the normal force, for an inclination of 0.01 and mu0 = 0.3
+        assert stiffer * 0.3 * 0.01 * y == pytest.approx(change, rel=0.1)
+    assert 2.0 * math.pi * 20e3 * 70e-6 / 3200.0 == pytest.approx(0.003, abs=3e-4)
+    assert in_series(1.0, 10.0) == pytest.approx(0.91, abs=0.001)
