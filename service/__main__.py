@@ -109,6 +109,7 @@ def _serve(settings: Settings) -> int:
                 server_header=False,
                 ws="none",
                 root_path=settings.root_path,
+                proxy_headers=bool(settings.trusted_proxies),
                 forwarded_allow_ips=settings.trusted_proxies,
                 limit_concurrency=settings.max_connections,
                 timeout_keep_alive=settings.keep_alive_s,

@@ -27,7 +27,7 @@ from starlette.responses import Response
 from mumacro.errors import MumacroError
 
 from . import __version__, numbers
-from .connection import Bounded, Connection
+from .connection import Connection
 from .errors import answer_problem, invalid_request
 from .formats.columns import numbers_ready
 from .guard import Guard, Work, path_of
@@ -168,7 +168,6 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
         strict_content_type=False,
         telemetry={"metrics": False, "logs": False, "tracing": settings.tracing},
         middleware=[
-            Middleware(Bounded),
             *cors,
             Middleware(RequestRecord, metrics=metrics, log=access_log, tables=tables),
             Middleware(Guard, keys=keys, open_paths=_OPEN_PATHS, max_bytes=settings.max_body_bytes),

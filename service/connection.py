@@ -1,201 +1,501 @@
-"""A bound around each connection: heads of limited size, in limited time, one request after another.
+"""HTTP/1.1 on one connection: bytes to ASGI and back, one request after another, every part of it bounded.
 
-uvicorn's fast parser takes heads of any size, queues pipelined requests without a limit and waits for ever for the rest
-of a head or for a caller who does not read.  This protocol, given to uvicorn as its documented ``http`` parameter,
-stands between the socket and uvicorn's own: it only counts, holds back and closes.  It knows when a request begins,
-wants its body and ends from the application's side, by an ASGI middleware (:class:`Bounded`) that finds the connection
-in the scope's state.
+uvicorn takes it by its documented ``http`` parameter; the parser is llhttp (httptools).  uvicorn's own protocol over
+the same parser takes heads of any size, queues pipelined requests without a limit, waits for ever for the rest of a
+head, and takes half as long again for a request: docs/decisions/0011-wire.md.
 """
 
 import asyncio
+import logging
+import math
+from collections import deque
+from http import HTTPStatus
 from typing import Any
+from urllib.parse import unquote
 
+import httptools
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-from .guard import BATCH_PATH, path_of
+from .errors import OverloadedError, problem_of
+from .guard import BATCH_PATH, CLOSE
 
-__all__ = ["Bounded", "Connection"]
+__all__ = ["Connection"]
 
-MAX_HEAD = 64 * 1024  # bytes of a request's head
-_SLICE = 16 * 1024  # bytes that are handed on at a time between requests: so few pipelined ones are parsed at once
-_SETTLE_S = 0.005
-_AHEAD = 256 * 1024  # bytes that are held back before the socket is no longer read
-_TOO_LARGE = (
-    b"HTTP/1.1 431 Request Header Fields Too Large\r\ncontent-type: text/plain\r\ncontent-length: 0\r\n"
-    b"connection: close\r\n\r\n"
-)
+MAX_HEAD = 64 * 1024  # bytes of a request's head, and of whatever else holds no body
+_HEADS = 16 * 1024  # bytes that are parsed at a time between requests: so few pipelined ones are queued at once
+_BODIES = 64 * 1024  # and within a body
+_AHEAD = 256 * 1024  # bytes that are held for later before the socket is no longer read
+_UNREAD = 64 * 1024  # bytes of a body that the application has not taken yet
+_TOGETHER = 64 * 1024  # bytes of a body that are copied behind the head: one write to the socket instead of two
+_LINGER_S = 5.0  # how long the rest of an unwanted body is read, so that the caller sees the answer and no reset,
+_LINGER = 32 * 1024 * 1024  # and how much of it
+_STATUS = {status.value: f"HTTP/1.1 {status.value} {status.phrase}\r\n".encode() for status in HTTPStatus}
+_END = b"\r\n"
+_log = logging.getLogger("mumacro.error")
 
 
-class _Transport:
-    """What uvicorn sees of the socket: it cannot go on reading while too much is held back."""
+async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
+    error = OverloadedError("too many connections are open", headers=CLOSE)
+    await problem_of(error, scope["path"])(scope, receive, send)
 
-    def __init__(self, transport: Any, connection: "Connection") -> None:
-        self._transport = transport
-        self._connection = connection
 
-    def resume_reading(self) -> None:
-        if not self._connection.full:
-            self._transport.resume_reading()
+class _Exchange:
+    """One request and its answer."""
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._transport, name)
+    __slots__ = (
+        "answered",
+        "body",
+        "connection",
+        "expects",
+        "gone",
+        "head",
+        "keep",
+        "left",
+        "more",
+        "scope",
+        "started",
+        "taken",
+        "task",
+        "waiter",
+    )  # fmt: skip
+
+    def __init__(self, connection: "Connection", scope: Scope, keep: bool, expects: bool) -> None:
+        self.connection, self.scope = connection, scope
+        self.keep = keep  # whether the connection goes on after it
+        self.expects = expects  # whether the caller waits for "100 Continue"
+        self.body, self.more = b"", True
+        self.taken = False  # whether the application has all of the body
+        self.started = self.answered = self.gone = False
+        self.head = b""  # of an answer of known length: written together with its first piece
+        self.left = 0.0  # bytes of the answer that are announced and not written; infinite: sent in chunks
+        self.waiter: asyncio.Future[None] | None = None
+        self.task: asyncio.Task[None] | None = None
+
+    async def run(self, app: ASGIApp) -> None:
+        """Have it answered."""
+        try:
+            await app(self.scope, self.receive, self.send)
+        except Exception:
+            _log.exception("unexpected error outside of the application")
+        finally:
+            self.connection.finished(self)
+
+    def wake(self) -> None:
+        """There is something to receive."""
+        if self.waiter is not None and not self.waiter.done():
+            self.waiter.set_result(None)
+
+    async def receive(self) -> Message:
+        """The next piece of the body, or that the caller has left."""
+        if self.expects and not self.started:
+            self.expects = False
+            self.connection.write(b"HTTP/1.1 100 Continue\r\n\r\n")
+        while not (self.gone or self.answered):
+            if self.body or not (self.more or self.taken):
+                body, self.body = self.body, b""
+                self.taken = not self.more
+                self.connection.regulate()
+                return {"type": "http.request", "body": body, "more_body": self.more}
+            self.waiter = asyncio.get_running_loop().create_future()
+            await self.waiter
+        return {"type": "http.disconnect"}
+
+    async def send(self, message: Message) -> None:
+        """Write the head or a piece of the answer.
+
+        Raises
+        ------
+        RuntimeError
+            Messages out of order, a header that would break the head, or another length than was announced.
+        """
+        if self.connection.stalled is not None and not self.gone:
+            await self.connection.stalled.wait()
+        if self.gone:
+            return
+        if message["type"] == "http.response.start" and not self.started:
+            self._begin(message["status"], message.get("headers", ()))
+            return
+        if message["type"] != "http.response.body" or not self.started or self.answered:
+            raise RuntimeError(f"{message['type']} is out of order")
+        body, more = message.get("body", b""), message.get("more_body", False)
+        if self.left == math.inf:
+            content = b"%x\r\n%b\r\n" % (len(body), body) if body else b""
+            self.connection.write(content if more else content + b"0\r\n\r\n")
+        else:
+            if self.scope["method"] == "HEAD":
+                body = b""
+            self.left -= len(body)
+            if self.left < 0.0 or (self.left > 0.0 and not more):
+                raise RuntimeError("the answer has another length than was announced")
+            if len(body) <= _TOGETHER:
+                self.connection.write(self.head + body)
+            else:
+                self.connection.write(self.head)
+                self.connection.write(body)
+            self.head = b""
+        if not more:
+            self.answered = True
+            self.wake()
+            self.connection.answered(self)
+
+    def _begin(self, status: int, headers: Any) -> None:
+        bodiless = self.scope["method"] == "HEAD" or status in (204, 304)
+        sized = bodiless
+        fields = []
+        for name, value in headers:
+            name = name.lower()
+            if name == b"connection":
+                self.keep = self.keep and b"close" not in value.lower()
+                continue
+            if name == b"content-length":
+                sized, self.left = True, 0.0 if bodiless else float(value)
+            fields.append(name + b": " + value)
+        if not sized:
+            self.left = math.inf
+            fields.append(b"transfer-encoding: chunked")
+        if not self.keep:
+            fields.append(b"connection: close")
+        text = _END.join(fields)
+        if text.count(b"\n") != len(fields) - 1 or text.count(b"\r") != len(fields) - 1 or b"\0" in text:
+            raise RuntimeError("a header holds a line break or a zero byte")
+        self.started = True
+        head = _STATUS[status] + self.connection.defaults() + text + b"\r\n\r\n"
+        if sized:
+            self.head = head
+        else:
+            self.connection.write(head)
 
 
 class Connection(asyncio.Protocol):
     """One connection; ``timeout_s`` is set by the application for all."""
 
     timeout_s = 30.0
+    _default_fields: tuple[Any, bytes] = ((), b"")
 
     def __init__(self, config: Any, server_state: Any, app_state: dict[str, Any], _loop: Any = None) -> None:
-        state = {**app_state, "connection": self}
-        made: Any = AutoHTTPProtocol
-        self._inner = made(config=config, server_state=server_state, app_state=state, _loop=_loop)
-        self._loop = asyncio.get_event_loop()
+        if not config.loaded:
+            config.load()
+        self._config, self._server, self._app_state = config, server_state, app_state
+        self._loop: asyncio.AbstractEventLoop = _loop or asyncio.get_event_loop()
+        self._parser = httptools.HttpRequestParser(self)
         self._transport: Any = None
-        self._held = bytearray()
-        self._head = b""  # the end of what came of a head that is not complete
-        self._head_size = 0
-        self._open = 0  # requests that the application is answering
-        self._due = 0  # ends of heads that were handed on, less requests that have begun
-        self._begun = 0
-        self._settling = False  # whether a request has just ended
-        self._wanting = False  # whether it waits for a body
-        self._closing = False
-        self._stalled = False  # whether the caller does not read
+        self._fixed: dict[str, Any] = {}  # of every scope
+        self._held = bytearray()  # what came while an earlier request was unanswered
+        self._queue: deque[_Exchange] = deque()  # requests that are parsed and wait for their turn
+        self._now: _Exchange | None = None  # the request that is being answered
+        self._coming: _Exchange | None = None  # the one whose body is being read
+        self._in_head = False
+        self._url, self._headers, self._expects = b"", list[tuple[bytes, bytes]](), False
+        self._idle_bytes = 0  # since the last head, or piece of a body, was complete
+        self._moved = False
+        self._deaf = False  # whether what comes is thrown away
+        self._paused = False
+        self.stalled: asyncio.Event | None = None  # while the caller does not read
         self._clock: asyncio.TimerHandle | None = None
+        self._idle_clock: asyncio.TimerHandle | None = None
+        self._idle_since = 0.0
+
+    # --- the socket's side ----------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin."""
         self._transport = transport
-        seen: Any = _Transport(transport, self)
-        self._inner.connection_made(seen)
-        self._watch()
+        self._server.connections.add(self)
+        info = transport.get_extra_info
+        self._fixed = {
+            "type": "http",
+            "asgi": {"version": self._config.asgi_version, "spec_version": "2.3"},
+            "scheme": "https" if info("sslcontext") else "http",
+            "root_path": self._config.root_path,
+            "client": _address(info("peername")),
+            "server": _address(info("sockname")),
+        }
+        self._watch(self.timeout_s)
+        self._rest()
+        self._idle_clock = self._loop.call_later(self._config.timeout_keep_alive, self._close_idle)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End."""
-        self._unwatch()
-        self._closing = True
+        del exc
+        self._server.connections.discard(self)
+        self._deaf = True
         self._held.clear()
-        self._inner.connection_lost(exc)
+        self._unwatch()
+        if self._idle_clock is not None:
+            self._idle_clock.cancel()
+        for exchange in (self._now, *self._queue):
+            if exchange is not None:
+                exchange.gone = True
+                exchange.wake()
+        self._queue.clear()
+        self.resume_writing()
 
-    def eof_received(self) -> Any:
-        """Hand on."""
-        return self._inner.eof_received()
+    def eof_received(self) -> bool:
+        """The caller sends no more: answer what is complete, then close."""
+        self._deaf = True
+        if self._coming is not None:
+            self._coming.gone = not self._coming.answered
+            self._coming.wake()
+        if self._now is None or self._now.answered:
+            return False
+        self._last().keep = False
+        return True
 
     def pause_writing(self) -> None:
         """Give the caller some time to read."""
-        self._stalled = True
-        self._watch()
-        self._inner.pause_writing()
+        self.stalled = asyncio.Event()
+        self._watch(self.timeout_s)
 
     def resume_writing(self) -> None:
         """The caller reads."""
-        self._stalled = False
-        self._unwatch()
-        self._inner.resume_writing()
+        if self.stalled is not None:
+            self.stalled.set()
+            self.stalled = None
+            self._unwatch()
 
-    @property
-    def full(self) -> bool:
-        """Whether as much is held back as may be."""
-        return len(self._held) > _AHEAD
-
-    @property
-    def _is_free(self) -> bool:
-        return self._open == 0 and self._due == 0 and not self._settling
+    def shutdown(self) -> None:
+        """Answer what has been asked, then close; uvicorn calls it."""
+        if self._now is None or self._now.answered:
+            self._transport.close()
+        else:
+            self._last().keep = False
 
     def data_received(self, data: bytes) -> None:
-        """Hand on what belongs to the request that is being answered, or begins one; hold back the rest."""
-        if self._closing:
-            return
-        if self._is_free and not self._held and len(data) <= _SLICE:
-            self._hand_on(data)
-        elif self._wanting and not self._held:
-            self._inner.data_received(data)
+        """Parse what belongs to the request that is being answered, or begins one; hold the rest."""
+        if self._deaf:
+            self._idle_bytes += len(data)
+            if self._idle_bytes > _LINGER:
+                self._give_up()
+        elif not self._held and self._is_wanted and len(data) <= _HEADS:
+            self._parse(data)
         else:
             self._held += data
-            self._feed()
-            if self.full:
-                self._transport.pause_reading()
+            self._go_on()
 
-    def _feed(self) -> None:
-        """Hand on what was held back, as far as somebody wants it."""
-        while self._held and not self._closing and (self._wanting or self._is_free):
-            size = _AHEAD if self._open else _SLICE
+    # --- from bytes to requests -----------------------------------------------------------------------
+
+    @property
+    def _is_wanted(self) -> bool:
+        return self._now is None or self._coming is self._now
+
+    def _go_on(self) -> None:
+        """Parse what is held, as far as somebody wants it."""
+        while self._held and not self._deaf and self._is_wanted:
+            size = _HEADS if self._coming is None else _BODIES
             piece = bytes(self._held[:size])
             del self._held[:size]
-            if self._open:
-                self._inner.data_received(piece)
-                continue
-            self._hand_on(piece)
-            if self._held and self._due == 0:
-                continue
-            break
-        if not self.full and self._transport is not None and not self._closing:
-            self._transport.resume_reading()
+            self._parse(piece)
+        self.regulate()
 
-    def _hand_on(self, data: bytes) -> None:
-        """Hand on the beginning of a request, or the next piece of it."""
-        seen = self._head + data
-        end = seen.rfind(b"\r\n\r\n")
-        if end >= 0:
-            self._due += seen.count(b"\r\n\r\n")
-            self._head_size = 0
-            self._head = b""  # a body may follow: what is in it counts as a head only until the application begins
+    def _parse(self, data: bytes) -> None:
+        self._moved = False
+        try:
+            self._parser.feed_data(data)
+        except httptools.HttpParserUpgrade:  # what follows would be another protocol's
+            self._last().keep = False
+            self._deaf = True
+        except httptools.HttpParserError:
+            self._break(400)
+        if self._moved:
+            self._idle_bytes = 0
         else:
-            self._head_size += len(data)
-            self._head = seen[-3:]
-            if self._clock is None:
-                self._watch()
-            if self._head_size > MAX_HEAD:
-                self._closing = True
-                self._transport.write(_TOO_LARGE)
-                self._transport.close()
-                return
-        self._inner.data_received(data)
+            self._idle_bytes += len(data)
+            if self._idle_bytes > MAX_HEAD:
+                self._break(431)
+        if self._deaf:
+            return
+        now = self._now
+        if now is not None and now.answered and self._coming is not now:
+            self._next()  # all of an answered request has been read
+        elif self._clock is None and self.stalled is None:
+            coming = self._coming
+            if self._in_head or (coming is not None and (coming.answered or not _keeps_time(coming.scope))):
+                self._watch(self.timeout_s)
+        self.regulate()
 
-    def begin(self) -> None:
-        """The application begins to answer a request."""
-        self._open += 1
-        self._begun += 1
-        self._due = max(self._due - 1, 0)
-        self._head_size, self._head = 0, b""
-        self._unwatch()
+    def on_message_begin(self) -> None:
+        """The parser's: a request begins."""
+        self._in_head = True
+        self._url, self._headers, self._expects = b"", [], False
 
-    def want(self, wanting: bool, timed: bool) -> None:
-        """The application waits for a body, or no longer; ``timed``: all of it has to come within the limit."""
-        self._wanting = wanting
-        if timed and self._clock is None:
-            self._watch()
-        if wanting and self._held:
-            self._feed()
+    def on_url(self, url: bytes) -> None:
+        """The parser's: a piece of the target."""
+        self._url += url
 
-    def end(self) -> None:
-        """The application has answered."""
-        self._open -= 1
-        self._wanting = False
-        if not self._stalled:
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """The parser's: a field of the head, or one behind the body, which nobody sees."""
+        if self._in_head:
+            name = name.lower()
+            if name == b"expect" and value.lower() == b"100-continue":
+                self._expects = True
+            self._headers.append((name, value))
+
+    def on_headers_complete(self) -> None:
+        """The parser's: the head is complete."""
+        self._in_head, self._moved = False, True
+        url, parser = self._url, self._parser
+        if url.startswith(b"/") and b"#" not in url:
+            path, _, query = url.partition(b"?")
+        else:
+            parsed = httptools.parse_url(url)
+            path, query = parsed.path or b"/", parsed.query or b""
+        text = path.decode("ascii")
+        if "%" in text:
+            text = unquote(text)
+        version = parser.get_http_version()
+        root: str = self._fixed["root_path"]
+        scope = {
+            **self._fixed,
+            "http_version": version,
+            "method": parser.get_method().decode("ascii"),
+            "path": root + text,
+            "raw_path": root.encode("ascii") + path,
+            "query_string": query,
+            "headers": self._headers,
+            "state": self._app_state.copy(),
+        }
+        keep = version != "1.0" and parser.should_keep_alive()
+        self._coming = exchange = _Exchange(self, scope, keep, self._expects)
+        if self._now is None:
+            self._begin(exchange)
+        else:
+            self._queue.append(exchange)
+
+    def on_body(self, body: bytes) -> None:
+        """The parser's: a piece of the body."""
+        self._moved = True
+        exchange = self._coming
+        if exchange is not None and not exchange.answered:
+            exchange.body = exchange.body + body if exchange.body else body
+            exchange.wake()
+
+    def on_message_complete(self) -> None:
+        """The parser's: the request is complete."""
+        self._moved = True
+        exchange, self._coming = self._coming, None
+        if exchange is not None:
+            exchange.more = False
+            exchange.wake()
+        if self.stalled is None:
             self._unwatch()
-        if self._due:
-            # What looked like the end of a head was in a body, or another request is about to begin.
-            self._loop.call_later(_SETTLE_S, self._settle, self._begun)
+
+    # --- from requests to answers ---------------------------------------------------------------------
+
+    def _begin(self, exchange: _Exchange) -> None:
+        self._now = exchange
+        if self._clock is not None:
+            self._unwatch()
+        limit = self._config.limit_concurrency
+        app = _refuse if limit is not None and len(self._server.connections) > limit else self._config.loaded_app
+        exchange.task = self._loop.create_task(exchange.run(app))
+        self._server.tasks.add(exchange.task)
+
+    def answered(self, exchange: _Exchange) -> None:
+        """The answer is written."""
+        self._server.total_requests += 1
+        if not exchange.keep:
+            self._close(unread=exchange.more)
+        elif exchange.more:  # the rest of its body comes first
+            self._watch(self.timeout_s)
+            self.regulate()
         else:
-            # A request that was parsed already begins before this: what comes until then may be its body.
-            self._settling = True
-            self._loop.call_soon(self._settled)
+            self._next()
 
-    def _settled(self) -> None:
-        self._settling = False
-        self._feed()
+    def finished(self, exchange: _Exchange) -> None:
+        """The application is done with the request."""
+        if exchange.task is not None:
+            self._server.tasks.discard(exchange.task)
+        if not (exchange.answered or exchange.gone):
+            exchange.gone = True
+            if exchange.started:
+                self._transport.abort()  # nothing but that can say that the answer is not complete
+            else:
+                self._break(500)
 
-    def _settle(self, begun: int) -> None:
-        if self._open == 0 and self._begun == begun:
-            self._due = 0
-            self._feed()
+    def _next(self) -> None:
+        self._now = None
+        self._rest()
+        if self._queue:
+            self._begin(self._queue.popleft())
+        elif self._held:
+            self._go_on()
 
-    def _watch(self) -> None:
+    def _last(self) -> Any:
+        return self._queue[-1] if self._queue else self._now
+
+    def _break(self, status: int) -> None:
+        """Say that no sense can be made of what comes, unless an answer has begun, and close."""
+        self._deaf = True
+        now = self._now
+        if self._queue or (now is not None and not now.answered and not now.gone and self._coming is not now):
+            self._last().keep = False  # what was asked in good order is answered
+            return
+        if now is not None and now.started and not now.answered:
+            self._transport.abort()
+            return
+        self.write(_STATUS[status] + b"content-length: 0\r\nconnection: close\r\n\r\n")
+        if now is not None and not now.answered:
+            now.gone = True
+            now.wake()
+        self._close(unread=True)
+
+    def _close(self, *, unread: bool) -> None:
+        """Close behind what is written; where more may come, once the caller has seen the answer."""
+        self._deaf = True
+        if not unread and not self._held:
+            self._transport.close()
+            return
+        self._held.clear()
+        if self._transport.can_write_eof():
+            self._transport.write_eof()
+        self._watch(_LINGER_S)
+        self.regulate()
+
+    def write(self, data: bytes) -> None:
+        """Write to the socket."""
+        if data:
+            self._transport.write(data)
+
+    def defaults(self) -> bytes:
+        """The fields that the server adds to every answer: the date."""
+        fields = self._server.default_headers
+        known, text = Connection._default_fields
+        if fields is not known:  # a new list every second
+            text = b"".join(b"%b: %b\r\n" % field for field in fields)
+            Connection._default_fields = fields, text
+        return text
+
+    # --- bounds ---------------------------------------------------------------------------------------
+
+    def regulate(self) -> None:
+        """Read the socket only while there is room for what comes."""
+        coming = self._coming
+        full = len(self._held) > _AHEAD or (
+            coming is not None and not coming.answered and len(coming.body) > _UNREAD
+        )  # fmt: skip
+        full = full and not self._deaf
+        if full != self._paused:
+            self._paused = full
+            if full:
+                self._transport.pause_reading()
+            elif not self._transport.is_closing():
+                self._transport.resume_reading()
+
+    def _rest(self) -> None:
+        self._idle_since = self._loop.time()
+
+    def _close_idle(self) -> None:
+        """Close if nothing was asked for as long as a connection is kept; else look again then."""
+        kept: float = self._config.timeout_keep_alive
+        left = kept if self._now is not None else self._idle_since + kept - self._loop.time()
+        if left <= 0.0:
+            self._transport.close()
+        else:
+            self._idle_clock = self._loop.call_later(left, self._close_idle)
+
+    def _watch(self, seconds: float) -> None:
         self._unwatch()
-        self._clock = self._loop.call_later(self.timeout_s, self._give_up)
+        self._clock = self._loop.call_later(seconds, self._give_up)
 
     def _unwatch(self) -> None:
         if self._clock is not None:
@@ -203,34 +503,16 @@ class Connection(asyncio.Protocol):
             self._clock = None
 
     def _give_up(self) -> None:
-        self._closing = True
+        self._deaf = True
         self._transport.abort()
 
 
-class Bounded:
-    """Middleware: tells a :class:`Connection` what the application is doing; under other servers it does nothing."""
+def _address(found: Any) -> tuple[str, int] | None:
+    """Host and port of a socket that has them."""
+    return (str(found[0]), int(found[1])) if isinstance(found, tuple) and len(found) > 1 else None
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run one request."""
-        connection = scope["state"].get("connection") if scope["type"] == "http" and "state" in scope else None
-        if not isinstance(connection, Connection):
-            await self.app(scope, receive, send)
-            return
-
-        timed = scope["method"] == "POST" and not path_of(scope).startswith(BATCH_PATH)  # batches watch the time
-
-        async def wanted() -> Message:
-            connection.want(True, timed)
-            try:
-                return await receive()
-            finally:
-                connection.want(False, False)
-
-        connection.begin()
-        try:
-            await self.app(scope, wanted, send)
-        finally:
-            connection.end()
+def _keeps_time(scope: Scope) -> bool:
+    """Whether the application itself watches how long the body takes: batches do."""
+    path: str = scope["path"].removeprefix(scope["root_path"])
+    return path.startswith(BATCH_PATH)

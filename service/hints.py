@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-from .kernel import SI, scale_of, suggestion
+from .kernel import BOUNDS, SI, scale_of, suggestion
 
 __all__ = [
     "NUMBER",
@@ -22,7 +22,7 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+\- ]?\d+)?", re.ASCII)
 STATE_K = "is required: the tangential stiffness [N/m], or {rigid} for rigid contact"
 STATE_OMEGA = "is required: omega [rad/s], or f [Hz] in its place"
 ONE_FREQUENCY = "omega is given, too: give exactly one of omega [rad/s] and f [Hz]"
-TOO_FREQUENT = "must be finite, and so must omega = 2 pi f"
+TOO_FREQUENT = f"must be {BOUNDS['f']}"
 
 _WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµμ%/·*^0-9]+)\s*")
 

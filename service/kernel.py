@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 
 #: what an input must be, and its unit: those of the six fields, and of f in place of omega
-BOUNDS = {**BOUNDS_OF_FIELDS, "f": BOUNDS_OF_FIELDS["omega"]}
+BOUNDS = {**BOUNDS_OF_FIELDS, "f": f"{BOUNDS_OF_FIELDS['omega']}, and so must be omega = 2 pi f"}
 UNITS = {name: unit for name, (unit, _) in SI.items()}
 #: name of the regime of every source code
 REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)

@@ -25,9 +25,14 @@ NO_ROOM = -1
 
 _U = np.uint64
 _SMALLEST, _LARGEST = -342, 308  # decimal exponents
-_0, _1, _3, _9, _10, _32, _52, _63 = (_U(n) for n in (0, 1, 3, 9, 10, 32, 52, 63))
+_0, _1, _3, _8, _9, _10, _32, _52, _63 = (_U(n) for n in (0, 1, 3, 8, 9, 10, 32, 52, 63))
 _LOW32, _NINE, _HIDDEN, _FRACTION = _U(2**32 - 1), _U(0x1FF), _U(1 << 52), _U((1 << 52) - 1)
 _SIGN = _U(1 << 63)
+# Eight digits at a time: "0" in each of eight bytes, their upper halves, what lifts ":" and beyond out of the digits,
+# and the weights of pairs and of fours.
+_ZEROS, _UPPER, _LIFT = _U(0x3030303030303030), _U(0xF0F0F0F0F0F0F0F0), _U(0x0606060606060606)
+_PAIRS, _WEIGHT_1, _WEIGHT_2 = _U(0x000000FF000000FF), _U(0x000F424000000064), _U(0x0000271000000001)
+_EIGHT = _U(100_000_000)
 _NAMES = np.array([int.from_bytes(name.encode(), "little") for name in (*FIELDS, "f")], dtype=np.uint64)
 _K, _OMEGA, _F = FIELDS.index("k"), FIELDS.index("omega"), len(FIELDS)
 
@@ -68,11 +73,12 @@ def _double(w: np.uint64, q: int) -> tuple[np.uint64, bool]:
         return _0, True
     if q > _LARGEST:
         return _0, False
-    shift = 0
-    for step in (32, 16, 8, 4, 2, 1):
-        if w < _1 << _U(64 - step):
-            w = w << _U(step)
-            shift += step
+    # The exponent of w as a double tells its length, or one more where w was rounded up to a power of two.
+    shift = max(1086 - int(np.float64(w).view(np.int64) >> 52), 0)
+    w = w << _U(shift)
+    if w < _SIGN:
+        w = w << _1
+        shift += 1
     row = _U(q - _SMALLEST)
     low, high = w * _FIVE_HIGH[row], _high(w, _FIVE_HIGH[row])
     if high & _NINE == _NINE:  # only then can the lower half of the power matter
@@ -111,6 +117,17 @@ def _space(text: Bytes, i: int) -> int:
 @_inlined
 def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
     """(w followed by the digits at ``i``, index behind them)."""
+    while i + 8 <= text.size:
+        eight = _0
+        for j in range(8):  # the compiler makes one load of it
+            eight |= _U(text[_U(i + j)]) << _U(8 * j)
+        if (eight & _UPPER) | ((eight + _LIFT & _UPPER) >> _U(4)) != _ZEROS | _ZEROS >> _U(4):
+            break
+        eight -= _ZEROS
+        eight = eight * _10 + (eight >> _8)
+        eight = ((eight & _PAIRS) * _WEIGHT_1 + (eight >> _U(16) & _PAIRS) * _WEIGHT_2) >> _32
+        w = w * _EIGHT + eight
+        i += 8
     c = text[_U(i)] - np.uint8(48)
     while c < 10:
         w = w * _10 + _U(c)

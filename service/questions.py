@@ -4,17 +4,19 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, create_model, model_validator
 
-from .hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA, TOO_FREQUENT
-from .kernel import BOUNDS, FIELDS, INPUTS, MOST_HZ, RAD_PER_CYCLE
+from .hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA
+from .kernel import BOUNDS, FIELDS, INPUTS, RAD_PER_CYCLE
 from .quantities import QUANTITIES
 from .schemas import (
     INCLUDES,
     Answered,
     CaseAnswer,
     ColumnsAnswer,
+    Frequency,
     InputStd,
     NotNegative,
     Positive,
+    QueryFrequency,
     QueryNotNegative,
     QueryPositive,
     Stiffness,
@@ -59,7 +61,7 @@ class _Five(BaseModel):
     k: Stiffness = Field(None, description='Tangential stiffness [N/m], finite and > 0; null or "rigid": rigid contact')
     y0: NotNegative | None = Field(None, description="Amplitude [m], finite and >= 0")
     omega: NotNegative | None = Field(None, description="Angular frequency [rad/s], finite and >= 0; or f")
-    f: NotNegative | None = Field(None, description="Frequency [Hz], finite and >= 0; in place of omega")
+    f: Frequency | None = Field(None, description="Frequency [Hz], finite and >= 0; in place of omega")
     v0: NotNegative | None = Field(None, description="Sliding velocity [m/s], finite and >= 0")
     tolerance: Positive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
     std: InputStd | None = Field(None, description="Standard deviations of the inputs, where include asks for std")
@@ -82,8 +84,6 @@ class _Five(BaseModel):
                     raise relation("omega", STATE_OMEGA)
                 elif given is not None and self.f is not None:
                     raise relation("f", ONE_FREQUENCY)
-                elif self.f is not None and self.f > MOST_HZ:
-                    raise relation("f", TOO_FREQUENT)
             elif name == asked and name in self.model_fields_set and given is not None:
                 raise relation(name, "must be left out: it is what is asked for")
             elif name == "k" and name != asked and "k" not in self.model_fields_set:
@@ -213,7 +213,7 @@ class LawQuery(BaseModel):
     k: QueryPositive | Literal["rigid"] | None = Field(None, description="[N/m], or rigid", examples=[1e6])
     y0: QueryNotNegative | None = Field(None, description="[m], finite and >= 0", examples=[2e-6])
     omega: QueryNotNegative | None = Field(None, description="[rad/s]; or f", examples=[1.3e5])
-    f: QueryNotNegative | None = Field(None, description="[Hz]; in place of omega")
+    f: QueryFrequency | None = Field(None, description="[Hz]; in place of omega")
     v0: QueryNotNegative | None = Field(None, description="[m/s], finite and >= 0")
     tolerance: QueryPositive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
     include: Annotated[

@@ -17,7 +17,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from .hints import ONE_FREQUENCY, STATE_OMEGA, TOO_FREQUENT, read_number
+from .hints import ONE_FREQUENCY, STATE_OMEGA, read_number
 from .kernel import FIELDS, MOST_HZ, RAD_PER_CYCLE
 from .quantities import QUANTITIES, Part
 
@@ -34,6 +34,7 @@ MAX_INCLUDE = 2 * len(INCLUDES)
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Frequency = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 #: null and "rigid" are rigid contact
 Stiffness = Positive | Literal["rigid"] | None
 IncludeList = Annotated[list[Include], Field(max_length=MAX_INCLUDE)]
@@ -73,15 +74,13 @@ class CaseFields(BaseModel):
     k: Stiffness = Field(description=f'{_TEXTS["k"]}: null or "rigid"')
     y0: NotNegative = Field(description=_TEXTS["y0"])
     omega: NotNegative | None = Field(None, description=_TEXTS["omega"])
-    f: NotNegative | None = Field(None, description=_TEXTS["f"])
+    f: Frequency | None = Field(None, description=_TEXTS["f"])
     v0: NotNegative = Field(description=_TEXTS["v0"])
 
     def fault(self) -> PydanticCustomError | None:
         """What does not hold between the fields."""
         if (self.omega is None) == (self.f is None):
             return frequency_fault(self.f is not None)
-        if self.f is not None and self.f > MOST_HZ:
-            return relation("f", TOO_FREQUENT)
         return None
 
     def inputs(self) -> tuple[float, float, float, float, float, float]:
@@ -139,7 +138,7 @@ class InputStd(BaseModel):
     k: NotNegative = Field(0.0, description="[N/m]; means nothing where contact is rigid")
     y0: NotNegative = Field(0.0, description="[m]")
     omega: NotNegative = Field(0.0, description="[rad/s]; or f in its place")
-    f: NotNegative = Field(0.0, description="[Hz]; in place of omega")
+    f: Frequency = Field(0.0, description="[Hz]; in place of omega")
     v0: NotNegative = Field(0.0, description="[m/s]")
 
     @model_validator(mode="after")
@@ -222,6 +221,7 @@ class CaseRequest(RequestFields):
 _Number = BeforeValidator(read_number)
 QueryPositive = Annotated[float, Field(gt=0, allow_inf_nan=False), _Number]
 QueryNotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), _Number]
+QueryFrequency = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False), _Number]
 
 
 def _split(names: Any) -> Any:
@@ -246,7 +246,7 @@ class BatchQuery(BaseModel):
     std_k: QueryNotNegative | None = Field(None, description="Standard deviation of k [N/m]")
     std_y0: QueryNotNegative | None = Field(None, description="Standard deviation of y0 [m]")
     std_omega: QueryNotNegative | None = Field(None, description="Standard deviation of omega [rad/s]")
-    std_f: QueryNotNegative | None = Field(None, description="Standard deviation of f [Hz]")
+    std_f: QueryFrequency | None = Field(None, description="Standard deviation of f [Hz]")
     std_v0: QueryNotNegative | None = Field(None, description="Standard deviation of v0 [m/s]")
 
     def given(self) -> dict[str, Any]:
@@ -265,7 +265,7 @@ class CaseQuery(BatchQuery):
     k: Annotated[Positive | Literal["rigid"], _Number] = Field(description=f"{_TEXTS['k']}: rigid", examples=[1e6])
     y0: QueryNotNegative = Field(description=_TEXTS["y0"], examples=[2e-6])
     omega: QueryNotNegative | None = Field(None, description=_TEXTS["omega"], examples=[1.3e5])
-    f: QueryNotNegative | None = Field(None, description=_TEXTS["f"])
+    f: QueryFrequency | None = Field(None, description=_TEXTS["f"])
     v0: QueryNotNegative = Field(description=_TEXTS["v0"], examples=[0.01])
 
     def case(self) -> CaseRequest:
@@ -304,7 +304,7 @@ class BatchColumns(BaseModel):
     k: Stiffness | list[float | Literal["rigid"] | None] = Field(description='[N/m]; null or "rigid": rigid contact')
     y0: NotNegative | list[float] = Field(description="[m], finite and >= 0")
     omega: NotNegative | list[float] | None = Field(None, description="[rad/s], finite and >= 0; or f in its place")
-    f: NotNegative | list[float] | None = Field(None, description="[Hz], finite and >= 0; in place of omega")
+    f: Frequency | list[float] | None = Field(None, description="[Hz], finite and >= 0; in place of omega")
     v0: NotNegative | list[float] = Field(description="[m/s], finite and >= 0")
     include: IncludeList | None = Field(None, description=_INCLUDE)
     tolerance: Positive | None = Field(None, description=_TOLERANCE)

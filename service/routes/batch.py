@@ -145,16 +145,20 @@ class BatchResponse(Response):
             raise self._batches.too_large()
         if int(length) > SMALL_BODY:
             self._place()
-        until = asyncio.get_running_loop().time() + self._request.app.state.settings.client_timeout_s
+        return await work.client(self._read(receive))
+
+    async def _read(self, receive: Receive) -> bytearray:
         body = bytearray()
         more = True
         while more:
-            message = await work.message(receive, until)
+            message = await receive()
+            if message["type"] != "http.request":
+                raise ClientDisconnect
             body += message.get("body", b"")
             more = message.get("more_body", False)
             if len(body) > SMALL_BODY:
                 self._place()
-            if len(body) > limit:
+            if len(body) > self._batches.max_body_bytes:
                 raise self._batches.too_large()
         return body
 
