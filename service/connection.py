@@ -417,8 +417,7 @@ class Connection(asyncio.Protocol):
         self._rest()
         if self._queue:
             self._begin(self._queue.popleft())
-        elif self._held:
-            self._go_on()
+        self._go_on()
 
     def _last(self) -> Any:
         return self._queue[-1] if self._queue else self._now

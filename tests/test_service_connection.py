@@ -1,0 +1,152 @@
+"""HTTP/1.1 as bytes on a socket: what comes back, and in which order, however the bytes come."""
+
+import http.client
+import json
+import socket
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
+GET = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
+LAST = b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+
+
+@pytest.fixture
+def raw(live_server):
+    host, _, port = live_server.url.removeprefix("http://").rpartition(":")
+    with socket.create_connection((host, int(port)), timeout=30) as made:
+        yield made
+
+
+def rest(raw):
+    """Everything until the service closes."""
+    received = b""
+    while piece := raw.recv(65536):
+        received += piece
+    return received
+
+
+def post(path, body, extra=""):
+    fields = f"Host: x\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n{extra}\r\n"
+    return f"POST {path} HTTP/1.1\r\n{fields}".encode() + body
+
+
+def chunked(path, pieces):
+    fields = "Host: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    body = b"".join(b"%x\r\n%b\r\n" % (len(piece), piece) for piece in pieces)
+    return f"POST {path} HTTP/1.1\r\n{fields}".encode() + body + b"0\r\n\r\n"
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 64, 1000])
+def test_the_answers_do_not_depend_on_how_the_bytes_come(raw, case, size):
+    body = json.dumps(case).encode()
+    text = post(SINGLE, body) + GET + chunked(SINGLE, [body[:40], body[40:]]) + b"\r\n" + post(BATCH, b"[]") + LAST
+    for start in range(0, len(text), size):
+        raw.sendall(text[start : start + size])
+    received = rest(raw)
+    assert received.count(b"HTTP/1.1 200 OK\r\n") == 5
+    assert received.count(b'"mu_macro":0.24001211754819618') == 2
+    assert received.rstrip().endswith(b"}")
+    assert received.count(b"connection: close") == 1
+
+
+@pytest.mark.parametrize("many", [2, 600, 5000])
+def test_pipelined_requests_are_answered_in_order(raw, many):
+    wanted = [b"/livez" if i % 2 else b"/nothing%d" % i for i in range(many)]
+    received = bytearray()
+    for start in range(0, many, 500):
+        part = wanted[start : start + 500]
+        raw.sendall(b"".join(b"GET %b HTTP/1.1\r\nHost: x\r\n\r\n" % path for path in part))
+        while received.count(b"HTTP/1.1 ") < start + len(part) or not received.endswith(b"}"):
+            received += raw.recv(65536)
+    statuses = [int(part[:3]) for part in bytes(received).split(b"HTTP/1.1 ")[1:]]
+    assert statuses == [200 if path == b"/livez" else 404 for path in wanted]
+
+
+def test_a_half_closed_caller_has_the_whole_answer(raw, case):
+    raw.sendall(post(BATCH, json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]}).encode()))
+    raw.shutdown(socket.SHUT_WR)
+    received = rest(raw)
+    assert b'"n_errors":0' in received[-2000:]
+    assert received.endswith(b"0\r\n\r\n")
+
+
+def test_a_caller_who_ends_within_a_body_has_no_answer(raw):
+    raw.sendall(b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n{")
+    raw.shutdown(socket.SHUT_WR)
+    assert b" 200 " not in rest(raw)
+
+
+@pytest.mark.parametrize("try_number", range(10))
+def test_who_sends_too_much_reads_why(live_server, try_number):
+    del try_number  # a reset would be seen in about half of the tries
+    host, _, port = live_server.url.removeprefix("http://").rpartition(":")
+    connection = http.client.HTTPConnection(host, int(port), timeout=30)
+    connection.request("POST", SINGLE, b" " * 3_000_000, {"Content-Type": "application/json"})
+    response = connection.getresponse()
+    assert response.status == 413
+    assert json.loads(response.read())["status"] == 413
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\nhello",
+        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\nhello",
+        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 0x5\r\n\r\nhello",
+        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\nContent-Length: 5\r\n\r\nhello",
+        b"GET /livez HTTP/1.1\r\nHost: x\r\nX-A: a\0b\r\n\r\n",
+        b"GET /livez HTTP/1.1\r\nHost: x\r\n folded\r\n\r\n",
+        b"GET /livez HTTP/1.1\r\nX A: b\r\n\r\n",
+        b"GET \xff HTTP/1.1\r\nHost: x\r\n\r\n",
+        b"nonsense\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
+    ],
+)
+def test_what_is_no_http_is_refused_and_closed(raw, text):
+    raw.sendall(GET)
+    first = raw.recv(65536)
+    raw.sendall(text)
+    received = rest(raw)
+    assert first.startswith(b"HTTP/1.1 200")
+    assert received.startswith(b"HTTP/1.1 400")
+    assert received.count(b"HTTP/1.1 ") == 1
+
+
+def test_what_was_asked_in_good_order_is_answered_before_nonsense(raw, case):
+    raw.sendall(post(SINGLE, json.dumps(case).encode()) + GET + b"nonsense\r\n\r\n")
+    received = rest(raw)
+    assert received.count(b"HTTP/1.1 200") == 2
+    assert b"connection: close" in received
+
+
+def test_http_1_0_is_answered_and_closed(raw):
+    raw.sendall(b"GET /livez HTTP/1.0\r\n\r\n")
+    assert rest(raw).startswith(b"HTTP/1.1 200")
+
+
+def test_a_caller_who_waits_to_go_on_is_told_so(raw, case):
+    body = json.dumps(case).encode()
+    whole = post(SINGLE, body, "Expect: 100-continue\r\nConnection: close\r\n")
+    raw.sendall(whole[: -len(body)])
+    assert raw.recv(65536) == b"HTTP/1.1 100 Continue\r\n\r\n"
+    raw.sendall(body)
+    assert rest(raw).startswith(b"HTTP/1.1 200")
+
+
+def test_head_has_the_head_of_get_and_no_body(raw):
+    raw.sendall(b"HEAD /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+    received = rest(raw)
+    assert received.endswith(b"\r\n\r\n")
+    assert b"content-length: 62\r\n" in received
+
+
+def test_fields_behind_a_body_are_read_and_dropped(raw, case):
+    text = chunked(SINGLE, [json.dumps(case).encode()]).removesuffix(b"\r\n") + b"x-request-id: stray\r\n\r\n"
+    raw.sendall(text + LAST)
+    received = rest(raw)
+    assert received.count(b"HTTP/1.1 200") == 2
+    assert b"stray" not in received
