@@ -301,13 +301,14 @@ def check() -> list[str]:
 def test(arguments: list[str]) -> int:
     """Run the checks, then pytest, which has the last word when all is well.
 
-    Without ``--quick`` the slow tests run too: an empty ``-m`` takes back what pyproject.toml leaves out.
+    Without ``--quick`` the slow tests run too: an empty ``-m`` takes back what pyproject.toml leaves out.  Every
+    processor runs a file at a time; ``-n 0`` among ARGS keeps them in one process.
     """
     failed = check()
     print("--- pytest", flush=True)
     chosen = [word for word in arguments if word != "--quick"]
     which = () if len(chosen) < len(arguments) else ("-m", "")
-    code = run(PYTHON, "-m", "pytest", *which, *chosen, env=environment())
+    code = run(PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *which, *chosen, env=environment())
     if failed:
         print(f"FAILED before pytest: {', '.join(failed)}", file=sys.stderr)
     return code or len(failed)

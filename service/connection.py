@@ -17,7 +17,7 @@ import httptools
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .errors import OverloadedError, problem_of
-from .guard import BATCH_PATH, CLOSE
+from .guard import BATCH_PATH, CLOSE, path_of
 
 __all__ = ["Connection"]
 
@@ -513,5 +513,4 @@ def _address(found: Any) -> tuple[str, int] | None:
 
 def _keeps_time(scope: Scope) -> bool:
     """Whether the application itself watches how long the body takes: batches do."""
-    path: str = scope["path"].removeprefix(scope["root_path"])
-    return path.startswith(BATCH_PATH)
+    return path_of(scope).startswith(BATCH_PATH)

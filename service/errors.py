@@ -300,10 +300,13 @@ def faults_of(
             path = (f"std_{path[1]}" if len(path) > 1 else "std",)
         if kind == "relation":  # between fields: the model says which one is to be mended
             field = context["field"]
-            if place == "parameter" and field == "std":
-                field = "std_mu0"
-            path = (field,)
-            fault = FieldFault(field, context["reason"], place=place, path=path, bound=all_bounds.get(field))
+            if loc == ("std",):
+                path = ("std", field) if place == "pointer" else (f"std_{field}",)
+            else:
+                path = ("std_mu0",) if place == "parameter" and field == "std" else (field,)
+            fault = FieldFault(
+                str(path[-1]), context["reason"], place=place, path=path, bound=all_bounds.get("_".join(map(str, path)))
+            )
         elif kind == "missing":
             name = str(path[-1]) if path else "body"
             rigid = "null" if place == "pointer" else "rigid"
@@ -316,7 +319,7 @@ def faults_of(
         else:
             name = str(path[0]) if path else "body"
             reason = _reason(kind, name, value, entry["msg"], all_bounds, place)
-            bound = all_bounds.get(str(path[-1]) if path else name, all_bounds.get(name))
+            bound = all_bounds.get("_".join(map(str, path)), all_bounds.get(name))
             fault = FieldFault(name, reason, value, bound, place, path)
         found.setdefault(tuple(path), fault)
     return list(found.values())

@@ -46,7 +46,7 @@ def path_of(scope: Scope) -> str:
     """The path within this application: without what a proxy puts in front of it."""
     path: str = scope["path"]
     root: str = scope.get("root_path", "")
-    return path[len(root) :] if root and path.startswith(root) else path
+    return path.removeprefix(root) if root else path
 
 
 class Guard:

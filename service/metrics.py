@@ -45,7 +45,13 @@ _CASES = _DURATIONS + len(ROUTES) * _WIDTH
 _PER_TABLE = len(SOURCES) + 1  # by source; bad cases
 _SHARE_EVERY_S = 0.25
 
-Place = tuple[int, int]
+#: (route, method, status) -> where requests, and where durations, of the kind are counted
+_PLACES = {
+    (route, method, status): (_REQUESTS + (r * len(METHODS) + m) * len(STATUSES) + s, _DURATIONS + r * _WIDTH)
+    for route, r in _ROUTE.items()
+    for method, m in _METHOD.items()
+    for status, s in _STATUS.items()
+}
 
 
 def first_cell(table: int) -> int:
@@ -70,17 +76,13 @@ class Metrics:
         if folder is not None:
             self._file = Path(folder) / f"{os.getpid()}-{os.urandom(4).hex()}"
 
-    @staticmethod
-    def place(route: str, method: str, status: int) -> Place:
-        """Where requests and durations of a kind are counted."""
-        r = _ROUTE.get(route, len(ROUTES) - 1)
-        m = _METHOD.get(method, len(METHODS) - 1)
-        s = _STATUS.get(status, len(STATUSES) - 1)
-        return _REQUESTS + (r * len(METHODS) + m) * len(STATUSES) + s, _DURATIONS + r * _WIDTH
-
-    def count(self, place: Place, seconds: float) -> None:
+    def count(self, route: str, method: str, status: int, seconds: float) -> None:
         """Count one request."""
         cells = self.cells
+        place = _PLACES.get((route, method, status))
+        if place is None:
+            known = route if route in _ROUTE else ROUTES[-1], method if method in _METHOD else METHODS[-1]
+            place = _PLACES[*known, status if status in _STATUS else STATUSES[-1]]
         request, durations = place
         cells[request] += 1.0
         cells[durations + bisect_left(BUCKETS_S, seconds)] += 1.0

@@ -82,7 +82,7 @@ class RequestRecord:
 
     def _finish(self, scope: Scope, identity: str, status: int, seconds: float) -> None:
         method, path = scope["method"], path_of(scope)
-        self.metrics.count(self.metrics.place(path, method, status), seconds)
+        self.metrics.count(path, method, status, seconds)
         client = scope.get("client")
         state = scope.get("state")
         self.log.write(

@@ -144,7 +144,7 @@ class InputStd(BaseModel):
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
         if self.omega and self.f:
-            raise relation("std", "give the standard deviation of omega or of f, not of both")
+            raise relation("f", "give the standard deviation of omega or of f, not of both")
         return self
 
     def of_inputs(self) -> dict[str, float]:

@@ -360,6 +360,13 @@ def test_head_is_get_without_the_body(client, case):
     assert (head.status_code, head.headers["etag"]) == (200, get.headers["etag"])
 
 
+def test_two_frequencies_in_the_deviations_of_a_query_are_told_by_name(client, case, problem):
+    query = {**case, "include": "std", "std_omega": 1.0, "std_f": 1.0}
+    (fault,) = problem(client.get(PATH, params=query), 422)["errors"]
+    assert fault["parameter"] == "std_f"
+    assert "not of both" in fault["reason"]
+
+
 def test_two_frequencies_in_the_case_and_in_its_deviations_are_both_told(client, case, problem):
     body = {**case, "f": 1.0, "include": ["std"], "std": {"omega": 1.0, "f": 1.0}}
     faults = problem(client.post(PATH, json=body), 422)["errors"]
