@@ -1,1 +1,1 @@
-"""The table as C: a translator of the library's scalar functions, and the header that it makes of them and of a table."""
+"""The table as C: a translator of the library's scalar functions, and the header made of them and of a table."""

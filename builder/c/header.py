@@ -15,7 +15,8 @@ from mumacro.table import Table
 from mumacro.version import __version__
 
 from . import questions
-from .translate import FLOAT, INT, Array, Translator, literal
+from .translate import Translator
+from .types import FLOAT, INT, Array, literal
 
 __all__ = ["header_text", "write_header"]
 
@@ -60,14 +61,13 @@ def header_text(table: Table) -> str:
 
     Raises
     ------
-    builder.c.translate.TranslationError
+    builder.c.types.TranslationError
         A function of the library is written in a way that has no translation.
     """
     surrogate = Surrogate(table, "table.nc", 1)
     arrays, into = _arrays(surrogate), Translator()
     _translate(into, arrays)
-    attributes = surrogate.attributes
-    about = {"name": f"{attributes['content_sha256'][:12]}, tolerance {surrogate.tolerance:g}", "version": __version__}
+    about = {"name": f"{surrogate.checksum[:12]}, tolerance {surrogate.tolerance:g}", "version": __version__}
     scalars = {
         "MUMACRO_VERSION": f'"{__version__}"', "MUMACRO_TOLERANCE": literal(surrogate.tolerance),
         "MUMACRO_CHECKSUM": f'"{surrogate.checksum}"', "MUMACRO_SOURCES": str(len(charts.SOURCES)),
@@ -77,7 +77,9 @@ def header_text(table: Table) -> str:
         _BANNER % about,
         _macros(scalars),
         _names("Dimensionless quantities, for mumacro_evaluate_point.", "", charts.QUANTITIES),
-        _names("Where an answer comes from: a block of the table, or a limit in closed form.", "SOURCE_", charts.SOURCES),
+        _names(
+            "Where an answer comes from: a block of the table, or a limit in closed form.", "SOURCE_", charts.SOURCES
+        ),
         _names("The regime of an answer; -1 where the input was illegal.", "REGIME_", charts.REGIMES),
         _text("interface.h"),
         "/* ---- from here on nothing is meant to be used from outside ---- */\n",
@@ -106,7 +108,7 @@ def write_header(table: Table, out: BinaryIO) -> None:
 
 
 def _arrays(surrogate: Surrogate) -> dict[str, Any]:
-    """The arrays of :mod:`mumacro.evaluate` by C name; nothing sticks in continuous sliding, whose cells are left out."""
+    """The arrays of :mod:`mumacro.evaluate` by C name; of the stick fraction those where something sticks."""
     arrays: dict[str, Any] = {}
     for name, quantity in (("mu", charts.MU), ("power", charts.POWER), ("stick", charts.STICK)):
         coef, blocks, border, pieces = surrogate._of(quantity)

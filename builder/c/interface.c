@@ -38,8 +38,9 @@ MUMACRO_API double mumacro_mu_macro(double mu0, double Fz, double k, double y0, 
 }
 
 MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_tilde, mumacro_point *out) {
-    mumacro_in_ddi found;
-    mumacro_in_ddddd slopes;
+    mumacro_in_ddi found = mumacro_in_ddi_of(NAN, NAN, -1);
+    mumacro_in_ddddd slopes = mumacro_in_ddddd_of(NAN, NAN, NAN, NAN, NAN);
+    int known = 1;
     if (out == NULL) return MUMACRO_NO_OUTPUT;
     switch (quantity) {
 #define MUMACRO_IN_QUANTITY(code, name) \
@@ -52,7 +53,7 @@ MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_ti
         MUMACRO_IN_QUANTITY(MUMACRO_STICK_FRACTION, stick);
 #undef MUMACRO_IN_QUANTITY
     default:
-        return MUMACRO_NO_QUANTITY;
+        known = 0;
     }
     out->value = found._0;
     out->bound = found._1;
@@ -61,6 +62,7 @@ MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_ti
     out->slope_v_bound = slopes._3;
     out->slope_y_bound = slopes._4;
     out->source = (int)found._2;
+    if (!known) return MUMACRO_NO_QUANTITY;
     return found._2 >= 0 ? 0 : v_tilde >= 0.0 ? 2 : 1;
 }
 

@@ -21,16 +21,23 @@ static inline double mumacro_in_number(int64_t bits) {
 /* Whole part of |x| < 2^63. */
 static inline double mumacro_in_trunc(double x) { return (double)(int64_t)x; }
 
-/* sqrt(x^2 + y^2) of what may not be squared. */
+/* sqrt(x^2 + y^2) of what may not be squared, to the last digit: the root's own error is taken out of it. */
 static inline double mumacro_in_hypot(double x, double y) {
-    const double a = mumacro_in_fmax(fabs(x), fabs(y)), b = mumacro_in_fmin(fabs(x), fabs(y));
-    if (a == HUGE_VAL || b == 0.0) return a;
-    if (a < 1e150 && b > 1e-150) return sqrt(x * x + y * y);
-    return a * sqrt(1.0 + (b / a) * (b / a));
+    const double larger = mumacro_in_fmax(fabs(x), fabs(y)), smaller = mumacro_in_fmin(fabs(x), fabs(y));
+    const double scale = larger > 1e150 ? 1e-160 : smaller < 1e-140 ? 1e140 : 1.0;
+    const double a = larger * scale, b = smaller * scale;
+    double h, d, excess;
+    if (larger == HUGE_VAL || smaller <= larger * 1e-17) return larger;
+    h = sqrt(a * a + b * b);
+    if (h <= 2.0 * b) { /* h^2 - a^2 - b^2, without squares that cancel */
+        d = h - b;
+        excess = a * (2.0 * d - a) + (d - 2.0 * (a - b)) * d;
+    } else {
+        d = h - a;
+        excess = 2.0 * d * (a - 2.0 * b) + ((4.0 * d - b) * b + d * d);
+    }
+    return (h - excess / (2.0 * h)) / scale;
 }
-
-/* Cube root of x > 0, to 13 digits: it starts an iteration. */
-static inline double mumacro_in_cbrt(double x) { return exp(log(x) / 3.0); }
 
 /* x = m 2^e with 1/2 <= m < 1, of finite x > 0. */
 static inline mumacro_in_di mumacro_in_frexp(double x) {
@@ -48,4 +55,12 @@ static inline double mumacro_in_ldexp(double x, int64_t e) {
     for (; e > 900; e -= 900) x *= mumacro_in_number(INT64_C(1923) << 52);
     for (; e < -900; e += 900) x *= mumacro_in_number(INT64_C(123) << 52);
     return x * mumacro_in_number((e + 1023) << 52);
+}
+
+/* Cube root of finite x > 0. */
+static inline double mumacro_in_cbrt(double x) {
+    const mumacro_in_di parts = mumacro_in_frexp(x);
+    const int64_t rest = (parts._1 % 3 + 3) % 3;
+    const double m = mumacro_in_ldexp(parts._0, rest), root = exp(log(m) / 3.0);
+    return mumacro_in_ldexp(root - (root * root * root - m) / (3.0 * root * root), (parts._1 - rest) / 3);
 }
