@@ -156,7 +156,7 @@ def export(
     """Write the table's plain grid for other tools; print what was written as JSON."""
     if kind not in FORMATS:
         raise typer.BadParameter(f"must be one of {', '.join(FORMATS)}, got {kind!r}", param_hint="--format")
-    target = Path(table.stem + FORMATS[kind][0]) if out is None else out
+    target = Path(FORMATS[kind][0].format(table.stem)) if out is None else out
     if target.is_dir():
         raise typer.BadParameter(f"{str(target)!r} is a folder", param_hint="--out")
     try:

@@ -26,6 +26,8 @@ from scipy.io import savemat
 from mumacro.errors import MumacroError
 from mumacro.table import Table, json_attributes, read_table
 
+from .c.header import write_header
+
 __all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
 
 Array = NDArray[np.float64]
@@ -114,12 +116,13 @@ def _parquet(table: Table, out: BinaryIO) -> None:
     parquet.write_table(arrow, out, compression="zstd")
 
 
-#: format -> (suffix, writer)
+#: format -> (name of the file after the table's, writer)
 FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None]]] = {
-    "csv": (".csv", _csv),
-    "mat": (".mat", _mat),
-    "modelica": (".txt", _modelica),
-    "parquet": (".parquet", _parquet),
+    "c": ("mumacro.h", write_header),
+    "csv": ("{}.csv", _csv),
+    "mat": ("{}.mat", _mat),
+    "modelica": ("{}.txt", _modelica),
+    "parquet": ("{}.parquet", _parquet),
 }
 
 

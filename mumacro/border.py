@@ -10,21 +10,27 @@ from numpy.typing import NDArray
 
 from mumacro import charts
 from mumacro.cells import border_cells
-from mumacro.kernel_cache import kernel
+from mumacro.kernel_cache import kernel, part
 from mumacro.table import BorderPiece
 
-__all__ = ["Border"]
+__all__ = ["Border", "border_at"]
 
 Array = NDArray[np.float64]
+
+
+@part
+def border_at(y: float, coef: Array, pieces: Array) -> float:
+    """v~crit [-] at the amplitude ``y`` [-]: 0 at 0, infinite at infinity, NaN for what is no amplitude."""
+    if 0.0 < y < math.inf:
+        crit, _, _ = charts.border(y, coef, pieces)
+        return crit
+    return y if y >= 0.0 else math.nan
 
 
 @kernel
 def _curve(y: Array, coef: Array, pieces: Array, out: Array) -> None:
     for i in range(y.size):
-        if 0.0 < y[i] < math.inf:
-            out[i], _, _ = charts.border(y[i], coef, pieces)
-        else:
-            out[i] = y[i] if y[i] >= 0.0 else math.nan
+        out[i] = border_at(y[i], coef, pieces)
 
 
 class Border:

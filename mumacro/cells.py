@@ -176,13 +176,14 @@ def patch_value(coef: Any, p: int, u: float, w: float) -> float:
 
     Rows hold falling powers of w, columns falling powers of u.
     """
-    row = [float(c) for c in coef[p, 0]]
+    row = coef[p, 0]
     for k in range(1, WIDTH):
-        row = [r * w + float(c) for r, c in zip(row, coef[p, k], strict=True)]
-    out = row[0]
-    for c in row[1:]:
-        out = out * u + c
-    return out
+        row = row * w + coef[p, k]
+    # the sum over powers of u by halves: u^4, u^2, u
+    u2 = u * u
+    four = row[:4] * (u2 * u2) + row[4:]
+    two = four[:2] * u2 + four[2:]
+    return two[0] * u + two[1]  # type: ignore[no-any-return]  # numpy's own float
 
 
 def _vector(n: int) -> ir.VectorType:
@@ -225,7 +226,6 @@ def _patch_vector(_typing: Any, coef: Any, _p: Any, _u: Any, _w: Any) -> Any:
         acc = row(0)
         for k in range(1, WIDTH):
             acc = _multiply_add(builder, acc, wide, row(k))
-        # the sum over powers of u by halves: u^4, u^2, u
         u2 = builder.fmul(u, u)
         u4 = builder.fmul(u2, u2)
         four = _multiply_add(builder, _part(builder, acc, 0, 4), _splat(builder, u4, 4), _part(builder, acc, 4, 4))

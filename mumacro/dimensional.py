@@ -34,12 +34,14 @@ __all__ = [
     "evaluate_case",
     "evaluate_unusual",
     "find_faults",
+    "first_bad",
     "gradient",
     "group_columns",
     "groups",
     "length_scale",
     "other_cases",
     "real",
+    "scaled",
 ]
 
 FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
@@ -163,7 +165,7 @@ def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:
 
 
 @part
-def _scaled(a: float, b: float, c: float, d: float, e: float) -> float:
+def scaled(a: float, b: float, c: float, d: float, e: float) -> float:
     """a b / (c d e) for finite positive numbers whose partial products may overflow or underflow."""
     ma, ea = math.frexp(a)
     mb, eb = math.frexp(b)
@@ -193,28 +195,35 @@ def _plain_groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: 
 def _amplitude_ratio(y0: float, omega: float, v0: float) -> float:
     """r = y~/v~ = y0 omega/v0 [-], which needs no stiffness."""
     product = y0 * omega
-    return product / v0 if 1e-290 < product < 1e290 else _scaled(y0, omega, v0, 1.0, 1.0)
+    return product / v0 if 1e-290 < product < 1e290 else scaled(y0, omega, v0, 1.0, 1.0)
 
 
 @part
 def groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float]:
     """(v~, y~) [-] of any legal case: v~ is infinite where nothing oscillates, both are for rigid contact."""
     if y0 == 0.0 or omega == 0.0 or v0 == 0.0:
-        y = 0.0 if y0 == 0.0 else (math.inf if k == math.inf else _scaled(y0, k, mu0, Fz, 1.0))
+        y = 0.0 if y0 == 0.0 else (math.inf if k == math.inf else scaled(y0, k, mu0, Fz, 1.0))
         return math.inf if v0 > 0.0 else 0.0, y
     if k == math.inf:
         return math.inf, math.inf
     v, y, plain = _plain_groups(mu0, Fz, k, y0, omega, v0)
-    return (v, y) if plain else (_scaled(v0, k, mu0, Fz, omega), _scaled(y0, k, mu0, Fz, 1.0))
+    return (v, y) if plain else (scaled(v0, k, mu0, Fz, omega), scaled(y0, k, mu0, Fz, 1.0))
 
 
 @part
-def _legal(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> bool:
-    """Whether the case is within :data:`BOUNDS`."""
-    return (
-        0.0 < mu0 < math.inf and 0.0 < Fz < math.inf and k > 0.0
-        and 0.0 <= y0 < math.inf and 0.0 <= omega < math.inf and 0.0 <= v0 < math.inf
-    )  # fmt: skip
+def first_bad(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> int:
+    """0 for a case within :data:`BOUNDS`, else 1 + the place of its first bad field among :data:`FIELDS`."""
+    if not 0.0 < mu0 < math.inf:
+        return 1
+    if not 0.0 < Fz < math.inf:
+        return 2
+    if not k > 0.0:
+        return 3
+    if not 0.0 <= y0 < math.inf:
+        return 4
+    if not 0.0 <= omega < math.inf:
+        return 5
+    return 0 if 0.0 <= v0 < math.inf else 6
 
 
 @kernel
@@ -252,7 +261,7 @@ def evaluate_unusual(
     coef: Array, blocks: Array, border: Array, pieces: Array,
 ) -> tuple[float, float, int, float, float]:  # fmt: skip
     """:func:`evaluate_case` for every legal case: zero inputs, rigid contact, groups beyond double precision, too."""
-    if not _legal(mu0, Fz, k, y0, omega, v0):
+    if first_bad(mu0, Fz, k, y0, omega, v0) != 0:
         return math.nan, math.nan, -1, math.nan, math.nan
     v, y = groups(mu0, Fz, k, y0, omega, v0)
     if y0 == 0.0 or omega == 0.0:

@@ -269,15 +269,26 @@ def sweep() -> Iterator[Sweep]:
         yield started
 
 
-@pytest.fixture(scope="session")
-def naive(repository: Path) -> ModuleType:
-    """The naive solver of tests/naive.py; loaded by path, since tests are no package."""
-    spec = importlib.util.spec_from_file_location("naive", repository / "tests" / "naive.py")
+def _by_path(name: str) -> ModuleType:
+    """A module beside the tests; loaded by path, since tests are no package."""
+    spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def naive() -> ModuleType:
+    """The naive solver."""
+    return _by_path("naive")
+
+
+@pytest.fixture(scope="session")
+def compilers() -> ModuleType:
+    """The compilers that are installed."""
+    return _by_path("compilers")
 
 
 @pytest.fixture(scope="session")

@@ -33,10 +33,10 @@ def table(path):
 def written(path, tmp_path_factory):
     """Every format, once."""
     folder = tmp_path_factory.mktemp("export")
-    for kind, (suffix, _) in FORMATS.items():
+    for kind, (name, _) in FORMATS.items():
         if kind == "parquet":
             pytest.importorskip("pyarrow")
-        export_table(path, kind, folder / f"grid{suffix}")
+        export_table(path, kind, folder / name.format("grid"))
     return folder
 
 
@@ -118,9 +118,8 @@ def test_parquet_holds_the_rows_and_says_where_they_come_from(table, written):
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_the_same_table_gives_the_same_bytes(path, written, tmp_path, kind):
-    suffix = FORMATS[kind][0]
     export_table(path, kind, tmp_path / "again")
-    assert (tmp_path / "again").read_bytes() == (written / f"grid{suffix}").read_bytes()
+    assert (tmp_path / "again").read_bytes() == (written / FORMATS[kind][0].format("grid")).read_bytes()
     assert [entry.name for entry in tmp_path.iterdir()] == ["again"]
 
 

@@ -1,0 +1,33 @@
+"""Compilers that tests of exports use where they are installed, and how one is called."""
+
+import functools
+import importlib.util
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+
+
+@functools.cache
+def compiler(name: str) -> tuple[str, ...]:
+    """The command of a compiler; skips the test where it is not installed."""
+    if name.startswith("zig"):
+        if importlib.util.find_spec("ziglang") is None:
+            pytest.skip("zig is not installed (pip install ziglang)")
+        return (sys.executable, "-m", "ziglang", name.removeprefix("zig "))
+    found = shutil.which(name)
+    if found is None:
+        pytest.skip(f"{name} is not installed")
+    return (found,)
+
+
+def run(*command: object, cwd: Path | None = None) -> str:
+    """The output of a command that must succeed."""
+    words = [str(word) for word in command]
+    done = subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, f"{' '.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+    return done.stdout
