@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from mumacro.border import Border
 from mumacro.bundled import bundled_tables
 from mumacro.cells import block_rows, cells_2d, joined
 from mumacro.errors import InputError, TableError
+from mumacro.processors import default_threads
 from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
 
 __all__ = ["Surrogate"]
@@ -40,10 +40,8 @@ class Surrogate:
     """
 
     def __init__(self, table: Table, path: str | Path, threads: int | None = None, image: bytes | None = None) -> None:
-        cores = os.cpu_count() or 1
         if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
-            raise InputError("threads", threads, "None (all cores) or a whole number from 1 to 1024")
-        self.threads = cores if threads is None else threads
+            raise InputError("threads", threads, "None or a whole number from 1 to 1024")
         self._asked_threads = threads
         self._image = image
         self.path = Path(path)
@@ -70,7 +68,8 @@ class Surrogate:
             A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it; or None for the
             tightest bundled table.
         threads : int, optional
-            Threads that large arrays are shared out to; all cores by default.  1 never starts one.
+            Threads that large arrays are shared out to; 1 never starts one.  Left out: all processors when called from
+            the main thread of a program; one in other threads and in child processes, which are shared out already.
 
         Raises
         ------
@@ -100,6 +99,11 @@ class Surrogate:
         other = Surrogate(self.table, self.path, 1, self._image)
         other._other_coef = self._other_coef
         return other
+
+    @property
+    def threads(self) -> int:
+        """Threads that a large array is shared out to by a call from here."""
+        return default_threads() if self._asked_threads is None else self._asked_threads
 
     @property
     def id(self) -> str:

@@ -25,6 +25,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.errors import MumacroError
+from mumacro.processors import processors
 
 from . import __version__, numbers
 from .connection import Connection
@@ -59,16 +60,6 @@ def _stand_back() -> None:
     if sys.platform == "linux":
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
-
-
-def processors() -> int:
-    """How many processors this process may use; a container's limit counts where the system tells it."""
-    found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    with suppress(OSError, ValueError):
-        with open("/sys/fs/cgroup/cpu.max", encoding="ascii") as limit:
-            quota, period = limit.read().split()
-        found = min(found, max(1, -(-int(quota) // int(period))))
-    return found
 
 
 def load(tables: Tables) -> None:

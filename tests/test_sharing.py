@@ -1,13 +1,14 @@
 """Threads, processes and pickles: the same bits everywhere, nothing waits, nothing is left over that a fork misses."""
 
 import multiprocessing
+import operator
 import os
 import pickle
 import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mumacro import InputError, Surrogate, TableError, batch
+from mumacro.processors import processors
 from mumacro.table import read_table
 
 Array = NDArray[np.float64]
@@ -80,6 +82,49 @@ def test_no_thread_outlives_its_call(table: Surrogate) -> None:
     before = set(threading.enumerate())
     everything(table)
     assert set(threading.enumerate()) == before
+
+
+def workers() -> Iterator[Any]:
+    """Ways to hand a call to a worker, by name: each calls a function with an argument and returns what it says."""
+
+    def executor(pool: Any) -> Callable[..., Any]:
+        def call(function: Any, argument: Any) -> Any:
+            with pool() as started:
+                return started.submit(function, argument).result(timeout=60)
+
+        return call
+
+    def joblib(backend: str) -> Callable[..., Any]:
+        def call(function: Any, argument: Any) -> Any:
+            parallel = pytest.importorskip("joblib")
+            return parallel.Parallel(2, backend=backend)([parallel.delayed(function)(argument)] * 2)[0]
+
+        return call
+
+    def dask(function: Any, argument: Any) -> Any:
+        return pytest.importorskip("dask").delayed(function)(argument).compute(scheduler="threads")
+
+    def distributed(function: Any, argument: Any) -> Any:
+        library = pytest.importorskip("distributed")
+        with library.Client(processes=False, n_workers=1, dashboard_address=None) as client:
+            return client.submit(function, argument).result()
+
+    yield pytest.param(executor(lambda: ThreadPoolExecutor(1)), id="threads")
+    for method in ("fork", "spawn") if hasattr(os, "fork") else ("spawn",):
+        context = multiprocessing.get_context(method)
+        yield pytest.param(executor(lambda c=context: ProcessPoolExecutor(1, mp_context=c)), id=method)
+    for backend in ("loky", "threading"):
+        yield pytest.param(joblib(backend), id=f"joblib {backend}")
+    yield pytest.param(dask, id="dask threads")
+    yield pytest.param(distributed, id="dask distributed")
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("call", workers())
+def test_workers_start_no_threads_unless_told(call: Callable[..., Any]) -> None:
+    unasked = Surrogate.open(1e-4)
+    assert unasked.threads == processors()
+    assert call(operator.attrgetter("threads"), unasked) == 1
 
 
 def test_eight_threads_may_ask_everything_at_once(table: Surrogate) -> None:

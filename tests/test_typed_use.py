@@ -2,6 +2,7 @@
 
 import doctest
 import importlib
+import importlib.util
 import pkgutil
 import subprocess
 import sys
@@ -11,8 +12,12 @@ import pytest
 
 import mumacro
 
+LEFT_OUT = {"mumacro.__main__"}
+for package in ("jax", "torch"):  # hundreds of megabytes, which no test needs but their own
+    if importlib.util.find_spec(package) is None:
+        LEFT_OUT |= {f"mumacro.{package}", f"mumacro.interop.{package}"}
 MODULES = sorted(
-    {"mumacro", *(module.name for module in pkgutil.walk_packages(mumacro.__path__, "mumacro."))} - {"mumacro.__main__"}
+    {"mumacro", *(module.name for module in pkgutil.walk_packages(mumacro.__path__, "mumacro."))} - LEFT_OUT
 )
 
 PROGRAM = '''

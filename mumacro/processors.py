@@ -1,0 +1,33 @@
+"""How many processors there are for this process, and how many threads a call may start unasked."""
+
+from __future__ import annotations
+
+import functools
+import multiprocessing
+import os
+import threading
+from contextlib import suppress
+
+__all__ = ["default_threads", "processors"]
+
+
+@functools.cache
+def processors() -> int:
+    """How many processors this process may use; a container's limit counts where the system tells it."""
+    found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with suppress(OSError, ValueError):
+        with open("/sys/fs/cgroup/cpu.max", encoding="ascii") as limit:
+            quota, period = limit.read().split()
+        found = min(found, max(1, -(-int(quota) // int(period))))
+    return found
+
+
+def default_threads() -> int:
+    """Threads of a call where nobody said how many.
+
+    All processors in the main thread of a program.  One in any other thread and in a child process: whoever started
+    those (Dask, joblib, multiprocessing, a pool of threads) shares the work out already.
+    """
+    if threading.current_thread() is not threading.main_thread() or multiprocessing.parent_process() is not None:
+        return 1
+    return processors()
