@@ -14,7 +14,6 @@ import os
 import pickle
 import stat
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, overload
@@ -23,6 +22,8 @@ import llvmlite
 import numba
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
+
+from mumacro.writing import write_whole
 
 __all__ = ["cache_folder", "kernel", "kernels_are_cached", "part", "source_digest"]
 
@@ -136,16 +137,10 @@ class _Stored:
             return
         path, what = self._place(signature, compiled.codegen)
         content = dumps(compiled._reduce())  # type: ignore[no-untyped-call]
-        partial = None
         try:
-            handle, partial = tempfile.mkstemp(dir=self.cache_path, prefix=f".{path.stem}.", suffix=".tmp")
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(hashlib.sha256(what + content).digest() + content)
-            os.replace(partial, path)
+            write_whole(path, hashlib.sha256(what + content).digest() + content)
         except OSError as error:
             _say_once(self.cache_path, error.strerror or str(error))
-            if partial is not None:
-                Path(partial).unlink(missing_ok=True)
 
     def flush(self) -> None:
         """Forget what is kept of this kernel."""

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import tempfile
 import threading
 from collections.abc import Callable
@@ -30,6 +29,7 @@ from numpy.typing import NDArray
 from mumacro import charts, hdf5
 from mumacro.cells import nodes
 from mumacro.errors import TableError
+from mumacro.writing import write_whole
 
 __all__ = [
     "FORMAT_VERSION",
@@ -199,16 +199,13 @@ def write_table(table: Table, path: str | Path) -> str:
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-            partial = Path(folder) / path.name
-            with partial.open("wb") as stream:
-                stream.write(image)
-                stream.flush()
-                os.fsync(stream.fileno())
-            partial.chmod(0o644)
-            os.replace(partial, path)
     except (OSError, RuntimeError) as error:  # the netCDF library says RuntimeError where it cannot write
-        raise TableError(path, f"cannot be written: {getattr(error, 'strerror', None) or error}") from error
+        where = f"in the folder of temporary files, {tempfile.gettempdir()}"
+        raise TableError(path, f"cannot be made {where}: {getattr(error, 'strerror', None) or error}") from error
+    try:
+        write_whole(path, image)
+    except OSError as error:
+        raise TableError(path, f"cannot be written: {error.strerror or error}") from error
     return str(table.attributes["content_sha256"])
 
 
