@@ -218,7 +218,7 @@ class _Run:
             write_whole(kept, plan)
 
     def _clear(self) -> None:
-        """Empty the folder of parts, so that a run that is stopped goes on: the last note first, then parts, then the plan."""
+        """Empty the folder of parts: the last note first, then parts, then the plan; who is stopped here can go on."""
         found = sorted(self.parts.iterdir(), reverse=True)
         for path in sorted(found, key=lambda path: (path.name == "plan.json", path.suffix != ".json")):
             path.unlink()
