@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from mumacro import MumacroError, Surrogate
 from mumacro.extras import missing
+from mumacro.writing import alone_in
 
 try:
     import typer
@@ -73,8 +74,10 @@ def build(
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:<32}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     try:
+        checkpoint = out.with_name(out.name + ".checkpoint")
         with (
-            Sweep(workers, scheduler, out.with_name(out.name + ".checkpoint")) as sweep,
+            alone_in(checkpoint),
+            Sweep(workers, scheduler, checkpoint) as sweep,
             Progress(*columns, console=console) as bar,
         ):
             task = bar.add_task("border", total=stages())
@@ -86,8 +89,10 @@ def build(
             solves = sweep.n_solves
     except ImportError as error:
         raise _fail(f"--scheduler: {missing('dask', error)}", 2) from error
-    except (MumacroError, BuildError, SolveError, OSError) as error:
+    except (MumacroError, BuildError, SolveError) as error:
         raise _fail(str(error)) from error
+    except OSError as error:
+        raise _fail(f"{error.filename or out}: {error.strerror or error}") from error
     print(
         _json(
             {

@@ -7,8 +7,7 @@ workers there are or on whether a build was interrupted.
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
+import io
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,13 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.errors import MumacroError
 from mumacro.kernel_cache import source_digest
+from mumacro.writing import write_whole
 
 from . import steady
 from .compiled import SOURCES, solver_kernel
 from .model import OK
 
-__all__ = ["COLUMNS", "SolveError", "Sweep"]
+__all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep"]
 
 Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
@@ -33,6 +34,10 @@ _MU, _DEFICIT, _STICK, _POWER, _ERROR, _STATUS = range(len(COLUMNS))
 
 class SolveError(ArithmeticError):
     """A node could not be solved; the message says which and what to do."""
+
+
+class CheckpointError(MumacroError):
+    """Finished work cannot be kept."""
 
 
 @solver_kernel
@@ -184,10 +189,13 @@ class Sweep:
         file = self._file(kind, points)
         if file is None:
             return
-        file.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=file.parent, suffix=".tmp")
-        with os.fdopen(handle, "wb") as stream:
-            np.save(stream, out)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(name, file)
+        content = io.BytesIO()
+        np.save(content, out)
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(file, content.getvalue())
+        except OSError as error:
+            raise CheckpointError(
+                f"{file.parent}: finished work cannot be kept: {error.strerror or error}; give the same command again "
+                "when that is mended, and it goes on from there"
+            ) from error

@@ -1,28 +1,37 @@
 """How kernels are compiled, and where the compiled code is kept between runs.
 
-numba compiles a kernel at its first call and stores the result on disk.  numba's own index looks at the file of a
-kernel only, not at the files of the kernels it calls; after an update it would run old code.  So the folder is named
-after a digest of all sources.  The folder must belong to this user: stored code is run as it is.
+numba compiles a kernel at its first call; the result is kept in a file.  Stored code is run as it is.  So its folder
+must belong to this user, and is named after a digest of all sources: after an update, old code would answer.  And every
+file carries a digest of its content: one that is damaged is compiled anew.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
+import logging
 import os
+import pickle
 import stat
 import sys
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
+import llvmlite
 import numba
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from mumacro.writing import write_whole
 
 __all__ = ["cache_folder", "kernel", "kernels_are_cached", "part", "source_digest"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _HERE = Path(__file__).resolve().parent
+_SUFFIX = ".kernel"
+_DIGEST = 32  # bytes in front of a file's content
+_log = logging.getLogger("mumacro.kernels")
 
 
 def source_digest(*folders: Path) -> str:
@@ -38,15 +47,28 @@ def source_digest(*folders: Path) -> str:
 def _private(folder: Path) -> bool:
     """Make ``folder`` and say whether nobody but this user, or the system's administrator, can write to it."""
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = folder.stat()
+        for missing in [folder, *folder.parents][::-1]:
+            missing.mkdir(mode=0o700, exist_ok=True)
+        folder = folder.resolve(strict=True)
+        if hasattr(os, "getuid"):
+            status = folder.stat()
+            if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) or not _trusted(status):
+                return False
+            # who may rename a folder above it may put another in its place
+            for above in map(Path.stat, folder.parents):
+                free = above.st_mode & stat.S_IWOTH and not above.st_mode & stat.S_ISVTX
+                if free or (above.st_uid != _UNMAPPED and not _trusted(above)):
+                    return False
     except OSError:
         return False
-    if hasattr(os, "getuid"):
-        foreign = status.st_uid not in (os.getuid(), 0)  # 0: an image's cache, compiled when it was built
-        if foreign or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return False
     return os.access(folder, os.R_OK | os.X_OK)
+
+
+_UNMAPPED = 65534  # whom a container sees as the owner of what lies outside
+
+
+def _trusted(status: os.stat_result) -> bool:
+    return status.st_uid in (os.getuid(), 0)  # 0: an image's cache, compiled when it was built
 
 
 @functools.cache
@@ -57,14 +79,12 @@ def cache_folder(*folders: Path) -> Path | None:
     can write to: kernels are then compiled anew in every process.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        base = Path(chosen)
-    else:
-        try:
-            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mumacro"
-        except RuntimeError:  # no home
-            return None
-    folder = base / f"kernels-{source_digest(*folders)}"
+    try:
+        base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mumacro"
+    except RuntimeError:
+        print("mumacro: kernels are not kept between runs: this user has no home", file=sys.stderr)
+        return None
+    folder = base.absolute() / f"kernels-{source_digest(*folders)}"
     if _private(folder):
         return folder
     print(f"mumacro: kernels are not kept between runs: {folder} is not this user's alone to write to", file=sys.stderr)
@@ -74,10 +94,63 @@ def cache_folder(*folders: Path) -> Path | None:
 def kernels_are_cached() -> bool:
     """Whether compiled kernels of these sources are at hand."""
     folder = cache_folder()
-    return folder is not None and any(folder.rglob("*.nbi"))
+    return folder is not None and any(folder.glob(f"*{_SUFFIX}"))
 
 
-_naming_the_folder = threading.Lock()
+class _Stored:
+    """The compiled code of one kernel on the disk, a file for every signature and processor.
+
+    Takes the place of numba's own store, which keeps an index of its files beside them, raises on a file that is empty
+    or cut, runs one that is damaged, mixes up what several processes write at once, and lets no kernel answer that
+    cannot be saved.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self.cache_path = str(folder)
+        code = function.__code__
+        self._name = f"{function.__name__}-{code.co_firstlineno}"
+        self._what = (function.__module__, function.__qualname__, self._name, hashlib.sha256(code.co_code).hexdigest(),
+                      numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)  # fmt: skip
+
+    def _place(self, signature: Any, codegen: Any) -> tuple[Path, bytes]:
+        """The file of a signature, and what it is the file of."""
+        what = repr((*self._what, signature, codegen.magic_tuple())).encode()
+        return Path(self.cache_path, f"{self._name}-{hashlib.sha256(what).hexdigest()[:16]}{_SUFFIX}"), what
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The compiled kernel, or None where there is none that is whole."""
+        target.refresh()
+        path, what = self._place(signature, target.codegen())
+        try:
+            data = path.read_bytes()
+        except OSError:
+            return None
+        content = data[_DIGEST:]
+        if data[:_DIGEST] != hashlib.sha256(what + content).digest():
+            return None
+        parts = pickle.loads(content)  # noqa: S301 (ours: see _private)
+        return CompileResult._rebuild(target, *parts)  # type: ignore[no-untyped-call]
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep a kernel, if that is possible: it answers in any case."""
+        if compiled.lifted or compiled.library.has_dynamic_globals:  # such code is of this process alone
+            return
+        path, what = self._place(signature, compiled.codegen)
+        content = dumps(compiled._reduce())  # type: ignore[no-untyped-call]
+        try:
+            write_whole(path, hashlib.sha256(what + content).digest() + content)
+        except OSError as error:
+            _say_once(self.cache_path, error.strerror or str(error))
+
+    def flush(self) -> None:
+        """Forget what is kept of this kernel."""
+        for path in Path(self.cache_path).glob(f"{self._name}-*{_SUFFIX}"):
+            path.unlink(missing_ok=True)
+
+
+@functools.cache
+def _say_once(folder: str, reason: str) -> None:
+    _log.warning("kernels that were compiled now cannot be kept in %s: %s", folder, reason)
 
 
 @overload
@@ -107,16 +180,11 @@ def kernel(function: Callable[..., Any] | None = None, *, fuse: bool = True, bes
     """
     if function is None:
         return functools.partial(kernel, fuse=fuse, beside=beside)
-    compiled = numba.njit(**_options(fuse))(function)
+    compiled: Any = numba.njit(**_options(fuse))(function)
     folder = cache_folder(*(() if beside is None else (beside,)))
-    if folder is not None and hasattr(compiled, "enable_caching"):  # absent where numba is switched off
-        config: Any = numba.config
-        with _naming_the_folder:  # numba reads the folder here and never again; other packages keep theirs
-            before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
-            try:
-                compiled.enable_caching()
-            finally:
-                config.CACHE_DIR = before
+    # A switched-off numba gives the function back; what a closure holds is no part of a file's name.
+    if folder is not None and hasattr(compiled, "enable_caching") and function.__closure__ is None:
+        compiled._cache = _Stored(function, folder)  # numba has no other place to say so
     return compiled
 
 

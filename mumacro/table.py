@@ -8,27 +8,28 @@ Layout (all quantities dimensionless, units "1"):
 * group ``border/blocks``: one sub-group a block (:data:`mumacro.charts.CHARTS`): node coordinates, node values of
   mu~, power and stick fraction, the chart by name and range, the number of cells, the verified errors.
 
-The netCDF library is not safe for threads: one lock holds while it works.
+The netCDF library writes, and is not safe for threads: one lock holds while it works.  It does not read: see
+:mod:`mumacro.hdf5`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import tempfile
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import charts
+from mumacro import charts, hdf5
 from mumacro.cells import nodes
 from mumacro.errors import TableError
+from mumacro.writing import write_whole
 
 __all__ = [
     "FORMAT_VERSION",
@@ -42,9 +43,12 @@ __all__ = [
 ]
 
 FORMAT_VERSION = 3
-MOST_BYTES = 64 * 2**20  # of a file; the largest that the builder makes has half a megabyte
-MOST_NUMBERS = 200_000  # of a variable: refused before memory is taken
-MOST_CELLS = 4096  # along an axis
+# More is refused before memory is taken; of the largest table that the builder makes:
+MOST_BYTES = 16 * 2**20  # of a file: 425 kB
+MOST_NUMBERS = 200_000  # of a variable: 14,641
+MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its square
+MOST_CELLS = 1024  # along an axis: 156
+MOST_PATCHES = 8192  # cells of a block: 646, of 512 bytes each and quantity
 Array = NDArray[np.float64]
 
 _one_at_a_time = threading.Lock()
@@ -195,16 +199,13 @@ def write_table(table: Table, path: str | Path) -> str:
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-            partial = Path(folder) / path.name
-            with partial.open("wb") as stream:
-                stream.write(image)
-                stream.flush()
-                os.fsync(stream.fileno())
-            partial.chmod(0o644)
-            os.replace(partial, path)
     except (OSError, RuntimeError) as error:  # the netCDF library says RuntimeError where it cannot write
-        raise TableError(path, f"cannot be written: {getattr(error, 'strerror', None) or error}") from error
+        where = f"in the folder of temporary files, {tempfile.gettempdir()}"
+        raise TableError(path, f"cannot be made {where}: {getattr(error, 'strerror', None) or error}") from error
+    try:
+        write_whole(path, image)
+    except OSError as error:
+        raise TableError(path, f"cannot be written: {error.strerror or error}") from error
     return str(table.attributes["content_sha256"])
 
 
@@ -214,6 +215,8 @@ def _image(table: Table) -> bytes:
     Made among the temporary files: where the disk is full the netCDF library says little and keeps the file open.  What
     it makes in memory holds the time of day.
     """
+    import netCDF4  # only who builds tables has it
+
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         path = Path(folder) / "table.nc"
         with _one_at_a_time, netCDF4.Dataset(str(path), "w", format="NETCDF4") as root:
@@ -225,7 +228,7 @@ def _image(table: Table) -> bytes:
 
 
 class _Reader:
-    """One open file; every refusal names it."""
+    """One file; every refusal names it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -233,78 +236,90 @@ class _Reader:
     def refuse(self, reason: str) -> TableError:
         return TableError(self.path, reason)
 
-    def group(self, parent: Any, name: str) -> Any:
-        if name not in parent.groups:
-            raise self.refuse(f"group {name!r} is missing")
-        return parent.groups[name]
-
-    def array(self, group: Any, name: str, shape: tuple[int, ...] | None = None) -> Array:
-        if name not in group.variables:
-            raise self.refuse(f"variable {name!r} is missing in {group.path}")
-        variable = group.variables[name]
-        if variable.dtype != np.float64 or variable.size > MOST_NUMBERS:
-            raise self.refuse(
-                f"variable {name!r} in {group.path} is no float64 array of at most {MOST_NUMBERS} numbers"
-            )
-        variable.set_auto_maskandscale(False)
-        values: Array = np.ascontiguousarray(variable[...], dtype=np.float64)
+    def array(self, group: hdf5.Group, name: str, shape: tuple[int, ...] | None = None) -> Array:
+        values = group.array(name, MOST_NUMBERS)
         if not np.all(np.isfinite(values)):
             raise self.refuse(f"variable {name!r} in {group.path} holds non-finite values")
         if shape is not None and values.shape != shape:
-            raise self.refuse(f"{group.path}: shapes of nodes and values disagree")
+            raise self.refuse(f"{group.path}: the shape of {name!r} is {values.shape}, not {shape}")
         return values
 
-    def numbers(self, group: Any, name: str, count: int) -> Array:
-        values = np.atleast_1d(np.asarray(group.getncattr(name), dtype=np.float64))
-        if values.shape != (count,) or not np.all(np.isfinite(values)):
+    def numbers(self, group: hdf5.Group, name: str, count: int) -> Array:
+        values = np.atleast_1d(np.asarray(group.attribute(name)))
+        if values.dtype.kind not in "fi" or values.shape != (count,) or not np.all(np.isfinite(values)):
             raise self.refuse(f"attribute {name!r} of {group.path} is not {count} finite numbers")
-        return values
+        return values.astype(np.float64)
 
-    def nodes(self, group: Any, axis: charts.Axis) -> Array:
+    def nodes(self, group: hdf5.Group, axis: charts.Axis) -> Array:
         """The nodes of an axis, which must be those of the running atlas."""
         found = self.array(group, axis.name)
-        if found.ndim != 1 or found.size < 2 or not np.array_equal(found, nodes(found.size, axis.low, axis.high)):
+        if found.ndim != 1 or not 2 <= found.size <= MOST_NODES:
+            raise self.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
+        if not np.array_equal(found, nodes(found.size, axis.low, axis.high)):
             raise self.refuse(f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart")
         return found
 
-    def cells(self, group: Any, count: int) -> tuple[int, ...]:
+    def cells(self, group: hdf5.Group, count: int) -> tuple[int, ...]:
         cells = self.numbers(group, "cells", count)
         if not np.all((cells >= 1) & (cells <= MOST_CELLS) & (cells == np.round(cells))):
             raise self.refuse(f"{group.path}: cells must be whole numbers from 1 to {MOST_CELLS}")
+        if np.prod(cells) > MOST_PATCHES:
+            raise self.refuse(f"{group.path}: has more than {MOST_PATCHES} cells")
         return tuple(int(n) for n in cells)
 
-    def errors(self, group: Any, *names: str, count: int = 1) -> list[Array]:
+    def errors(self, group: hdf5.Group, *names: str, count: int = 1) -> list[Array]:
         found = [self.numbers(group, name, count) for name in names]
         if any(np.any(error < 0.0) for error in found):
             raise self.refuse(f"{group.path}: an error is negative")
         return found
 
-    def same(self, group: Any, name: str, wanted: object) -> None:
-        if not np.array_equal(group.getncattr(name), np.asarray(wanted)):
-            raise self.refuse(f"{group.path}: {name} is {group.getncattr(name)!r}, this program's atlas has {wanted!r}")
+    def same(self, group: hdf5.Group, name: str, wanted: object) -> None:
+        found = group.attribute(name)
+        if not np.array_equal(found, np.asarray(wanted)):
+            raise self.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {wanted!r}")
+
+    def attributes(self, root: hdf5.Group) -> dict[str, Any]:
+        """Those of the root: what the program uses of them is of the right kind."""
+        if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
+            raise self.refuse("not a mumacro table: format_version, tolerance or content_sha256 is missing")
+        version = root.attribute("format_version")
+        if not np.array_equal(version, FORMAT_VERSION):
+            raise self.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
+        found = root.attributes()
+        for name in ("tolerance", *(key for key in found if key.startswith("verified_max_"))):
+            if not self.numbers(root, name, 1)[0] > 0.0:
+                raise self.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
+        if not isinstance(found["content_sha256"], str):
+            raise self.refuse("attribute 'content_sha256' is no text")
+        _options(found, self.refuse)
+        return found
 
 
-def _read(root: Any, reader: _Reader) -> Table:
-    attributes = {key: root.getncattr(key) for key in root.ncattrs()}
-    if not {"format_version", "content_sha256", "tolerance"} <= attributes.keys():
-        raise reader.refuse("not a mumacro table: format_version, tolerance or content_sha256 is missing")
-    if attributes["format_version"] != FORMAT_VERSION:
-        raise reader.refuse(f"format version {attributes['format_version']}, this program reads {FORMAT_VERSION}")
-    border_group = reader.group(root, "border")
-    blocks_group = reader.group(border_group, "blocks")
-    strange = sorted(set(blocks_group.groups) - set(charts.NAMES))
+def _options(attributes: dict[str, Any], refuse: Callable[[str], Exception]) -> Any:
+    """What the table was built with, parsed."""
+    try:
+        return json.loads(attributes.get("builder_options", "{}"))
+    except (ValueError, TypeError, RecursionError) as error:
+        raise refuse(f"attribute 'builder_options' is no JSON ({error})") from None
+
+
+def _read(root: hdf5.Group, reader: _Reader) -> Table:
+    attributes = reader.attributes(root)
+    border_group = root.group("border")
+    blocks_group = border_group.group("blocks")
+    strange = sorted(set(blocks_group.groups()) - set(charts.NAMES))
     if strange:
         raise reader.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
     border, blocks = [], []
     for name, axis, _ in charts.BORDER_PIECES:
-        group = reader.group(border_group, name)
+        group = border_group.group(name)
         reader.same(group, "range", [axis.low, axis.high])
         at = reader.nodes(group, axis)
         (error,) = reader.errors(group, "max_rel_error")
         (cells,) = reader.cells(group, 1)
         border.append(BorderPiece(at, reader.array(group, "value", at.shape), cells, float(error[0])))
     for chart in charts.CHARTS:
-        group = reader.group(blocks_group, chart.name)
+        group = blocks_group.group(chart.name)
         for name, wanted in _geometry(chart).items():
             reader.same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
         a, b = reader.nodes(group, chart.a), reader.nodes(group, chart.b)
@@ -318,21 +333,25 @@ def _read(root: Any, reader: _Reader) -> Table:
                 reader.errors(group, "errors", count=9)[0].reshape(3, 3), *(float(error[0]) for error in largest),
             )
         )  # fmt: skip
-    plain = {name: reader.array(root, name) for name in _PLAIN}
+    plain: dict[str, Array] = {}
+    for name, (_, axes) in _PLAIN.items():  # the two axes come first
+        plain[name] = reader.array(root, name, tuple(plain[axis].size for axis in axes) if axes else None)
+        if not axes and plain[name].ndim != 1:
+            raise reader.refuse(f"variable {name!r} in / is no axis")
     return Table(border=border, blocks=blocks, attributes=attributes, **plain)
 
 
 def parse_table(image: bytes, path: str | Path) -> Table:
     """Read and check the bytes of a table file; ``path`` names it in errors.  See :func:`read_table`."""
     path = Path(path)
+    reader = _Reader(path)
     try:
-        with _one_at_a_time, netCDF4.Dataset(path.name, "r", memory=image) as root:
-            table = _read(root, _Reader(path))
+        table = _read(hdf5.open_image(image, reader.refuse), reader)
         digest = _digest(table)
     except TableError:
         raise
-    except Exception as error:
-        raise TableError(path, f"not a readable netCDF-4 table ({error})") from error
+    except Exception as error:  # h5py raises nearly all that there is
+        raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
     if digest != table.attributes["content_sha256"]:
         raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
     return table
@@ -374,6 +393,6 @@ def json_attributes(table: Table) -> dict[str, object]:
     out: dict[str, object] = {}
     for key, value in table.attributes.items():
         out[key] = value.item() if isinstance(value, np.generic) else value
-    if isinstance(out.get("builder_options"), str):
-        out["builder_options"] = json.loads(str(out["builder_options"]))
+    if "builder_options" in out:
+        out["builder_options"] = _options(table.attributes, ValueError)
     return out

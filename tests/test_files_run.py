@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -315,24 +316,64 @@ def test_mixed_types_are_told_in_a_line(tmp_path, capsys):
     assert [row["x"] for row in read(tmp_path / "out.ndjson")] == [1, "a"]
 
 
+@pytest.mark.parametrize("part_rows", [100, 500])
+@pytest.mark.parametrize("stop", range(5))
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_a_run_that_is_stopped_between_naming_the_output_and_clearing_up_ends_well(tmp_path, table, monkeypatch, kind):
-    source, out = write(cases(100), tmp_path / f"cases.{kind}"), tmp_path / f"out.{kind}"
+def test_a_run_that_is_stopped_between_naming_the_output_and_clearing_up_ends_well(
+    tmp_path, table, monkeypatch, kind, stop, part_rows
+):
+    """In between a file after the other goes; whichever was the last to go, the same command goes on."""
+    source, out = write(cases(500), tmp_path / f"cases.{kind}"), tmp_path / f"out.{kind}"
+    removed = []
+
+    def unlink(path, missing_ok=False):
+        if out.exists():
+            removed.append(path)
+            if len(removed) > stop:
+                raise KeyboardInterrupt
+        os.unlink(path) if path.exists() or not missing_ok else None
+
     with monkeypatch.context() as patch:
-        patch.setattr(run.shutil, "rmtree", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
-        patch.setattr(run._Run, "begin", lambda self, force: _begin_without_clearing(self, force))
-        with pytest.raises(KeyboardInterrupt):
-            evaluate_files([source], out, table)
+        patch.setattr(run.Path, "unlink", unlink)
+        with suppress(KeyboardInterrupt):
+            evaluate_files([source], out, table, part_rows=part_rows)
+    if len(removed) <= stop:
+        return  # one part only: done before it could be stopped there
     before = out.read_bytes()
-    assert evaluate_files([source], out, table).resumed == 100
+    assert evaluate_files([source], out, table, part_rows=part_rows).rows == 500
     assert out.read_bytes() == before
     assert left(tmp_path) == [source.name, out.name]
 
 
-def _begin_without_clearing(self, force):
-    assert not force
-    self.parts.mkdir()
-    (self.parts / "plan.json").write_text(json.dumps(self.plan))
+@pytest.mark.parametrize("left_over", [[], [".plan.json.abc.growing"]])
+def test_a_run_that_is_killed_before_it_has_a_plan_ends_well(tmp_path, table, left_over):
+    source = write(cases(10), tmp_path / "cases.csv")
+    (tmp_path / "out.csv.parts").mkdir()
+    for name in left_over:
+        (tmp_path / "out.csv.parts" / name).touch()
+    assert evaluate_files([source], tmp_path / "out.csv", table).rows == 10
+    assert left(tmp_path) == ["cases.csv", "out.csv"]
+
+
+def test_two_runs_to_one_output_do_not_meet(tmp_path, capsys, table):
+    source = write(cases(3000), tmp_path / "cases.csv")
+    said = []
+
+    def other(*_):
+        if not said:
+            said.append(ran(capsys, 1, source, "-o", tmp_path / "out.csv", "--force"))
+
+    assert evaluate_files([source], tmp_path / "out.csv", table, progress=other).rows == 3000
+    assert "out.csv.parts: another process is at work here; wait for it, or stop it" in said[0]
+    assert left(tmp_path) == ["cases.csv", "out.csv"]
+
+
+def test_a_folder_of_parts_that_is_somebody_elses_is_left_alone(tmp_path, capsys):
+    source = write(cases(10), tmp_path / "cases.csv")
+    (tmp_path / "out.csv.parts").mkdir()
+    (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
+    assert "--force drops them" in ran(capsys, 1, source, "-o", tmp_path / "out.csv")
+    assert (tmp_path / "out.csv.parts" / "precious.txt").read_text() == "mine"
 
 
 # --- going on -----------------------------------------------------------------------------------------

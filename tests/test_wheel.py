@@ -15,7 +15,7 @@ from mumacro import Surrogate
 pytestmark = pytest.mark.slow
 
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
-CORE = ("numpy", "numba", "llvmlite", "netCDF4", "cftime", "certifi")
+CORE = ("numpy", "numba", "llvmlite", "h5py")
 
 
 class Installed:

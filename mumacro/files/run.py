@@ -11,7 +11,6 @@ import csv
 import io
 import json
 import os
-import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -24,9 +23,10 @@ from mumacro.files.answering import added_fields, answer_columns, numbers
 from mumacro.files.blocks import Block, Fault, Place
 from mumacro.files.columns import FilesError, find_columns
 from mumacro.files.reading import FORMATS, Source, format_of, open_source
-from mumacro.files.writing import join_parts, open_part, put, sync_folder
+from mumacro.files.writing import join_parts, open_part
 from mumacro.surrogate import Surrogate
 from mumacro.version import __version__
+from mumacro.writing import alone_in, sync_folder, write_whole
 
 __all__ = ["PART_ROWS", "Summary", "evaluate_files", "find_files"]
 
@@ -138,10 +138,13 @@ def evaluate_files(
     ------
     FilesError
         An input or output that cannot be used; names it, with the remedy.
+    BusyError
+        Another run writes the same output.
     """
     run = _Run(given, out, surrogate, rigid, include, on_error, part_rows)
-    run.begin(force)
-    return run.finish(*run.answer(progress))
+    with alone_in(run.parts):
+        run.begin(force)
+        return run.finish(*run.answer(progress))
 
 
 class _Run:
@@ -202,20 +205,23 @@ class _Run:
 
     def begin(self, force: bool) -> None:
         """Take up the parts that a run like this one left, or make room for them."""
-        plan = self.parts / "plan.json"
-        mine = plan.is_file() and plan.read_text("utf-8") == json.dumps(self.plan)
-        if not mine:
-            if self.parts.exists() and not force:
+        plan = json.dumps(self.plan).encode()
+        kept = self.parts / "plan.json"
+        if not (kept.is_file() and kept.read_bytes() == plan):
+            if not force and any(path.name[0] != "." for path in self.parts.iterdir()):
                 raise FilesError(
                     f"{self.parts}: holds parts of another run (input, options or table differ); --force drops them"
                 )
             if not force:
                 self._check_free()
-            shutil.rmtree(self.parts, ignore_errors=True)
-            self.parts.mkdir()
-            growing = plan.with_suffix(".growing")
-            growing.write_text(json.dumps(self.plan), "utf-8")
-            put(growing, plan)
+            self._clear()
+            write_whole(kept, plan)
+
+    def _clear(self) -> None:
+        """Empty the folder of parts: the last note first, then parts, then the plan; who is stopped here can go on."""
+        found = sorted(self.parts.iterdir(), reverse=True)
+        for path in sorted(found, key=lambda path: (path.name == "plan.json", path.suffix != ".json")):
+            path.unlink()
 
     def _check_free(self) -> None:
         taken = [*self.out.glob("part-*")] if self.folder else [self.out] * self.out.exists()
@@ -285,9 +291,7 @@ class _Run:
             part.discard()
             raise
         for suffix, text in ((".rejects.csv", rejects.getvalue()), (".json", json.dumps(vars(note)))):
-            growing = self._path(number, f"{suffix}.{os.getpid()}.growing")
-            growing.write_text(text, "utf-8", newline="")
-            put(growing, self._path(number, suffix))
+            write_whole(self._path(number, suffix), text.encode())
         return note
 
     def _answered(self, block: Block) -> tuple[pa.RecordBatch, list[Fault]]:
@@ -345,7 +349,7 @@ class _Run:
                 sync_folder(self.out.parent)
         else:
             join_parts(parts, self.out, self.kind, self.packed, self.schema, self.header)
-        shutil.rmtree(self.parts)
+        self._clear()
         rows = sum(note.rows for note in notes)
         return Summary(rows, rows - rejected, rejected, self.out, self.rejects if rejected else None, resumed)
 

@@ -18,8 +18,9 @@ import pyarrow.parquet
 
 from mumacro.files.blocks import one_line
 from mumacro.files.columns import FilesError
+from mumacro.writing import put
 
-__all__ = ["Part", "csv_text", "join_parts", "json_text", "open_part", "sync_folder"]
+__all__ = ["Part", "csv_text", "join_parts", "json_text", "open_part"]
 
 ROWS = 262_144  # of a row group that is written
 
@@ -134,25 +135,6 @@ class Part(ABC):
         with suppress(OSError, pa.ArrowException):
             self.close()
         self.growing.unlink(missing_ok=True)
-
-
-def put(growing: Path, path: Path) -> None:
-    """Bring a whole file to the disk, then give it its name."""
-    with growing.open("r+b") as stream:
-        os.fsync(stream.fileno())
-    os.replace(growing, path)
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk, where the system can."""
-    if os.name == "nt":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 class _TextPart(Part):

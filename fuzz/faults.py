@@ -1,0 +1,383 @@
+"""Faults of disks, permissions, processes and clocks: nothing is lost, and the same command goes on.
+
+    python fuzz/faults.py [--only killed_builds] [--share 0.1] [--write]
+
+Small disks are mounted as tmpfs and permissions are taken away from another user, both of which only root may do; what
+cannot be tried here is said to be so.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import reporting
+from measuring import markdown
+
+SMALLEST = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
+TOLERANCE = "1e-2"
+NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
+AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a user that owns nothing
+
+
+class NotTriedError(Exception):
+    """This machine or user may not do what the trial needs."""
+
+
+# --- what the trials share ----------------------------------------------------------------------------
+
+
+def run(*words: object, nobody: bool = False, code: int | None = 0, **environment: str) -> str:
+    """A command of the project; what it says in the end, in one line when it fails."""
+    variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    done = subprocess.run(
+        [*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words)], cwd=reporting.ROOT, env=variables,
+        capture_output=True, text=True, timeout=1800, check=False,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr, done.stderr
+    assert code is None or done.returncode == code, f"exit code {done.returncode}: {done.stderr or done.stdout}"
+    lines = (done.stderr if done.returncode in (1, 2) else done.stdout).strip().splitlines()
+    return lines[-1] if lines else ""
+
+
+def build(out: Path) -> list[str]:
+    """The words that build a rough table."""
+    return ["-m", "builder", "build", "--tolerance", TOLERANCE, "--out", str(out)]
+
+
+def checksum(path: Path) -> str:
+    """Of the numbers in a table."""
+    from mumacro import Surrogate
+
+    return Surrogate.open(path).checksum
+
+
+def cases(path: Path, n: int) -> Path:
+    """A CSV file of random cases."""
+    rng = np.random.default_rng(1)
+    rows = 10.0 ** rng.uniform([-2, -1, 4, -8, 2, -5], [0, 3, 8, -4, 6, 1], (n, 6))
+    path.write_text("\n".join([",".join(NAMES), *(",".join(map(repr, row)) for row in rows.tolist()), ""]))
+    return path
+
+
+@contextmanager
+def small_disk(folder: Path, size: str) -> Iterator[Path]:
+    """A file system in memory, which is soon full."""
+    disk = folder / "disk"
+    disk.mkdir()
+    mount = shutil.which("mount")
+    words = [str(mount), "-t", "tmpfs", "-o", f"size={size},mode=0777", "tmpfs", str(disk)]
+    if mount is None or subprocess.run(words, capture_output=True, check=False).returncode:
+        raise NotTriedError("no small file system may be mounted here")
+    try:
+        yield disk
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+def closed(folder: Path) -> Path:
+    """A folder that another user may read and not write."""
+    if not hasattr(os, "getuid") or os.getuid() != 0:
+        raise NotTriedError("only root may run a trial as another user")
+    folder.chmod(0o755)
+    try:
+        words = [*AS_NOBODY, sys.executable, "-c", "import numpy"]
+        subprocess.run(words, cwd=folder, check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        raise NotTriedError("another user may not run this Python") from None
+    made = folder / "closed"
+    made.mkdir(mode=0o755)
+    return made
+
+
+def left(folder: Path) -> list[str]:
+    """The names of all files in a folder, hidden ones too."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+# --- full disks and lost permissions ------------------------------------------------------------------
+
+
+def full_disk_in_a_build(folder: Path) -> str:
+    with small_disk(folder, "96k") as disk:
+        said = run(*build(disk / "rough.nc"), code=1)
+        assert "No space left on device; give the same command again" in said, said
+        assert not [name for name in left(disk) if name.endswith(".growing")], left(disk)
+        kept = len(left(disk))
+        subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
+        run(*build(disk / "rough.nc"))
+        assert left(disk) == ["rough.nc"]
+        run(*build(folder / "whole.nc"))
+        assert checksum(disk / "rough.nc") == checksum(folder / "whole.nc")
+    return f"one line; {kept} finished parts kept; with more space the same command gives the same table"
+
+
+def full_disk_in_writing_a_table(folder: Path) -> str:
+    from mumacro import TableError
+    from mumacro.table import read_table, write_table
+
+    with small_disk(folder, "64k") as disk:
+        (disk / "before.txt").write_text("kept")
+        try:
+            write_table(read_table(SMALLEST), disk / "new.nc")
+        except TableError as error:
+            assert error.reason == "cannot be written: No space left on device", error.reason
+        else:
+            raise AssertionError("a table of 126 kB was written to a disk of 64 kB")
+        assert left(disk) == ["before.txt"]
+    return "TableError; nothing left behind"
+
+
+def full_disk_in_eval(folder: Path, n: int = 20_000) -> str:
+    source = cases(folder / "cases.csv", n)
+    for kind in ("csv", "ndjson", "parquet"):
+        run("-m", "mumacro", "eval", source, "-o", folder / f"whole.{kind}", "--part-rows", n // 4)
+    for kind in ("csv", "ndjson", "parquet"):
+        with small_disk(folder, f"{n * 60 >> 10}k") as disk:
+            words = ("-m", "mumacro", "eval", source, "-o", disk / f"out.{kind}", "--part-rows", n // 4)
+            said = run(*words, code=1)
+            assert "No space left on device" in said, said
+            assert not [name for name in left(disk) if name.endswith(".growing")], left(disk)
+            assert not (disk / f"out.{kind}").exists()
+            subprocess.run(["mount", "-o", f"remount,size={n >> 5}m", str(disk)], check=True)
+            run(*words)
+            assert (disk / f"out.{kind}").read_bytes() == (folder / f"whole.{kind}").read_bytes()
+            assert left(disk) == [f"out.{kind}"]
+        (folder / "disk").rmdir()
+    return "one line; with more space the same command goes on and gives the same bytes; CSV, NDJSON, Parquet"
+
+
+def lost_permission_in_a_build(folder: Path) -> str:
+    said = run(*build(closed(folder) / "rough.nc"), nobody=True, code=1)
+    assert "Permission denied" in said, said
+    assert left(folder / "closed") == []
+    return "one line; nothing left behind"
+
+
+def lost_permission_in_writing_a_table(folder: Path) -> str:
+    out = closed(folder) / "new.nc"
+    program = (
+        "import sys, mumacro\nfrom mumacro.table import read_table, write_table\ntable = read_table(sys.argv[1])\n"
+        "try:\n    write_table(table, sys.argv[2])\nexcept mumacro.TableError as error:\n    print(error.reason)"
+    )
+    said = run("-c", program, SMALLEST, out, nobody=True)
+    assert said == "cannot be written: Permission denied", said
+    assert left(folder / "closed") == []
+    return "TableError; nothing left behind"
+
+
+def lost_permission_in_eval(folder: Path) -> str:
+    source = cases(folder / "cases.csv", 100)
+    said = run("-m", "mumacro", "eval", source, "-o", closed(folder) / "out.csv", nobody=True, code=1)
+    assert "Permission denied" in said, said
+    assert left(folder / "closed") == []
+    return "one line; nothing left behind"
+
+
+# --- processes ----------------------------------------------------------------------------------------
+
+
+def two_builds_to_one_output(folder: Path) -> str:
+    out = folder / "rough.nc"
+    variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT)}
+    words = [sys.executable, *build(out)]
+    first = subprocess.Popen(words, cwd=reporting.ROOT, env=variables, stdout=-3, stderr=-3)
+    while not list(folder.glob("rough.nc.checkpoint/*")):
+        assert first.poll() is None
+        time.sleep(0.01)
+    said = run(*build(out), code=1)
+    assert "another process is at work here" in said, said
+    assert first.wait(timeout=1800) == 0
+    run(*build(folder / "whole.nc"))
+    assert checksum(out) == checksum(folder / "whole.nc")
+    assert left(folder) == ["rough.nc", "whole.nc"]
+    return "the second is refused in one line, the first ends well"
+
+
+def killed_eval(folder: Path, n: int = 100_000, kills: int = 10) -> str:
+    source = cases(folder / "cases.csv", n)
+    for kind in ("csv", "parquet"):
+        words = ["-m", "mumacro", "eval", str(source), "--part-rows", str(n // 10), "-o"]
+        run(*words, folder / f"whole.{kind}")
+        chance, done = random.Random(1), 0  # noqa: S311
+        variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT)}
+        while done < kills:
+            command = [sys.executable, *words, str(folder / f"out.{kind}")]
+            process = subprocess.Popen(command, cwd=reporting.ROOT, env=variables, stdout=-3, stderr=-3)
+            before = len(list(folder.glob(f"out.{kind}.parts/*")))
+            while process.poll() is None and len(list(folder.glob(f"out.{kind}.parts/*"))) == before:
+                time.sleep(0.002)
+            time.sleep(chance.uniform(0.0, 0.03))
+            process.kill()
+            process.wait()
+            done += 1
+            if (folder / f"out.{kind}").exists():
+                break
+        run(*words, folder / f"out.{kind}", code=None)
+        assert (folder / f"out.{kind}").read_bytes() == (folder / f"whole.{kind}").read_bytes()
+        assert not list(folder.glob("*.parts"))
+    return f"killed up to {kills} times each, then the same command: the same bytes; CSV, Parquet"
+
+
+# --- kernel cache, home, clock ------------------------------------------------------------------------
+
+ASK = ("-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01", "--json", "--table", "1e-4")
+
+
+def damaged_kernels(folder: Path) -> str:
+    kernels = folder / "kernels"
+    sound = run(*ASK, NUMBA_CACHE_DIR=str(kernels))
+    files = sorted(kernels.rglob("*.kernel"))
+    assert files
+    for i, path in enumerate(files):
+        whole = path.read_bytes()
+        damaged = (b"", whole[: len(whole) // 2], whole[:-1], whole[:40] + bytes([whole[40] ^ 4]) + whole[41:])
+        path.write_bytes(damaged[i % len(damaged)])
+    assert run(*ASK, NUMBA_CACHE_DIR=str(kernels)) == sound
+    sizes = {path: path.stat().st_size for path in files}
+    assert all(sizes.values())
+    stamps = {path: path.stat().st_mtime_ns for path in files}
+    assert run(*ASK, NUMBA_CACHE_DIR=str(kernels)) == sound
+    assert stamps == {path: path.stat().st_mtime_ns for path in files}  # mended: nothing was compiled again
+    return f"{len(files)} files empty, cut or with a flipped bit: the same answer, and mended"
+
+
+def kernels_written_by_several(folder: Path, processes: int = 4) -> str:
+    variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT), "NUMBA_CACHE_DIR": str(folder / "kernels")}
+    started = [
+        subprocess.Popen([sys.executable, *ASK], cwd=reporting.ROOT, env=variables, stdout=-1, stderr=-3)
+        for _ in range(processes)
+    ]
+    said = {process.communicate(timeout=1800)[0] for process in started}
+    assert len(said) == 1, said
+    assert not [name for name in left(folder) if not name.endswith(".kernel")], left(folder)
+    return f"{processes} processes with one empty folder: one answer, whole files"
+
+
+def kernels_that_cannot_be_kept(folder: Path) -> str:
+    kernels = closed(folder)
+    sound = run(*ASK)
+    assert run(*ASK, nobody=True, NUMBA_CACHE_DIR=str(kernels)) == sound
+    assert left(kernels) == []
+    return "the same answer, compiled for this process"
+
+
+def no_home(folder: Path) -> str:
+    if os.getuid() != 0:
+        raise NotTriedError("only root may run a trial as a user without a home")
+    (folder / "tmp").mkdir(mode=0o777)
+    (folder / "tmp").chmod(0o777)
+    closed(folder)
+    variables = dict.fromkeys(("HOME", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME"), "")
+    for home in ("", "/nonexistent"):
+        said = run(*ASK, nobody=True, **{**variables, "HOME": home, "TMPDIR": str(folder / "tmp")})
+        assert said == run(*ASK)
+    assert left(folder / "tmp") == []
+    return "the same answer; no kernel in a folder of temporary files"
+
+
+def clock_steps(folder: Path) -> str:
+    """Every reading of the clock is up to ten years from the last; files of the next century and of 1970."""
+    (folder / "stepping").mkdir()
+    (folder / "stepping" / "sitecustomize.py").write_text(
+        "import random, time\nreal, chance = time.time, random.Random(1)\n"
+        "time.time = lambda: real() + chance.uniform(-3e8, 3e8)\n"
+    )
+    source = cases(folder / "cases.csv", 3000)
+    path = os.pathsep.join([str(folder / "stepping"), str(reporting.ROOT)])
+    run("-m", "mumacro", "eval", source, "-o", folder / "whole.csv", "--part-rows", 500)
+    for stamp in (0, 4_100_000_000):
+        os.utime(source, (stamp, stamp))
+        words = ("-m", "mumacro", "eval", source, "-o", folder / "out.csv", "--part-rows", 500, "--force")
+        run(*words, PYTHONPATH=path)
+        assert (folder / "out.csv").read_bytes() == (folder / "whole.csv").read_bytes()
+    return "eval: the same bytes"
+
+
+FAULTS: dict[str, Callable[..., str]] = {
+    "disk full while a build runs": full_disk_in_a_build,
+    "disk full while a table is written": full_disk_in_writing_a_table,
+    "disk full while eval runs": full_disk_in_eval,
+    "no permission to write a build": lost_permission_in_a_build,
+    "no permission to write a table": lost_permission_in_writing_a_table,
+    "no permission to write eval's output": lost_permission_in_eval,
+    "two builds to one output": two_builds_to_one_output,
+    "SIGKILL of eval": killed_eval,
+    "damaged kernel cache": damaged_kernels,
+    "kernel cache written by several processes": kernels_written_by_several,
+    "kernel cache that cannot be written": kernels_that_cannot_be_kept,
+    "no home, and an unwritable one": no_home,
+    "a clock that steps": clock_steps,
+}
+
+
+def tried(fault: Callable[..., Any]) -> tuple[str, str]:
+    """Whether the project held, and what was seen."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            return "held", fault(Path(folder))
+        except NotTriedError as reason:
+            return "not tried", str(reason)
+        except AssertionError as error:
+            return "FAILED", " ".join(str(error).split())[:200]
+
+
+def faults(_share: float) -> str:
+    """Every fault once."""
+    started = time.perf_counter()
+    rows = [[name, *tried(fault)] for name, fault in FAULTS.items()]
+    return f"{markdown(('fault', 'it', 'what was seen'), rows, 3)}\n\n{reporting.took(started)}"
+
+
+def killed_builds(share: float, total: int = 20) -> str:
+    """Builds that are killed at random moments and started again."""
+    started = time.perf_counter()
+    total = max(1, round(total * share))
+    chance = random.Random(7)  # noqa: S311
+    same = parts = late = 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        begun = time.perf_counter()
+        run(*build(folder / "whole.nc"))
+        whole = time.perf_counter() - begun
+        expected = checksum(folder / "whole.nc")
+        for i in range(total):
+            out = folder / f"{i}.nc"
+            variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT)}
+            process = subprocess.Popen(
+                [sys.executable, *build(out)], cwd=reporting.ROOT, env=variables, stdout=-3, stderr=-3
+            )
+            try:
+                process.wait(timeout=chance.uniform(0.0, whole))
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGKILL)
+                process.wait()
+            late += out.exists()
+            parts += bool(list(folder.glob(f"{i}.nc.checkpoint/*.npy")))
+            run(*build(out))
+            same += checksum(out) == expected
+        names = sorted(["whole.nc", *(f"{i}.nc" for i in range(total))])
+        rest = [name for name in left(folder) if name not in names]
+    rows = [["builds that were killed at a random moment", f"{total}"],
+            ["of them with finished parts to go on from", f"{parts}"],
+            ["of them already done when they should be killed", f"{late}"],
+            ["the same command again gave the data of a build that nobody disturbs", f"{same}"],
+            ["files left behind", f"{len(rest)}"]]  # fmt: skip
+    return f"{markdown(('', 'count'), rows)}\n\n{reporting.took(started)}"
+
+
+SECTIONS = {"faults": faults, "killed_builds": killed_builds}
+
+if __name__ == "__main__":
+    reporting.report(__doc__ or "", SECTIONS)

@@ -1,0 +1,187 @@
+"""Tables from strangers: truncated, flipped and hostile files are refused, or answer as the sound one.
+
+    python fuzz/tables.py [--only damaged_tables] [--share 0.01] [--write]
+
+Files are opened by other processes (``python fuzz/tables.py open``), which may take 256 MB more than they have after
+opening the sound table; one that dies is a finding.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import random
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import reporting
+from hostile_tables import HOSTILE
+from measuring import markdown
+
+SMALLEST = min((reporting.ROOT / "tables").glob("*.nc"), key=lambda path: path.stat().st_size)
+STEP = 256  # bytes between truncations
+MORE = 256 * 2**20  # bytes that opening a file may take
+PATIENCE = 3600.0  # seconds for one share of work
+
+HEAD = ("the smallest table", "files", "refused", "same answers", "same answers, other texts",
+        "other answers, or a crash", "slowest [s]", "memory [MB]")  # fmt: skip
+CHANGES = {"cut": f"cut at every {STEP} bytes", "flip": "every byte in turn, some of its bits flipped"}
+
+REFUSED, SAME, TEXTS, DIFFERS, ESCAPED, DIED = "refused", "same", "texts", "differs", "escaped", "died"
+
+
+class Outcome(NamedTuple):
+    """What became of a file: one of the words above, what was said, seconds, memory [MB] beyond the sound table's."""
+
+    what: str
+    said: str
+    seconds: float
+    megabytes: float
+
+
+def work(start: int, count: int, change: str, stride: int = 1) -> Iterator[tuple[int, bytes]]:
+    """Changed copies of the smallest table: at every ``stride``-th of ``count`` offsets from ``start``."""
+    whole = SMALLEST.read_bytes()
+    for offset in range(start, min(start + count, len(whole)), stride):
+        if change == "cut":
+            if offset % STEP == 0:
+                yield offset, whole[:offset]
+            continue
+        changed = bytearray(whole)
+        changed[offset] ^= random.Random(offset).randrange(1, 256)  # noqa: S311
+        yield offset, bytes(changed)
+
+
+def in_other_process(*arguments: str, timeout: float = PATIENCE) -> tuple[list[Outcome], int]:
+    """What the other process found, one outcome a line, and its exit code."""
+    command = [sys.executable, __file__, "open", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+    return [Outcome(*json.loads(line)) for line in done.stdout.splitlines()], done.returncode
+
+
+def ask(table: Any) -> None:
+    """Ask a table for all that it has, near and far: it may answer as it likes, but must not crash."""
+    import numpy as np
+
+    v, y = np.meshgrid(*2 * [np.concatenate([[0.0, 5e-324, 1e300, np.inf], np.geomspace(1e-6, 1e6, 60)])])
+    for quantity in ("mu_ratio", "power", "stick_fraction"):
+        table.slopes(v, y, quantity, bounds=True)
+    table.evaluate(mu0=0.3, Fz=10.0, k=1e6, y0=1e-5 * y, omega=1e3, v0=1e-2 * v, gradient=True)
+    table.v_tilde_crit(y)
+
+
+@functools.cache
+def sound() -> Any:
+    """The smallest table, with all kernels loaded."""
+    from mumacro import Surrogate
+
+    opened = Surrogate.open(SMALLEST)
+    ask(opened)
+    return opened
+
+
+def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
+    """Open one file; ``before`` is the memory [kB] that was taken before."""
+    from mumacro import Surrogate, TableError
+    from mumacro.table import parse_table
+
+    expected = sound()
+    started = time.perf_counter()
+    try:
+        table = parse_table(image, path)
+        what, said = SAME, ""
+        if table.attributes["content_sha256"] != expected.checksum:
+            ask(Surrogate(table, path))
+            what = DIFFERS
+        elif table.attributes != expected.table.attributes:
+            names = [n for n, value in expected.table.attributes.items() if table.attributes.get(n) != value]
+            what, said = TEXTS, ", ".join(names)
+    except TableError as error:
+        what, said = REFUSED, error.reason
+    except BaseException as error:  # anything else is a finding
+        what, said = ESCAPED, f"{type(error).__name__}: {error}"
+    more = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    return Outcome(what, said[:300], time.perf_counter() - started, more / 1024.0)
+
+
+def open_all(arguments: Sequence[str]) -> None:
+    """Here the files are opened, under a memory limit."""
+    sound()
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (size + MORE, size + MORE))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    files: Any = ((path, Path(path).read_bytes()) for path in arguments)
+    if arguments[0] in CHANGES:
+        files = work(*map(int, arguments[1:3]), arguments[0], int(arguments[3]))
+    for name, image in files:
+        print(json.dumps(outcome(image, Path(str(name)), before)), flush=True)
+
+
+def damaged(share: float, change: str) -> list[Outcome]:
+    """Every copy of the smallest table with one change; where ``share`` is less than 1, bytes are left out."""
+    total, size = SMALLEST.stat().st_size, 4096
+    starts = list(range(0, total, size))
+    stride = 1 if change == "cut" else round(1.0 / share)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        parts = list(pool.map(lambda start: in_other_process(change, str(start), str(size), str(stride)), starts))
+    found = []
+    for outcomes, code in parts:
+        found += outcomes
+        if code:
+            found.append(Outcome(DIED, f"exit code {code}", 0.0, 0.0))
+    return found
+
+
+def row(name: str, found: Sequence[Outcome]) -> list[str]:
+    """One line of the table."""
+    count = Counter(outcome.what for outcome in found)
+    bad = count[DIFFERS] + count[ESCAPED] + count[DIED]
+    worst = max(outcome.seconds for outcome in found), max(outcome.megabytes for outcome in found)
+    numbers = [len(found), count[REFUSED], count[SAME], count[TEXTS], bad]
+    return [name, *(f"{n:,}" for n in numbers), f"{worst[0]:.2f}", f"{worst[1]:.0f}"]
+
+
+def damaged_tables(share: float) -> str:
+    """Truncations and flipped bytes."""
+    started = time.perf_counter()
+    rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
+    left_out = "" if share == 1.0 else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
+    return f"{markdown(HEAD, rows)}\n\n{left_out}{reporting.took(started, 'h5py')}"
+
+
+def hostile_tables(_share: float) -> str:
+    """Crafted files, each opened by a process of its own."""
+    started = time.perf_counter()
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, make in HOSTILE.items():
+            path = Path(folder) / "hostile.nc"
+            path.unlink(missing_ok=True)
+            make(path)
+            outcomes, code = in_other_process(str(path))
+            found = outcomes[0] if outcomes and not code else Outcome(DIED, f"exit code {code}", 0.0, 0.0)
+            said = found.said.replace(str(folder), "").replace("|", "/")
+            size = f"{path.stat().st_size / 1e3:,.0f}"
+            cells = [name, found.what, said[:90], size, f"{found.seconds:.2f}", f"{found.megabytes:.0f}"]
+            rows.append([*cells[:2], cells[2], *cells[3:]])
+    head = ("what is in the file", "it is", "because", "size [kB]", "seconds", "memory [MB]")
+    return f"{markdown(head, rows, 3)}\n\n{reporting.took(started, 'h5py')}"
+
+
+SECTIONS = {"damaged_tables": damaged_tables, "hostile_tables": hostile_tables}
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["open"]:
+        open_all(sys.argv[2:])
+    else:
+        reporting.report(__doc__ or "", SECTIONS)
