@@ -34,6 +34,16 @@ START_S = 180  # a first start compiles the kernels
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
+def load(name: str) -> ModuleType:
+    """A module of helpers beside this file; by its path, since tests are no package."""
+    spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The root of the source tree."""
@@ -229,6 +239,18 @@ def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
     return serve
 
 
+@pytest.fixture(scope="session")
+def open_page(live_server: LiveServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
+    """Opens the page in a headless Chromium (tests/browser.py), where there is one."""
+    module = load("browser")
+    try:
+        browser = module.start(tmp_path_factory.mktemp("browser"))
+    except LookupError as error:
+        pytest.skip(str(error))
+    yield module.Opened(browser, live_server.url)
+    browser.quit()
+
+
 # --- what the numerical tests share -------------------------------------------------------------------
 
 
@@ -268,27 +290,16 @@ def sweep() -> Iterator[Sweep]:
     with Sweep(workers=2) as started:
         yield started
 
-
-def _by_path(name: str) -> ModuleType:
-    """A module beside the tests; loaded by path, since tests are no package."""
-    spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="session")
 def naive() -> ModuleType:
     """The naive solver."""
-    return _by_path("naive")
+    return load("naive")
 
 
 @pytest.fixture(scope="session")
 def compilers() -> ModuleType:
     """The compilers that are installed."""
-    return _by_path("compilers")
+    return load("compilers")
 
 
 @pytest.fixture(scope="session")

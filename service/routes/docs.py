@@ -10,7 +10,10 @@ __all__ = ["ASSETS", "OPEN_PATHS", "router"]
 router = APIRouter(include_in_schema=False)
 
 _FOLDER = Path(__file__).resolve().parent.parent / "static" / "swagger-ui"
-ASSETS = {"swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css", "start.js": "text/javascript"}
+ASSETS = {
+    "swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css", "start.js": "text/javascript",
+    "docs.css": "text/css",
+}  # fmt: skip
 #: what needs no API key: the page and its parts; the description itself does
 OPEN_PATHS = frozenset({"/docs", *(f"/static/swagger-ui/{name}" for name in ASSETS)})
 
@@ -30,8 +33,11 @@ async def docs() -> Response:
 
 
 def _add_asset(name: str, media_type: str) -> None:
+    vendored = name.startswith("swagger-ui")  # changes with its version only
+    headers = {"Cache-Control": "public, max-age=86400" if vendored else "no-cache"}
+
     async def asset() -> Response:
-        return FileResponse(_FOLDER / name, media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})
+        return FileResponse(_FOLDER / name, media_type=media_type, headers=headers)
 
     router.add_api_route(f"/static/swagger-ui/{name}", asset, methods=["GET", "HEAD"], name=name)
 

@@ -9,9 +9,12 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
 from mumacro import Surrogate
+from mumacro.input_names import UNITS_OF
+from mumacro.law import APPROXIMATIONS, EQUATIONS
 
 from .. import __version__
 from ..formats.columns import dump
+from ..kernel import BOUNDS, POSITIVE, UNITS
 from ..tables import tables_of
 from . import etag_matches
 
@@ -20,10 +23,11 @@ __all__ = ["ASSETS", "OPEN_PATHS", "POLICY", "router"]
 router = APIRouter(include_in_schema=False)
 
 _FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
-_SCRIPTS = ("main.js", "api.js", "key.js", "fields.js", "plot.js", "map.js", "law.js")
-ASSETS = {**dict.fromkeys(_SCRIPTS, "text/javascript"), "page.css": "text/css"}
+_TYPES = {".js": "text/javascript", ".css": "text/css"}
+ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(_FOLDER.iterdir()) if path.suffix in _TYPES}
+_NAMES = "/static/page/names.json"
 #: what needs no API key: the page and its parts, but no number
-OPEN_PATHS = frozenset({"/", *(f"/static/page/{name}" for name in ASSETS)})
+OPEN_PATHS = frozenset({"/", _NAMES, *(f"/static/page/{name}" for name in ASSETS)})
 
 # No inline script, no inline style, nothing from another host.
 POLICY = (
@@ -54,6 +58,23 @@ def _add_asset(name: str, media_type: str) -> None:
 
 for _name, _media_type in ASSETS.items():
     _add_asset(_name, _media_type)
+
+
+@router.head(_NAMES)
+@router.get(_NAMES)
+async def names() -> Response:
+    """Return what the page must not say in words of its own: inputs, units, bounds, approximations."""
+    inputs = {
+        name: {
+            "unit": UNITS[name], "bound": BOUNDS[name], "positive": name in POSITIVE,
+            "units": {unit: [scale.times, scale.over] for unit, scale in known.items()},
+        }
+        for name, known in UNITS_OF.items()
+    }  # fmt: skip
+    numbers = {name: [number for number, found in EQUATIONS.items() if found == name] for name in APPROXIMATIONS}
+    about = {name: {"equations": numbers[name], "text": text} for name, text in APPROXIMATIONS.items()}
+    content = dump({"inputs": inputs, "approximations": about})
+    return Response(content, headers={"Cache-Control": "no-cache"}, media_type="application/json")
 
 
 @router.head("/static/page/map.json")

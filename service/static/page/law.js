@@ -1,37 +1,32 @@
-// The friction law: mu_macro over one input, with its border, its static value, approximations, the user's point.
+// The friction law: mu_macro over one input in the unit of its field, its border, static value, approximations, family, point.
 import { Axis, Plot, drawAxes, drawPoint, theme } from "./plot.js";
-import { SYMBOLS } from "./fields.js";
-
-export const APPROXIMATIONS = { static: ["static limit (16)", "a1"], creep: ["creep, first order", "a5"], small_amplitude: ["small amplitude (31)", "a2"], continuous: ["(31) and (35) in one", "a6"], rigid: ["rigid contact (35)", "a3"], corner: ["near ỹ = 1", "a4"] };
 
 export class LawPlot {
-  /** `pick(value)` when the user moves along the law, `hover(value, mu, regime)` or `hover(null)`. */
+  /** `pick(value)` when the user moves along the law, `hover(index)` of the value under the pointer, or `hover(null)`. */
   constructor(canvas, pick, hover) {
-    this.law = null;
-    this.point = null;
-    this.cursor = null;
+    Object.assign(this, { law: null, family: null, point: null, cursor: null });
     this.plot = new Plot(canvas, (...place) => this.draw(...place));
+    const read = (i) => {
+      this.cursor = i;
+      this.plot.redraw();
+      hover(i);
+    };
     this.plot.follow({
-      move: (x) => {
-        if (!this.law || x < this.x.from || x > this.x.to) return this.leave(hover);
-        const i = this.nearest(this.x.value(x));
-        this.cursor = i;
-        this.plot.redraw();
-        return hover(this.law.values[i], this.law.mu_macro[i], this.law.regime[i]);
-      },
-      pick: (x) => this.law && pick(this.x.clamp(this.x.value(x))),
-      leave: () => this.leave(hover),
+      move: (x) => this.x && read(x < this.x.from || x > this.x.to ? null : this.nearest(this.x.value(x))),
+      pick: (x) => this.x && pick(this.x.clamp(this.x.value(x))),
+      leave: () => read(null),
     });
   }
 
-  leave(hover) {
-    this.cursor = null;
+  /** `law`: { title, values, mu, still, regime, border, scale, top, approximations: [{ column, shade, dash }] }. */
+  show(law) {
+    Object.assign(this, { law, cursor: null });
     this.plot.redraw();
-    hover(null);
   }
 
-  show(law, scale, mu0) {
-    Object.assign(this, { law, scale, mu0, cursor: null });
+  /** `family`: { values, curves: [{ mu, shade }] }, or null. */
+  showFamily(family) {
+    this.family = family;
     this.plot.redraw();
   }
 
@@ -41,111 +36,86 @@ export class LawPlot {
   }
 
   nearest(value) {
-    const { values } = this.law;
-    const share = (x) => this.x.share(x);
-    let best = 0;
-    values.forEach((x, i) => {
-      if (Math.abs(share(x) - share(value)) < Math.abs(share(values[best]) - share(value))) best = i;
-    });
-    return best;
+    const away = this.law.values.map((x) => Math.abs(this.x.share(x) - this.x.share(value)));
+    return away.indexOf(Math.min(...away));
   }
 
   draw(context, width, height) {
     if (!this.law) return;
     const colour = theme();
-    const { values, mu_macro: mu, mu_static: still, regime, border, along, unit, approximations } = this.law;
-    const top = 1.06 * Math.max(...mu, this.mu0, 1e-300);
-    const bottom = height - 46;
-    this.x = new Axis(values[0], values.at(-1), this.scale === "log", 58, width - 14);
-    this.y = new Axis(0, top, false, bottom, 12);
+    const { values, mu, still, regime, border, title, scale, approximations } = this.law;
+    const curves = this.family?.curves ?? [];
+    const top = 1.06 * Math.max(this.law.top, 1e-300, ...mu, ...curves.flatMap((one) => one.mu));
+    const x = new Axis(values[0], values.at(-1), scale === "log", 58, width - 14);
+    const y = new Axis(0, top, false, height - 46, 12);
+    Object.assign(this, { x, y });
     context.fillStyle = colour("stick");
     regime.forEach((name, i) => {
       if (name === "continuous" || i + 1 >= values.length) return;
-      const [from, to] = [this.x.pixel(values[i]), this.x.pixel(values[i + 1])];
-      context.fillRect(from, this.y.to, to - from + 0.5, this.y.from - this.y.to);
+      const [from, to] = [x.pixel(values[i]), x.pixel(values[i + 1])];
+      context.fillRect(from, y.to, to - from + 0.5, y.from - y.to);
     });
-    drawAxes(context, this.x, this.y, `${SYMBOLS[along]}${unit === "-" ? "" : ` [${unit}]`}`, "µ macro");
-    const curve = (column, style, lineWidth, dash) => {
-      context.strokeStyle = style;
-      context.lineWidth = lineWidth;
-      context.setLineDash(dash);
-      context.beginPath();
-      let down = false;
-      column.forEach((value, i) => {
-        if (value === null || value > top) down = false;
-        else {
-          context[down ? "lineTo" : "moveTo"](this.x.pixel(values[i]), this.y.pixel(value));
-          down = true;
-        }
-      });
-      context.stroke();
-      context.setLineDash([]);
-    };
+    drawAxes(context, x, y, title, "µ macro");
+    context.save();
+    context.beginPath();
+    context.rect(x.from, y.to - 2, x.to - x.from, y.from - y.to + 3);
+    context.clip();
     context.lineJoin = "round";
-    if (approximations) {
-      for (const [name, [, shade]] of Object.entries(APPROXIMATIONS)) curve(approximations[name], colour(shade), 1.8, [7, 4]);
-    } else curve(still, colour("soft"), 1.2, [2, 4]);
-    curve(mu, colour("curve"), 2.6, []);
-    this.drawMarks(context, colour, border, still, approximations, width);
-    if (this.cursor !== null) {
-      const [x, y] = [this.x.pixel(values[this.cursor]), this.y.pixel(mu[this.cursor])];
-      context.strokeStyle = colour("soft");
-      context.lineWidth = 1;
-      context.beginPath();
-      context.moveTo(x, this.y.from);
-      context.lineTo(x, this.y.to);
-      context.stroke();
-      context.beginPath();
-      context.arc(x, y, 4, 0, 2 * Math.PI);
-      context.fillStyle = colour("curve");
-      context.fill();
+    if (!approximations.length) this.curve(context, values, still, colour("soft"), 1.2, [2, 4]);
+    for (const { column, shade, dash } of approximations) this.curve(context, values, column, shade(colour), 1.8, dash);
+    for (const one of curves) this.curve(context, this.family.values, one.mu, one.shade(colour), 1.8, []);
+    this.curve(context, values, mu, colour("curve"), 2.8, []);
+    context.restore();
+    this.drawMarks(context, colour, border, approximations.length ? null : still[0]);
+    if (this.cursor !== null) this.drawCursor(context, colour);
+    if (this.point) {
+      const [value, friction] = this.point;
+      drawPoint(context, x.pixel(x.clamp(value)), y.pixel(Math.min(friction, top)), [x.side(value), 0]);
     }
-    if (this.point) drawPoint(context, this.x.pixel(this.x.clamp(this.point[0])), this.y.pixel(Math.min(this.point[1], top)));
   }
 
-  drawMarks(context, colour, border, still, approximations) {
-    context.font = "12px system-ui, sans-serif";
-    context.textBaseline = "bottom";
+  curve(context, values, column, style, lineWidth, dash) {
+    Object.assign(context, { strokeStyle: style, lineWidth });
+    context.setLineDash(dash);
+    context.beginPath();
+    let down = false;
+    column.forEach((value, i) => {
+      if (value !== null) context[down ? "lineTo" : "moveTo"](this.x.pixel(values[i]), Math.max(this.y.pixel(value), -1e4));
+      down = value !== null;
+    });
+    context.stroke();
+    context.setLineDash([]);
+  }
+
+  drawCursor(context, colour) {
+    const { values, mu } = this.law;
+    const [at, up] = [this.x.pixel(values[this.cursor]), this.y.pixel(mu[this.cursor])];
+    Object.assign(context, { strokeStyle: colour("soft"), fillStyle: colour("curve"), lineWidth: 1 });
+    context.beginPath();
+    context.moveTo(at, this.y.from);
+    context.lineTo(at, this.y.to);
+    context.stroke();
+    context.beginPath();
+    context.arc(at, up, 4, 0, 2 * Math.PI);
+    context.fill();
+  }
+
+  drawMarks(context, colour, border, still) {
+    Object.assign(context, { font: "12px system-ui, sans-serif", textBaseline: "bottom", strokeStyle: colour("mark"), fillStyle: colour("mark"), lineWidth: 1.5 });
     for (const mark of border) {
-      const x = this.x.pixel(mark.value);
-      context.strokeStyle = colour("mark");
-      context.lineWidth = 1.5;
+      const at = this.x.pixel(mark);
       context.setLineDash([9, 6]);
       context.beginPath();
-      context.moveTo(x, this.y.from);
-      context.lineTo(x, this.y.to);
+      context.moveTo(at, this.y.from);
+      context.lineTo(at, this.y.to);
       context.stroke();
       context.setLineDash([]);
-      const right = x < this.x.to - 60;
-      context.fillStyle = colour("mark");
+      const right = at < this.x.to - 60;
       context.textAlign = right ? "left" : "right";
-      context.fillText("border", x + (right ? 5 : -5), this.y.from - 6);
+      context.fillText("border", at + (right ? 5 : -5), this.y.from - 6);
     }
-    context.textAlign = "left";
-    if (!approximations) {
-      context.fillStyle = colour("soft");
-      context.fillText("static", this.x.from + 5, this.y.pixel(still[0]) - 3);
-      return;
-    }
-    // only those that are meant to hold somewhere here
-    const shown = Object.entries(APPROXIMATIONS).filter(([name]) => approximations[name].some((value) => value !== null));
-    const x = this.x.to - 150;
-    context.globalAlpha = 0.85; // curves pass below it, and stay to be seen
-    context.fillStyle = colour("card");
-    context.fillRect(x - 38, this.y.from - 25 - 17 * shown.length, 188, 17 * shown.length + 7);
-    context.globalAlpha = 1;
-    shown.forEach(([, [label, shade]], i) => {
-      const y = this.y.from - 22 - 17 * (shown.length - 1 - i);
-      context.strokeStyle = colour(shade);
-      context.lineWidth = 1.8;
-      context.setLineDash([7, 4]);
-      context.beginPath();
-      context.moveTo(x - 32, y - 7);
-      context.lineTo(x - 6, y - 7);
-      context.stroke();
-      context.setLineDash([]);
-      context.fillStyle = colour("text");
-      context.fillText(label, x, y);
-    });
+    if (still === null) return;
+    Object.assign(context, { textAlign: "left", fillStyle: colour("soft") });
+    context.fillText("static", this.x.from + 5, this.y.pixel(still) - 3);
   }
 }

@@ -1,126 +1,92 @@
-// The map of mu~ over (v~, y~): colours, isolines, the border, the user's point.
-import { Axis, Plot, drawAxes, drawPoint } from "./plot.js";
+// The map of mu~ over (v~, y~): colours with their bar, isolines, the border, the user's point.
+import { Grid, colourOf } from "./grid.js";
+import { Axis, Plot, drawAxes, drawPoint, theme } from "./plot.js";
 
-const VIRIDIS = ["440154", "482878", "3e4989", "31688e", "26828e", "1f9e89", "35b779", "6ece58", "b5de2b", "fde725"].map((hex) =>
-  [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16)));
 const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
 // label -> where along v~ it stands, so that labels keep clear of each other and of the border
 const LABELS = new Map([[0.01, 0.45], [0.1, 0.55], [0.3, 0.66], [0.5, 0.75], [0.7, 0.83], [0.9, 0.9], [0.99, 0.94]]);
+const BAR = 66; // room on the right for the colour bar and its numbers
 
-const colourOf = (share) => {
-  const x = Math.min(Math.max(share, 0), 1) * (VIRIDIS.length - 1);
-  const i = Math.min(Math.floor(x), VIRIDIS.length - 2);
-  return VIRIDIS[i].map((low, channel) => Math.round(low + (x - i) * (VIRIDIS[i + 1][channel] - low)));
-};
+/** Where to mark a case: { place: [v~, y~], out: [-1 | 0 | 1, ...] }; null where nothing moves at all. */
+export function placed(x, y, v, a, slope) {
+  if (v === Infinity && a === Infinity) {
+    // rigid contact: the end of the line v~ / y~ = v0 / (y0 omega), where it leaves the frame
+    if (Number.isNaN(slope)) return null;
+    const top = slope * y.high;
+    return top <= x.high ? { place: [x.clamp(top), y.high], out: [x.side(top) || 1, 1] } : { place: [x.high, y.clamp(x.high / slope)], out: [1, y.side(x.high / slope) || 1] };
+  }
+  return { place: [x.clamp(v), y.clamp(a)], out: [x.side(v), y.side(a)] };
+}
 
 export class FrictionMap {
   /** `pick(vTilde, yTilde)` when the user moves the point, `hover(vTilde, yTilde, ratio)` or `hover(null)`. */
   constructor(canvas, pick, hover) {
-    this.data = null;
-    this.point = null;
+    Object.assign(this, { grid: null, point: null });
     this.plot = new Plot(canvas, (...place) => this.draw(...place));
     const at = (x, y) => [this.x.clamp(this.x.value(x)), this.y.clamp(this.y.value(y))];
     this.plot.follow({
       move: (x, y) => {
-        if (!this.data) return;
+        if (!this.x) return;
         const inside = x >= this.x.from && x <= this.x.to && y >= this.y.to && y <= this.y.from;
-        if (inside) hover(...at(x, y), this.ratio(...at(x, y)));
+        if (inside) hover(...at(x, y), this.grid.ratio(...at(x, y)));
         else hover(null);
       },
-      pick: (x, y) => this.data && pick(...at(x, y)),
+      pick: (x, y) => this.x && pick(...at(x, y)),
       leave: () => hover(null),
     });
   }
 
   show(data) {
-    this.data = data;
-    this.image = null;
-    this.lines = null;
+    Object.assign(this, { grid: new Grid(data), border: data.border, image: null, lines: null });
     this.plot.redraw();
   }
 
-  move(point) {
-    this.point = point;
+  /** Marks v~, y~; where both are infinite, the end of the line v~ / y~ = slope. */
+  move(v, y, slope) {
+    this.point = [v, y, slope];
     this.plot.redraw();
   }
 
-  /** Place in the grid, in cells. */
-  cell(v, y) {
-    const { v_tilde: a, y_tilde: b } = this.data;
-    const place = ({ start, stop, n }, value) =>
-      ((Math.log10(value) - Math.log10(start)) / (Math.log10(stop) - Math.log10(start))) * (n - 1);
-    return [place(a, v), place(b, y)];
-  }
-
-  node(i, j) {
-    return this.data.mu_ratio[j * this.data.v_tilde.n + i] * this.data.unit;
-  }
-
-  interpolate(x, y) {
-    const i = Math.min(Math.max(Math.floor(x), 0), this.data.v_tilde.n - 2);
-    const j = Math.min(Math.max(Math.floor(y), 0), this.data.y_tilde.n - 2);
-    const [s, t] = [x - i, y - j];
-    return (1 - t) * ((1 - s) * this.node(i, j) + s * this.node(i + 1, j)) + t * ((1 - s) * this.node(i, j + 1) + s * this.node(i + 1, j + 1));
-  }
-
-  ratio(v, y) {
-    return this.interpolate(...this.cell(v, y));
-  }
-
-  paint() {
-    const { v_tilde: { n }, y_tilde: { n: m } } = this.data;
-    const [width, height] = [4 * (n - 1), 4 * (m - 1)];
-    const image = new ImageData(width, height);
-    for (let row = 0; row < height; row += 1) {
-      for (let column = 0; column < width; column += 1) {
-        const rgb = colourOf(this.interpolate((column + 0.5) / 4, (height - row - 0.5) / 4));
-        image.data.set([...rgb, 255], 4 * (row * width + column));
-      }
-    }
-    const canvas = document.createElement("canvas");
-    Object.assign(canvas, { width, height });
-    canvas.getContext("2d").putImageData(image, 0, 0);
-    return canvas;
-  }
-
-  /** Segments [x1, y1, x2, y2] in cells where mu~ = level: marching squares, saddles by the mean. */
-  isoline(level) {
-    const { v_tilde: { n }, y_tilde: { n: m } } = this.data;
-    const found = [];
-    for (let j = 0; j < m - 1; j += 1) {
-      for (let i = 0; i < n - 1; i += 1) {
-        const corners = [this.node(i, j), this.node(i + 1, j), this.node(i + 1, j + 1), this.node(i, j + 1)].map((value) => value - level);
-        const places = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
-        const cuts = [];
-        for (let e = 0; e < 4; e += 1) {
-          const [a, b] = [corners[e], corners[(e + 1) % 4]];
-          if (a >= 0 === b >= 0) continue;
-          const t = a / (a - b);
-          const [p, q] = [places[e], places[(e + 1) % 4]];
-          cuts.push([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
-        }
-        for (let c = 0; c + 1 < cuts.length; c += 2) found.push([...cuts[c], ...cuts[c + 1]]);
-      }
-    }
-    return found;
+  /** [-1 | 0 | 1, ...]: on which sides of the map v~ and y~ are, 0 inside. */
+  outside(v, y) {
+    if (!this.grid) return [0, 0];
+    return [[this.grid.v_tilde, v], [this.grid.y_tilde, y]].map(([{ start, stop }, value]) => new Axis(start, stop, true, 0, 1).side(value));
   }
 
   draw(context, width, height) {
-    if (!this.data) return;
-    const { v_tilde: a, y_tilde: b, border } = this.data;
-    this.x = new Axis(a.start, a.stop, true, 58, width - 14);
-    this.y = new Axis(b.start, b.stop, true, height - 46, 10);
-    this.image ??= this.paint();
-    this.lines ??= LEVELS.map((level) => [level, this.isoline(level)]);
+    if (!this.grid) return;
+    const { v_tilde: a, y_tilde: b } = this.grid;
+    const { x, y } = Object.assign(this, { x: new Axis(a.start, a.stop, true, 58, width - BAR), y: new Axis(b.start, b.stop, true, height - 46, 10) });
+    this.image ??= this.grid.paint();
+    this.lines ??= LEVELS.map((level) => [level, this.grid.isoline(level)]);
     context.imageSmoothingEnabled = true;
-    context.drawImage(this.image, this.x.from, this.y.to, this.x.to - this.x.from, this.y.from - this.y.to);
-    drawAxes(context, this.x, this.y, "dimensionless speed ṽ", "dimensionless amplitude ỹ", false);
-    const px = (i) => this.x.from + (i / (a.n - 1)) * (this.x.to - this.x.from);
-    const py = (j) => this.y.from + (j / (b.n - 1)) * (this.y.to - this.y.from);
+    context.drawImage(this.image, x.from, y.to, x.to - x.from, y.from - y.to);
+    drawAxes(context, x, y, "dimensionless speed ṽ", "dimensionless amplitude ỹ", false);
+    this.drawBar(context, width);
+    const px = (i) => x.from + (i / (a.n - 1)) * (x.to - x.from);
+    const py = (j) => y.from + (j / (b.n - 1)) * (y.to - y.from);
     context.save();
     context.beginPath();
-    context.rect(this.x.from, this.y.to, this.x.to - this.x.from, this.y.from - this.y.to);
+    context.rect(x.from, y.to, x.to - x.from, y.from - y.to);
     context.clip();
+    this.drawLines(context, px, py);
+    this.drawLabels(context, px, py);
+    for (const [style, lineWidth, dash] of [["rgb(0 0 0 / 60%)", 4, []], ["#ffffff", 2, [9, 6]]]) {
+      Object.assign(context, { strokeStyle: style, lineWidth });
+      context.setLineDash(dash);
+      context.beginPath();
+      this.border.forEach(([v, amplitude], i) => context[i ? "lineTo" : "moveTo"](x.pixel(v), y.pixel(amplitude)));
+      context.stroke();
+    }
+    context.restore();
+    context.font = "600 13px system-ui, sans-serif";
+    this.tag(context, "stick–slip", x.from + 0.16 * (x.to - x.from), y.pixel(0.3));
+    this.tag(context, "continuous", x.from + 0.78 * (x.to - x.from), y.pixel(0.06));
+    const found = this.point && placed(x, y, ...this.point);
+    if (found) drawPoint(context, x.pixel(found.place[0]), y.pixel(found.place[1]), found.out);
+  }
+
+  drawLines(context, px, py) {
     context.lineWidth = 1;
     for (const [level, segments] of this.lines) {
       context.strokeStyle = level > 0.75 ? "rgb(0 0 0 / 45%)" : "rgb(255 255 255 / 55%)";
@@ -131,38 +97,42 @@ export class FrictionMap {
       }
       context.stroke();
     }
-    this.drawLabels(context, px, py);
-    for (const [style, lineWidth, dash] of [["rgb(0 0 0 / 60%)", 4, []], ["#ffffff", 2, [9, 6]]]) {
-      context.strokeStyle = style;
-      context.lineWidth = lineWidth;
-      context.setLineDash(dash);
-      context.beginPath();
-      border.forEach(([v, y], i) => context[i ? "lineTo" : "moveTo"](this.x.pixel(v), this.y.pixel(y)));
-      context.stroke();
-    }
-    context.restore();
-    context.font = "600 13px system-ui, sans-serif";
-    this.tag(context, "stick–slip", this.x.from + 0.16 * (this.x.to - this.x.from), this.y.pixel(0.3));
-    this.tag(context, "continuous", this.x.from + 0.78 * (this.x.to - this.x.from), this.y.pixel(0.06));
-    if (this.point) drawPoint(context, this.x.pixel(this.x.clamp(this.point[0])), this.y.pixel(this.y.clamp(this.point[1])));
   }
 
   drawLabels(context, px, py) {
     context.font = "11px system-ui, sans-serif";
     for (const [level, segments] of this.lines) {
       if (!LABELS.has(level) || !segments.length) continue;
-      const target = LABELS.get(level) * this.data.v_tilde.n;
+      const target = LABELS.get(level) * this.grid.v_tilde.n;
       const [x1, y1] = segments.reduce((best, segment) => (Math.abs(segment[0] - target) < Math.abs(best[0] - target) ? segment : best));
       if (py(y1) > this.y.to + 12 && py(y1) < this.y.from - 12) this.tag(context, String(level), px(x1), py(y1));
     }
   }
 
+  /** The colours from 0 to 1, right of the map. */
+  drawBar(context, width) {
+    const { from, to } = this.y;
+    const [left, thick] = [width - BAR + 14, 14];
+    const shades = context.createLinearGradient(0, from, 0, to);
+    for (let i = 0; i <= 18; i += 1) shades.addColorStop(i / 18, `rgb(${colourOf(i / 18).join(" ")})`);
+    context.fillStyle = shades;
+    context.fillRect(left, to, thick, from - to);
+    const colour = theme();
+    Object.assign(context, { fillStyle: colour("soft"), strokeStyle: colour("soft"), font: "12px system-ui, sans-serif", textAlign: "left", textBaseline: "middle", lineWidth: 1 });
+    for (let i = 0; i <= 5; i += 1) {
+      const y = Math.round(from + (i / 5) * (to - from)) + 0.5;
+      context.beginPath();
+      context.moveTo(left + thick, y);
+      context.lineTo(left + thick + 4, y);
+      context.stroke();
+      context.fillText(String(i / 5), left + thick + 7, y);
+    }
+    Object.assign(context, { fillStyle: colour("text"), textAlign: "center", textBaseline: "bottom" });
+    context.fillText("µ/µ₀", left + thick / 2 + 4, from + 40);
+  }
+
   tag(context, text, x, y) {
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.lineJoin = "round";
-    context.lineWidth = 4;
-    context.strokeStyle = "rgb(0 0 0 / 55%)";
+    Object.assign(context, { textAlign: "center", textBaseline: "middle", lineJoin: "round", lineWidth: 4, strokeStyle: "rgb(0 0 0 / 55%)" });
     context.strokeText(text, x, y);
     context.fillStyle = "#ffffff";
     context.fillText(text, x, y);

@@ -31,6 +31,13 @@ export class Axis {
     return this.log ? 10 ** x : x;
   }
 
+  /** -1 below the axis, 1 above it, 0 on it. */
+  side(value) {
+    const slack = 1e-9 * (this.b - this.a);
+    const place = this.log ? (value > 0 ? Math.log10(value) : -Infinity) : value;
+    return place < this.a - slack ? -1 : Number(place > this.b + slack);
+  }
+
   clamp(value) {
     return Math.min(Math.max(value, this.low), this.high);
   }
@@ -78,6 +85,29 @@ export class Plot {
       this.context.clearRect(0, 0, width, height);
       this.painter(this.context, width, height);
     });
+  }
+
+  /** The plot as a PNG of twice its size, on the card's colour, with rows of { text, style, dash } below it. */
+  picture(rows) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const whole = height + 20 * rows.length + 14;
+    const canvas = Object.assign(document.createElement("canvas"), { width: 2 * width, height: 2 * whole });
+    const context = canvas.getContext("2d");
+    const colour = theme();
+    context.setTransform(2, 0, 0, 2, 0, 0);
+    context.fillStyle = colour("card");
+    context.fillRect(0, 0, width, whole);
+    this.painter(context, width, height);
+    context.font = "13px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.textBaseline = "middle";
+    rows.forEach(({ text, style, dash }, i) => {
+      const y = height + 10 + 20 * i;
+      if (style) drawSample(context, 16, y, style, dash);
+      context.fillStyle = colour("text");
+      context.fillText(text, style ? 52 : 16, y, width - 60);
+    });
+    return new Promise((done) => { canvas.toBlob(done, "image/png"); });
   }
 
   /** Calls back with the pointer's place: move(x, y), pick(x, y) for click and drag, leave(). */
@@ -136,10 +166,27 @@ export function drawAxes(context, xAxis, yAxis, xTitle, yTitle, grid = true) {
   context.restore();
 }
 
-export function drawPoint(context, x, y) {
+/** A short line in a curve's style, for a legend. */
+export function drawSample(context, x, y, style, dash) {
+  Object.assign(context, { strokeStyle: style, lineWidth: 2.2 });
+  context.setLineDash(dash);
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(x + 28, y);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+/** The user's point; outside of the plot, an arrow on its frame that points to it (`out`: -1, 0 or 1 for x and for y). */
+export function drawPoint(context, x, y, out = [0, 0]) {
   const colour = theme();
   context.beginPath();
-  context.arc(x, y, 7, 0, 2 * Math.PI);
+  if (out[0] || out[1]) {
+    const turn = Math.atan2(-out[1], out[0]);
+    [[0, 0], [-18, -10], [-18, 10]].forEach(([a, b], i) =>
+      context[i ? "lineTo" : "moveTo"](x + a * Math.cos(turn) - b * Math.sin(turn), y + a * Math.sin(turn) + b * Math.cos(turn)));
+    context.closePath();
+  } else context.arc(x, y, 7, 0, 2 * Math.PI);
   context.fillStyle = colour("point");
   context.fill();
   context.lineWidth = 2.5;

@@ -1,32 +1,47 @@
 // The description is fetched here and not by the interface, so that a service with an API key can be asked for it.
-import { apiKey, setApiKey, withKey } from "../page/key.js";
+import { KeyWanted, Channel, get } from "../page/api.js";
+import { withKey } from "../page/key.js";
+import { keyTaken, onKey, wantKey } from "../page/keyform.js";
 
 const $ = (id) => document.getElementById(id);
 
-async function show() {
-  const response = await fetch("openapi.json", withKey());
-  if (response.status === 401) {
-    if (apiKey() !== null) $("key-status").textContent = "That is not the key of this service.";
-    setApiKey(null);
-    $("key-form").hidden = false;
-    $("key").focus();
-    return;
-  }
-  $("key-form").hidden = true;
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const follow = () => document.documentElement.classList.toggle("dark-mode", dark.matches);
+dark.addEventListener("change", follow);
+follow();
+
+// What the interface lacks for those who use a keyboard or listen: no link inside of a button, no text outside of
+// every landmark, a heading between that of the page (h1) and those of the groups (h3).
+const accessible = ({ React }) => ({
+  components: { DeepLink: ({ text }) => React.createElement("span", null, text) },
+  wrapComponents: {
+    InfoContainer: (Original) => (props) => React.createElement("section", { "aria-label": "About" },
+      React.createElement(Original, props), React.createElement("h2", { className: "wrapper" }, "Calls")),
+  },
+});
+
+function show(spec) {
+  $("status").textContent = "";
+  keyTaken();
   // validatorUrl: null keeps the page from sending the description to a public validator.
   window.SwaggerUIBundle({
-    spec: await response.json(),
+    spec,
     dom_id: "#swagger-ui",
     deepLinking: true,
     validatorUrl: null,
     presets: [window.SwaggerUIBundle.presets.apis],
+    plugins: [accessible],
     requestInterceptor: (request) => Object.assign(request, withKey(request.headers)),
   });
 }
 
-$("key-form").addEventListener("submit", (event) => {
-  event.preventDefault();
-  if (setApiKey($("key").value.trim())) show();
-  else $("key-status").textContent = "A key has 1 to 512 characters: letters, digits, signs, no spaces.";
+const description = new Channel({
+  ask: () => get("openapi.json"),
+  answer: show,
+  fail: (error) => {
+    if (error instanceof KeyWanted) wantKey();
+    else $("status").textContent = `${error.message} Asking again by itself.`;
+  },
 });
-show();
+onKey(() => description.push(null));
+description.push(null);

@@ -1,0 +1,192 @@
+"""A headless Chromium that opens the page: what tests and pictures of it share."""
+
+import base64
+import json
+import re
+import shutil
+import time
+
+import numpy as np
+
+
+def start(folder):
+    """A browser of its own that reaches nothing but this machine; its files are in the folder.
+
+    Raises
+    ------
+    LookupError
+        Selenium, Chromium or its ChromeDriver is not installed.
+    """
+    try:
+        from selenium import webdriver
+    except ImportError:
+        raise LookupError("the PyPI package selenium is not installed") from None
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        raise LookupError("there is no Chromium with its ChromeDriver on the PATH")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "disable-quic", "no-first-run",
+        "disable-background-networking", "disable-component-update", "disable-sync", "window-size=1400,1000",
+        "hide-scrollbars", "host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", f"user-data-dir={folder}",
+    ):  # fmt: skip
+        options.add_argument(f"--{argument}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+
+
+class Opened:
+    """Opens a state of the page: by its address, and as a new document only where that makes a difference."""
+
+    def __init__(self, browser, url):
+        self.browser, self.url, self.shown = browser, url, None
+
+    def __call__(self, address="", width=1400, height=1000, url=None, path="", new=False):
+        wanted = (width, height, url or self.url, path)
+        page = Page(self.browser, url or self.url)
+        if new or wanted != self.shown or path:
+            self.browser.get("about:blank")
+            metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+            page.scheme("light")
+            page.complaints()
+            self.browser.get(f"{url or self.url}/{path}{address}")
+            self.shown = wanted
+        else:
+            page.run(
+                "history.replaceState(null, '', location.pathname); scrollTo(0, 0);"
+                "const heard = new Promise((done) => addEventListener('hashchange', done, { once: true }));"
+                f"location.hash = {json.dumps(address or '#mu0=0.3')}; await heard;"
+            )
+        if not path and url is None:
+            page.settle()
+        return page
+
+
+class Page:
+    """The page as a user sees it."""
+
+    def __init__(self, browser, url):
+        self.browser, self.url = browser, url
+
+    @staticmethod
+    def rounded(value, digits=6):
+        """A number as the page shows it."""
+        return float(f"{value:.{digits - 1}e}")
+
+    def run(self, script):
+        return self.browser.execute_async_script(
+            f"const done = arguments[arguments.length - 1]; (async () => {{ {script} }})().then(done);"
+        )
+
+    def settle(self):
+        """Wait until every question that follows from the state is answered."""
+        self.run(
+            "while (document.getElementById('main')?.getAttribute('aria-busy') !== 'false')"
+            " await new Promise((next) => setTimeout(next, 10));"
+        )
+        return self
+
+    def text(self, selector):
+        return self.run(f"return document.querySelector({selector!r}).textContent;")
+
+    def value(self, selector):
+        return self.find(selector).get_property("value")
+
+    def wait_for(self, selector, pattern):
+        deadline = time.monotonic() + 30
+        while not (found := re.search(pattern, self.text(selector))):
+            assert time.monotonic() < deadline, f"{selector} is {self.text(selector)!r}, not {pattern}"
+            time.sleep(0.03)
+        return found
+
+    def find(self, selector):
+        return self.browser.find_element("css selector", selector)
+
+    def type(self, selector, text, commit=True):
+        from selenium.webdriver import Keys
+
+        field = self.find(selector)
+        field.send_keys(Keys.CONTROL + "a", Keys.NULL, text or Keys.DELETE)
+        if commit:
+            field.send_keys(Keys.ENTER)
+            self.settle_unless_bad()
+
+    def settle_unless_bad(self):
+        if self.run("return document.querySelector('#main').getAttribute('aria-busy');") == "true":
+            self.settle()
+
+    def wait_until_shown(self, selector):
+        deadline = time.monotonic() + 30
+        while not self.find(selector).is_displayed():
+            assert time.monotonic() < deadline, f"{selector} does not appear"
+            time.sleep(0.03)
+
+    def enter_key(self, key):
+        self.type("#key", key, commit=False)
+        self.find("#key-form button").click()
+
+    def choose(self, selector, value, event="change"):
+        self.run(
+            f"const field = document.querySelector({selector!r}); field.value = {value!r};"
+            f"field.dispatchEvent(new Event('{event}'));"
+        )
+        self.settle()
+
+    def click(self, selector):
+        self.run(f"document.querySelector({selector!r}).click();")
+        self.settle()
+
+    def is_old(self, selector="#main"):
+        return "old" in self.find(selector).get_attribute("class").split()
+
+    def complaints(self):
+        return [
+            entry["message"] for entry in self.browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")
+        ]
+
+    def pixels(self, name):
+        """The pixels of a canvas, (height, width, 4)."""
+        found = self.run(
+            f"const canvas = document.getElementById('{name}'); await new Promise(requestAnimationFrame);"
+            "const copy = new OffscreenCanvas(canvas.width, canvas.height)"
+            ".getContext('2d', { willReadFrequently: true });"
+            "copy.drawImage(canvas, 0, 0); const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);"
+            "let text = ''; for (let i = 0; i < data.length; i += 8192)"
+            " text += String.fromCharCode(...data.subarray(i, i + 8192));"
+            "return [canvas.height, canvas.width, btoa(text)];"
+        )
+        return np.frombuffer(base64.b64decode(found[2]), np.uint8).reshape(found[0], found[1], 4)
+
+    def touched(self, selector, x, y, click=False):
+        """Move the pointer to a share of an element's width and height."""
+        from selenium.webdriver import ActionChains
+
+        element = self.find(selector)
+        self.run(f"document.querySelector({selector!r}).scrollIntoView({{ block: 'center' }});")
+        size = element.size
+        offset = round((x - 0.5) * size["width"]), round((y - 0.5) * size["height"])
+        actions = ActionChains(self.browser, duration=0).move_to_element_with_offset(element, *offset)
+        (actions.click() if click else actions).perform()
+
+    def download(self, selector, folder, name):
+        """What comes when an element is clicked."""
+        behaviour = {"behavior": "allow", "downloadPath": str(folder)}
+        self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
+        self.run(f"document.querySelector({selector!r}).click();")
+        deadline = time.monotonic() + 30
+        while not (folder / name).exists():
+            assert time.monotonic() < deadline, [path.name for path in folder.iterdir()]
+            time.sleep(0.03)
+        return folder / name
+
+    def scheme(self, name):
+        media = {"features": [{"name": "prefers-color-scheme", "value": name}]}
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+
+    def offline(self, state):
+        rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
+        self.browser.execute_cdp_cmd("Network.enable", {})
+        self.browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": state, **rates})
