@@ -5,6 +5,7 @@
     python3 dev.py test [ARGS]     every check, then every test (ARGS go to pytest)
     python3 dev.py test --quick    every check, then the tests that are not marked slow
     python3 dev.py check           the checks without pytest
+    python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until it is told to stop
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
@@ -247,6 +248,11 @@ def stale_locks() -> list[str]:
     return [name for name in LOCKS if f"# inputs: {inputs_digest()}" not in lock_path(name).read_text("utf-8")]
 
 
+def build_docs(folder: str | Path) -> int:
+    """Build the site into a folder; a warning, such as a link that leads nowhere, is an error."""
+    return run(BIN / "sphinx-build", "-W", "--keep-going", "-q", "docs", folder, env=environment())
+
+
 def check_packages() -> list[str]:
     """Build what would be uploaded, into a temporary folder, and check it; return the names of what failed."""
     failed = []
@@ -281,6 +287,9 @@ def check() -> list[str]:
         "mypy of dev.py": ("mypy", "dev.py"),
         "import-linter": ("lint-imports",),
         "validate-pyproject": ("validate-pyproject", "pyproject.toml"),
+        "codespell": ("codespell",),
+        "interrogate": ("interrogate", "--quiet", "mumacro", "builder", "service"),
+        "sp-repo-review": ("sp-repo-review", "--show", "err", "."),
         "CF conventions": (
             *("compliance-checker", "--test=cf:1.11"),
             *tables,
@@ -294,6 +303,10 @@ def check() -> list[str]:
             failed.append(title)
         elif run(BIN / tool, *arguments, env=environment()):
             failed.append(title)
+    print("--- documentation", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        if build_docs(folder):
+            failed.append("documentation")
     return failed + check_packages()
 
 
@@ -402,6 +415,11 @@ def main(arguments: list[str]) -> int:
             failed = check()
             print(f"FAILED: {', '.join(failed)}" if failed else "All checks passed")
             return len(failed)
+        if word == "docs" and not rest:
+            ensure("dev")
+            code = build_docs("build/docs")
+            print("The site is in build/docs: open build/docs/index.html" if code == 0 else "FAILED: see above")
+            return code
         if word == "serve":
             return serve(rest)
         if word == "exec" and rest:

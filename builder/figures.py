@@ -2,7 +2,7 @@
 
 Axes are the paper's: v~ over y~ in Fig. 4 to 7, mu~ over v~ in Fig. 8, the normalised rise over v~/v~crit in Fig. 9,
 mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11.  Lines come from the table, dots from fresh solves, crosses and
-dashed lines from the paper's formulas.  Needs matplotlib, the extra ``figures``.
+dashed lines from the paper's formulas.  Before them one cycle of each regime.  Needs matplotlib, the extra ``figures``.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mumacro import Surrogate, closed_forms
 from mumacro.law import approximations, border_speeds, friction_law
 
+from .cycle import draw_cycles
 from .steady import border
 
 __all__ = ["FIGURES", "FiguresError", "draw_figures"]
@@ -238,6 +239,7 @@ def _plane(axes: Any, y_max: float, v_max: float, legend: str) -> None:
 
 #: file name without suffix -> what draws it on given axes
 FIGURES: dict[str, Callable[[Surrogate, Any], None]] = {
+    "cycle": draw_cycles,
     "fig04_regions": _regions,
     "fig05_border_small_amplitude": _small_border,
     "fig06_border": _whole_border,
@@ -262,7 +264,7 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        What was written, in the order of the paper.
+        What was written, the cycles first, then in the order of the paper.
 
     Raises
     ------

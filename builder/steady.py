@@ -336,7 +336,7 @@ class Steady:
         Smallest lam of the continuous orbit; NaN far below the border, where it is not followed.  Where v~ is so far
         above the border that stiff steps pass it by, it is right to 0.1 %.
     error_estimate : float
-        Largest absolute error of mu_ratio to be expected, see :func:`error_estimate`.
+        Largest absolute error of mu_ratio to be expected, see ``error_estimate``.
     status : int
         0 when solved.
     advice : str

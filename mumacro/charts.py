@@ -8,23 +8,23 @@ lives between the static limit and the border, both of them square-root edges; w
 analytic in s on [0, 1].  Around y~ = 1, v~ = 0 only polar coordinates of the normal form
 mu~^3 + 2 (y~ - 1) mu~ = pi v~ are analytic.
 
-========================  =======================  =======================  =======================================
-block                     where                    coordinates (a, b)       q of mu~
-========================  =======================  =======================  =======================================
-continuous_low            y~ <= 1.5, all v~        y~^2, v~^2 / (1 + v~^2)  (1 - mu~) 4 (1 + v~^2) / y~^2
-continuous_mid_1, _2      1.5 < y~ <= 3, 32        ln y~, ln(v~ / v~crit)   mu~ sqrt(1 + y~^2 / v~^2)
-continuous_high           32 < y~ <= 2^17          ln y~, ln(v~ / v~crit)   mu~ sqrt(1 + y~^2 / v~^2)
-continuous_tail           y~ > 2^17                1 / y~, ln(v~ / sqrt y~) (mu~ - outer) y~ / v~
-tail_fast (closed form)   v~ > 128 v~crit          -                        -
+========================  =======================  ========================  =======================================
+block                     where                    coordinates (a, b)        q of mu~
+========================  =======================  ========================  =======================================
+continuous_low            y~ <= 1.5, all v~        y~^2, v~^2 / (1 + v~^2)   (1 - mu~) 4 (1 + v~^2) / y~^2
+continuous_mid_1, _2      1.5 < y~ <= 3, 32        ln y~, ln(v~ / v~crit)    mu~ sqrt(1 + y~^2 / v~^2)
+continuous_high           32 < y~ <= 2^17          ln y~, ln(v~ / v~crit)    mu~ sqrt(1 + y~^2 / v~^2)
+continuous_tail           y~ > 2^17                1 / y~, ln(v~ / sqrt y~)  (mu~ - outer) y~ / v~
+tail_fast (closed form)   v~ > 128 v~crit          -                         -
   where y~ > 2^17         ln(v~ / sqrt y~) > 4
-stick_slip_low            y~ <= 0.75               y~^2, s                  (1 - mu~) / y~^2
-stick_slip_mid            0.75 < y~ <= 1.5         y~, s >= 0.3             mu~
-corner                    0.75 < y~ <= 1.5         R, 2 psi / pi (s < 0.3)  mu~ / phi
-stick_slip_mid_1, _2      1.5 < y~ <= 3, 32        ln y~, s                 mu~ y~ / v~
-stick_slip_high           32 < y~ <= 2^17          ln y~, s                 mu~ y~ / v~
-stick_slip_tail           y~ > 2^17                1 / y~, s                (mu~ - outer) y~ / v~
-                                                                            - (2/pi) ln(v~ / sqrt y~)
-========================  =======================  =======================  =======================================
+stick_slip_low            y~ <= 0.75               y~^2, s                   (1 - mu~) / y~^2
+stick_slip_mid            0.75 < y~ <= 1.5         y~, s >= 0.3              mu~
+corner                    0.75 < y~ <= 1.5         R, 2 psi / pi (s < 0.3)   mu~ / phi
+stick_slip_mid_1, _2      1.5 < y~ <= 3, 32        ln y~, s                  mu~ y~ / v~
+stick_slip_high           32 < y~ <= 2^17          ln y~, s                  mu~ y~ / v~
+stick_slip_tail           y~ > 2^17                1 / y~, s                 (mu~ - outer) y~ / v~
+                                                                             - (2/pi) ln(v~ / sqrt y~)
+========================  =======================  ========================  =======================================
 
 outer = 1 / AGM(1, sqrt(1 + y~^2/v~^2)) = (2/pi) K(i y~/v~), eq. (35).
 

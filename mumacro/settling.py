@@ -3,11 +3,12 @@
 Two motions of the same contact, steady and disturbed, are two elongations u_a, u_b under the same motion of the upper
 point.  They differ by d = u_b - u_a, in units of l0, and only slip changes d (docs/model.md derives it):
 
-    |d|^2/2 falls at the rate (lam_a + lam_b)(1 - u_a.u_b) >= (lam_a + lam_b)|d|^2/2,    lam = slip speed of the foot
+    abs(d)^2/2 falls at the rate (lam_a + lam_b)(1 - u_a.u_b) >= (lam_a + lam_b) abs(d)^2/2
 
-With the slip path S of the steady cycle per period this gives for every disturbance, of any size,
+with the slip speed lam of the foot.  With the slip path S of the steady cycle per period this gives for every
+disturbance, of any size,
 
-    |d| after n periods <= |d| exp(-n S/2),
+    abs(d) after n periods <= abs(d) exp(-n S/2),
 
 and for small ones exp(-n S) in continuous sliding, exp(-n S) cos^(2n)(th1 - th0) in stick-slip, where th0 and th1 are
 the angles at which the contact begins and ends to stick.  S follows from the energy that drive and shaker put in:
@@ -77,7 +78,7 @@ def settling(
     surrogate : Surrogate
         The table that is asked for mu~ and for the oscillation power.
     mu0, Fz, k, y0, omega, v0 : array_like
-        The case [-, N, N/m, m, rad/s, m/s], as in :meth:`Surrogate.evaluate`.
+        The case [-, N, N/m, m, rad/s, m/s], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
         What is left of the disturbance [-], 0 < remaining < 1.
 
@@ -95,7 +96,7 @@ def settling(
 
     Notes
     -----
-    The force averaged over period n differs from the steady one by at most mu0 Fz |d| of that period.  Source: this
+    The force averaged over period n differs from the steady one by at most mu0 Fz abs(d) of that period.  Source: this
     project; the paper (Sec. 8) names the kinetics as open.
 
     Examples

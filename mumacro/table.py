@@ -81,7 +81,7 @@ class Block:
 
     ``values``, ``power`` and, in stick-slip, ``stick`` hold what :mod:`mumacro.charts` tabulates for mu~, oscillation
     power and stick fraction.  ``errors`` (3, 3), a row a quantity, bounds the errors of the tabulated value and of the
-    slopes along ln v~ and ln y~, both as :func:`mumacro.evaluate.answer_with_slopes` scales them.
+    slopes along ln v~ and ln y~, both as ``mumacro.evaluate.answer_with_slopes`` scales them.
     ``max_abs_error`` and ``max_rel_error`` are the largest found of mu~.
     """
 

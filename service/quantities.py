@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.settling import settling
+
 from .kernel import FIELDS, REGIME_OF_SOURCE, ROUNDING, STATIC, UNITS, Array, Details, Kernel
 
 __all__ = ["QUANTITIES", "Cases", "Part", "Quantity", "compute", "cost_of", "nested", "parts_of", "register"]
@@ -310,7 +312,7 @@ register(
     )
 )  # fmt: skip
 
-# --- stick fraction and power -------------------------------------------------------------------------
+# --- stick fraction, power and settling -----------------------------------------------------------------
 
 
 def _stick_fraction(cases: Cases) -> Sequence[Array]:
@@ -364,6 +366,28 @@ register(
             Part("power.saved_bound", "W", "Bound of the absolute error of saved"),
         ),
         _power,
+        cost=5,
+    )
+)
+
+
+def _settling(cases: Cases) -> Sequence[Array]:
+    found = settling(cases.kernel.surrogate, **dict(cases.columns))  # type: ignore[arg-type]
+    return found.periods, found.periods_any, found.time, found.slip_path, found.error_bound
+
+
+register(
+    Quantity(
+        "settling",
+        "Periods until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never slips",
+        (
+            Part("settling.periods", "-", "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many"),
+            Part("settling.periods_any", "-", "For a disturbance of any size: twice as many"),
+            Part("settling.time", "s", "periods as a time; also without oscillation"),
+            Part("settling.slip_path", "-", "Path of the foot in a period over l0; null also for rigid contact"),
+            Part("settling.periods_bound", "-", "Bound of the absolute error of periods; null also: not known"),
+        ),
+        _settling,
         cost=5,
     )
 )

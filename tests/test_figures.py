@@ -1,5 +1,6 @@
-"""The paper's figures: drawn by one command, the committed ones among them, small enough for a page."""
+"""The figures, of cycles and of the paper: drawn by one command, the committed ones too, small enough for a page."""
 
+import doctest
 import json
 import sys
 from pathlib import Path
@@ -8,6 +9,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from builder import cycle
+from builder.cycle import CASES, steady_cycle
 from builder.figures import FIGURES, FiguresError, draw_figures
 
 
@@ -36,3 +39,19 @@ def test_without_matplotlib_the_extra_is_named(surrogate, tmp_path, monkeypatch)
     with pytest.raises(FiguresError, match="extra 'figures'"):
         draw_figures(surrogate, tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("v", "y"), CASES)
+def test_the_cycle_that_is_drawn_is_the_steady_one(surrogate, v, y) -> None:
+    tau, u, sticks = steady_cycle(v, y)
+    assert tau[-1] == pytest.approx(2.0 * np.pi)
+    assert np.hypot(*u.T).max() <= 1.0 + 1e-12
+    assert u[:, 0].mean() == pytest.approx(surrogate.mu_ratio(v, y), abs=1e-3)
+    assert sticks.mean() == pytest.approx(surrogate.stick_fraction(v, y), abs=2e-3)
+    # half a period later the same, mirrored
+    half = tau.size // 2
+    assert np.abs(u[:half] * (1.0, -1.0) - u[half:]).max() < 2e-3
+
+
+def test_the_example_runs() -> None:
+    assert doctest.testmod(cycle).failed == 0

@@ -1,9 +1,11 @@
-"""Gradient, standard deviation, power and stick fraction: what they say, in every form, and how they are refused."""
+"""Gradient, deviations, power, stick fraction and settling: what they say, in every form; how they are refused."""
 
 import json
 import math
 
 import pytest
+
+from mumacro.settling import settling
 
 PATH = "/v1/mu-macro"
 STD = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "y0": 1e-7, "omega": 1e3, "v0": 1e-3}
@@ -172,3 +174,31 @@ def test_bounds_of_power_and_stick_fraction_come_as_columns_lines_and_arrow(clie
     assert found["stick_fraction_bound"] == columns["stick_fraction_bound"]
     for key, values in columns["power"].items():
         assert found[f"power.{key}"] == values
+
+
+@pytest.mark.parametrize("v0", [1e-4, 0.01, 5.0])
+@pytest.mark.parametrize("y0", [1e-7, 2e-6, 1e-4])
+def test_settling_is_the_librarys(client, case, surrogate, v0, y0):
+    at = {**case, "v0": v0, "y0": y0}
+    found, expected = ask(client, at, include=["settling"])["settling"], settling(surrogate, **at)
+    assert list(found.values()) == [
+        expected.periods, expected.periods_any, expected.time, expected.slip_path, expected.error_bound,
+    ]  # fmt: skip
+    assert 0.0 < found["periods_bound"] < 1e-3 * found["periods"]
+    batch = {**at, "v0": [v0, 0.3], "include": ["settling"]}
+    columns = client.post(f"{PATH}/batch", json=batch).json()["settling"]
+    assert {name: column[0] for name, column in columns.items()} == pytest.approx(found, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "periods", "time"),
+    [
+        ({"k": None}, 0.0, 0.0),  # rigid: at once
+        ({"v0": 0}, None, None),  # nothing slips: never
+        ({"omega": 0}, 0.0, 3e-6 * math.log(100.0) / 0.01),  # dragged only: l0 ln(100) / v0
+    ],
+)
+def test_settling_at_once_never_and_without_oscillation(client, case, change, periods, time):
+    found = ask(client, {**case, **change}, include=["settling"])["settling"]
+    assert found["periods"] == periods
+    assert found["time"] == (time if time is None else pytest.approx(time))

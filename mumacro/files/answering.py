@@ -68,7 +68,7 @@ def answer(
         As many rows in the same order, with mu_macro, mu_ratio, regime, error_bound and source; null where a case has
         no answer.
     rejects : pyarrow.RecordBatch
-        One row of :data:`REJECTS` for each of those.
+        One row of ``REJECTS`` for each of those.
 
     Raises
     ------

@@ -125,7 +125,8 @@ def evaluate_files(
     force : bool
         Replace an output that exists, and forget the parts of another run.
     part_rows : int, optional
-        Rows after which a part ends: what a stopped run loses at the most.  Left out: :data:`PART_ROWS`.
+        Rows after which a part ends: what a stopped run loses at the most.  Left out: 10 million of Parquet, 1 million
+        of text.
     progress : callable
         Called with the share that is done, rows read and rows rejected.
 

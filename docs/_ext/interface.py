@@ -1,0 +1,123 @@
+"""Two directives that let the interface describe itself: ``command-help`` and ``rest-reference``."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import redirect_stdout, suppress
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+TABLES = Path(__file__).resolve().parent.parent.parent / "tables"
+COLUMNS = "100"
+
+
+def help_of(command: str) -> str:
+    """What ``command --help`` prints, without starting a process."""
+    words = [*command.removeprefix("python -m ").split(), "--help"]
+    if words[0] == "builder":
+        from typer.testing import CliRunner
+
+        from builder.__main__ import app
+
+        return CliRunner().invoke(app, words[1:], prog_name="python -m builder", env={"COLUMNS": COLUMNS}).output
+    from mumacro.__main__ import main
+
+    text = io.StringIO()
+    with redirect_stdout(text), suppress(SystemExit), patch.dict("os.environ", {"COLUMNS": COLUMNS}):
+        main(words[1:])
+    return text.getvalue()
+
+
+class CommandHelp(SphinxDirective):
+    """``{command-help} mumacro law``: a heading and the help of that command."""
+
+    required_arguments = 1
+    final_argument_whitespace = True
+
+    def run(self) -> list[nodes.Node]:
+        (command,) = self.arguments
+        text = help_of(command).strip()
+        if "usage" not in text.lower():
+            raise self.error(f"{command} --help prints no usage: {text!r}")
+        return self.parse_text_to_nodes(
+            f"### `{command} --help`\n\n```text\n{text}\n```\n", allow_section_headings=True
+        )
+
+
+class RestReference(SphinxDirective):
+    """Every operation of the service with its fields, from the description that it serves as /openapi.json."""
+
+    def run(self) -> list[nodes.Node]:
+        from service.app import create_app
+        from service.settings import Settings
+
+        description = create_app(Settings(tables=(TABLES,))).openapi()
+        text = "\n".join(_operations(description))
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+def _operations(description: dict[str, Any]) -> Iterator[str]:
+    schemas = description["components"]["schemas"]
+    for path, methods in description["paths"].items():
+        for method, operation in methods.items():
+            yield f"\n## {method.upper()} {path}\n\n{operation['summary']}. {operation.get('description', '')}\n"
+            fields = [(p["name"], p["schema"], p.get("required", False)) for p in operation.get("parameters", [])]
+            yield from _table("query", fields, schemas)
+            body = operation.get("requestBody", {}).get("content", {})
+            if body:
+                yield f"\nBody: {', '.join(f'`{kind}`' for kind in body)}\n"
+                yield from _fields(body.get("application/json", {}).get("schema", {}), schemas, "body")
+            for status, response in operation["responses"].items():
+                content = response.get("content", {})
+                yield f"\n**{status}** {response['description']}: {', '.join(f'`{kind}`' for kind in content)}\n"
+                if status == "200":
+                    yield from _fields(content.get("application/json", {}).get("schema", {}), schemas, "answer")
+
+
+def _resolved(schema: dict[str, Any], schemas: dict[str, Any]) -> list[dict[str, Any]]:
+    """The objects that a schema may be, references followed."""
+    if "$ref" in schema:
+        return _resolved(schemas[schema["$ref"].rsplit("/", 1)[1]], schemas)
+    options = [*schema.get("oneOf", []), *schema.get("anyOf", [])]
+    return [found for option in options for found in _resolved(option, schemas)] or [schema]
+
+
+def _fields(schema: dict[str, Any], schemas: dict[str, Any], what: str) -> Iterator[str]:
+    for found in _resolved(schema, schemas):
+        required = found.get("required", [])
+        entries = [(name, entry, name in required) for name, entry in found.get("properties", {}).items()]
+        title = f"{what} {found['title']}" if "title" in found else what
+        yield from _table(title, entries, schemas)
+
+
+def _table(what: str, fields: list[tuple[str, dict[str, Any], bool]], schemas: dict[str, Any]) -> Iterator[str]:
+    if fields:
+        yield f"\n| {what} | | |\n| --- | --- | --- |"
+    for name, schema, required in fields:
+        kinds = " or ".join(dict.fromkeys(_kind(found) for found in _resolved(schema, schemas)))
+        text = schema.get("description", "").replace("|", "\\|").replace("\n", " ")
+        yield f"| `{name}`{', required' if required else ''} | {kinds} | {text} |"
+
+
+def _kind(schema: dict[str, Any]) -> str:
+    """Type and bounds in words."""
+    words = {"exclusiveMinimum": "> {}", "minimum": ">= {}", "maximum": "<= {}", "maxItems": "at most {}"}
+    bounds = [text.format(schema[key]) for key, text in words.items() if key in schema]
+    if "enum" in schema or "const" in schema:
+        return ", ".join(f"`{value}`" for value in schema.get("enum", [schema.get("const")]))
+    kind = str(schema.get("type", "any"))
+    if kind == "array" and schema.get("items", {}).get("type"):
+        kind = f"array of {schema['items']['type']}"
+    return " ".join([kind, *bounds])
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.add_directive("command-help", CommandHelp)
+    app.add_directive("rest-reference", RestReference)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,34 @@
+"""The documentation as a site: ``python3 dev.py docs``; warnings are errors, links are checked by the build itself."""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_ext")]
+
+from mumacro.version import __version__  # noqa: E402 - found by the line above
+
+project = "mumacro"
+author = "the mumacro developers"
+version = release = __version__
+html_title = f"mumacro {__version__}"
+highlight_language = "none"
+smartquotes = False  # --help is no dash
+html_theme = "furo"
+html_copy_source = False
+html_show_copyright = False
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "interface"]
+exclude_patterns = ["_ext"]
+nitpicky = True  # every reference to a function, a method, a module or a name must lead somewhere
+nitpick_ignore_regex = [("py:(class|exc|obj)", ".*")]  # types are words with shapes, such as "float or ndarray"
+
+# Anchors of headings are those that GitHub makes, so that the pages read alike there.
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # types stand in the docstrings, with shapes and units
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
