@@ -290,6 +290,7 @@ def sweep() -> Iterator[Sweep]:
     with Sweep(workers=2) as started:
         yield started
 
+
 @pytest.fixture(scope="session")
 def naive() -> ModuleType:
     """The naive solver."""
