@@ -209,6 +209,14 @@ class Server:
             assert time.monotonic() < deadline, "".join(self.lines)
             time.sleep(0.05)
 
+    def wait_for_tables(self, workers):
+        """Wait until so many workers have said that their tables are loaded."""
+        deadline = time.monotonic() + START_S
+        while sum("tables are loaded" in line for line in list(self.lines)) < workers:
+            assert time.monotonic() < deadline, "".join(self.lines)
+            time.sleep(0.05)
+        self.wait_until_ready()
+
     def stop(self, number=signal.SIGTERM):
         self.process.send_signal(number)
         return self.wait()

@@ -155,7 +155,7 @@ def test_a_stop_that_was_asked_for_is_a_success(serving, surrogate, number):
 
 def test_several_workers_serve_and_stop(serving, surrogate):
     with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
-        server.wait_for_workers()
+        server.wait_for_tables(2)
         assert server.ask("GET", "/readyz")[0] == 200
         assert server.ask("GET", "/v1/table")[0] == 401
         assert server.ask("GET", "/v1/table", headers={"X-API-Key": "k3y"})[0] == 200
