@@ -9,7 +9,7 @@ Layout (all quantities dimensionless, units "1"):
   mu~, power and stick fraction, the chart by name and range, the number of cells, the verified errors.
 
 The netCDF library writes, and is not safe for threads: one lock holds while it works.  It does not read: see
-:mod:`mumacro.hdf5`.
+``mumacro.hdf5``.
 """
 
 from __future__ import annotations
