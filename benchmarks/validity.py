@@ -9,14 +9,15 @@ import measuring  # isort: split
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 from measuring import ROOT, markdown, quantity
 
 from mumacro import Surrogate
 from mumacro.settling import settling
-from mumacro.stiffness import Material, ball_on_flat, flat_punch
+from mumacro.stiffness import Contact, Material, ball_on_flat, flat_punch
 
 PAGE = ROOT / "docs" / "validity.md"
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
@@ -54,11 +55,8 @@ def rate() -> str:
     return markdown(("fastest over slowest slip", *(f"change of mu0 = {m} [%]" for m in (0.2, 0.4, 0.8))), rows)
 
 
-def rigs() -> str:
-    """Where contacts of the usual kind lie on the map, with assumed, not published, numbers."""
-    s = Surrogate.open(TABLE)
-    mu0, omega = 0.3, 2.0 * math.pi * 20e3
-    rows = []
+def contacts() -> Iterator[tuple[str, Contact, dict[str, float]]]:
+    """Contacts of the usual kind at 20 kHz, with assumed, not published, numbers: name, contact, the six inputs."""
     for name, force, contact in (
         ("steel ball, R = 5 mm", 1.0, ball_on_flat(5e-3, 1.0, STEEL, STEEL)),
         ("steel ball, R = 5 mm", 10.0, ball_on_flat(5e-3, 10.0, STEEL, STEEL)),
@@ -66,16 +64,54 @@ def rigs() -> str:
         ("steel pin, flat, 1 mm radius", 100.0, flat_punch(1e-3, 100.0, STEEL, STEEL)),
     ):
         for y0, v0 in ((0.1e-6, 0.01), (5e-6, 0.01), (5e-6, 0.5)):
-            case = {"mu0": mu0, "Fz": force, "k": contact.k, "y0": y0, "omega": omega, "v0": v0}
-            answer = s.evaluate(**case)
-            found = settling(s, **case)
-            cells = [f"{contact.k:.2g}", f"{1e6 * contact.length_scale(mu0, force):.3g}", f"{1e6 * y0:g}", f"{v0:g}"]
-            groups = [f"{answer.v_tilde:.2g}", f"{answer.y_tilde:.2g}", f"{answer.mu_ratio:.3f}", answer.regime]
-            rows.append([name, f"{force:g}", *cells, *groups, f"{found.periods:.2g}"])
+            omega = 2.0 * math.pi * 20e3
+            yield name, contact, {"mu0": 0.3, "Fz": force, "k": contact.k, "y0": y0, "omega": omega, "v0": v0}
+
+
+def rigs() -> str:
+    """Where these contacts lie on the map."""
+    s = Surrogate.open(TABLE)
+    rows = []
+    for name, contact, case in contacts():
+        force, y0, v0 = case["Fz"], case["y0"], case["v0"]
+        answer = s.evaluate(**case)
+        found = settling(s, **case)
+        l0 = contact.length_scale(case["mu0"], force)
+        cells = [f"{contact.k:.2g}", f"{1e6 * l0:.3g}", f"{1e6 * y0:g}", f"{v0:g}"]
+        groups = [f"{answer.v_tilde:.2g}", f"{answer.y_tilde:.2g}", f"{answer.mu_ratio:.3f}", answer.regime]
+        rows.append([name, f"{force:g}", *cells, *groups, f"{found.periods:.2g}"])
     header = (
         "contact", "Fz [N]", "k [N/m]", "l0 [um]", "y0 [um]", "v0 [m/s]", "v~", "y~", "mu~", "regime", "periods to 1 %",
     )  # fmt: skip
     return markdown(header, rows)
+
+
+def draw(out: Path) -> None:
+    """The map with these contacts on it, 800 x 560 pixels: mu~ as isolines, one mark a contact, one shape a load."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    s = Surrogate.open(TABLE)
+    v, y = np.geomspace(0.02, 200.0, 241), np.geomspace(0.05, 200.0, 241)
+    figure = Figure(figsize=(8.0, 5.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set(xscale="log", yscale="log", xlim=(v[0], v[-1]), ylim=(y[0], y[-1]))
+    mu = s.mu_ratio(v[None, :], y[:, None])
+    lines = axes.contour(v, y, mu, levels=(0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99), colors="#8c959f", linewidths=0.8)
+    axes.clabel(lines, fmt="%g", fontsize=9)
+    axes.plot(s.v_tilde_crit(y), y, color="#c1272d", lw=2.4, label="border of continuous sliding")
+    labels: dict[str, str] = {}
+    shapes = iter("osD^")
+    for name, _, case in contacts():
+        label = f"{name}, {case['Fz']:g} N"
+        first = label not in labels
+        shape = labels.setdefault(label, next(shapes) if first else "")
+        answer = s.evaluate(**case)
+        axes.plot(answer.v_tilde, answer.y_tilde, shape, color="#1f6fb4", ms=8, label=label if first else None)
+    axes.set(xlabel=r"$\tilde v = v_0 k/(\mu_0 F_z \omega)$", ylabel=r"$\tilde y = y_0 k/(\mu_0 F_z)$")
+    axes.legend(loc="lower right", fontsize=9)
+    figure.savefig(out, dpi=100, metadata={"Software": None})
 
 
 SECTIONS: dict[str, Callable[[], str]] = {
@@ -96,6 +132,8 @@ def main() -> None:
         print(f"## {name}\n\n{text}\n", flush=True)
         if given.write:
             measuring.write_section(name, text, PAGE)
+    if given.write:
+        draw(measuring.IMAGES / "contacts.png")
 
 
 if __name__ == "__main__":

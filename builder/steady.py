@@ -236,7 +236,7 @@ def _widen(res: np.ndarray, v: float, y: float, solved: float) -> None:
     stretch = math.sqrt(y / LARGEST_Y)
     mu, _, power = rigid(solved, LARGEST_Y)
     layer, work = (res[MU_RATIO] - mu) * (LARGEST_Y / solved), res[POWER] - power
-    x = solved * stretch  # v, or in its stead the speed from which on mu~ is linear
+    x = solved * stretch  # v, or the speed below which mu~ is linear
     mu, _, power = rigid(x, y)
     res[MU_RATIO] = v * (mu * (y / x) + layer) / y
     res[DEFICIT] = 1.0 - res[MU_RATIO]

@@ -180,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ImpossibleError, MumacroError) as error:
         print(f"{title}: {error}", file=sys.stderr)
         return 1
-    except BrokenPipeError:  # whoever reads, head for one, has enough
+    except BrokenPipeError:  # the reader, such as head, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:

@@ -45,7 +45,7 @@ def source_digest(*folders: Path) -> str:
 
 
 def _private(folder: Path) -> bool:
-    """Make ``folder`` and say whether nobody but this user, or the system's administrator, can write to it."""
+    """Make ``folder``; True where only this user and the system's administrator can write to it."""
     try:
         for missing in [folder, *folder.parents][::-1]:
             missing.mkdir(mode=0o700, exist_ok=True)
@@ -92,7 +92,7 @@ def cache_folder(*folders: Path) -> Path | None:
 
 
 def kernels_are_cached() -> bool:
-    """Whether compiled kernels of these sources are at hand."""
+    """Whether compiled kernels of these sources are in the cache."""
     folder = cache_folder()
     return folder is not None and any(folder.glob(f"*{_SUFFIX}"))
 

@@ -123,12 +123,36 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
 
 
 def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[str, float | None]) -> Law:
-    """mu_macro at ``values`` (ascending) of the input ``along``; ``case`` holds the other five inputs.
+    """The friction law: mu_macro over a range of one input.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        The table that answers.
+    along : str
+        The swept input: mu0, Fz, k, y0, omega or v0.
+    values : ndarray
+        Its values [SI], ascending, shape (n,), such as :func:`sweep_values` makes.
+    case : mapping
+        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
+
+    Returns
+    -------
+    Law
+        The answers with the static limit, eq. (38), and the border of continuous sliding.
 
     Raises
     ------
     InputError
         An input that is missing, out of bounds, or given twice.
+
+    Examples
+    --------
+    >>> import mumacro
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+    >>> law = friction_law(mumacro.open(), "v0", sweep_values("v0", 1e-4, 1.0, 3, "log"), case)
+    >>> law.answer.mu_macro.round(4).tolist(), round(law.border[0].value, 5)
+    ([0.2238, 0.24, 0.2957], 0.07105)
     """
     known = checked_case(case, along)
     full: dict[str, Any] = {"k": None, **known, along: values}

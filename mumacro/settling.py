@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Settling:
-    """How fast a contact forgets; floats for scalar inputs, arrays of the broadcast shape otherwise.
+    """How fast a disturbance decays; floats for scalar inputs, arrays of the broadcast shape otherwise.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def settling(
     Returns
     -------
     Settling
-        Infinite where nothing slips (v0 = 0 with y~ <= 1, or with omega = 0): such a contact never forgets.  Zero for
+        Infinite where nothing slips (v0 = 0 with y~ <= 1, or with omega = 0): a disturbance stays.  Zero for
         rigid contact, whose friction follows at once.  NaN at an illegal case of an array, if the surrogate lets it
         pass.
 
@@ -104,7 +104,7 @@ def settling(
     >>> from mumacro import Surrogate
     >>> s = Surrogate.open("tables/mumacro-1e-10.nc")
     >>> found = settling(s, mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
-    >>> round(found.periods, 2), round(found.slip_path, 3)      # slow sliding forgets slowly
+    >>> round(found.periods, 2), round(found.slip_path, 3)      # slow sliding settles slowly
     (22.86, 0.201)
     """
     if not 0.0 < remaining < 1.0:
@@ -133,7 +133,7 @@ def settling(
         periods = decay / slip_path
         time = np.where(still & ~np.isnan(mu), l0 * (decay / speed), decay / rate / frequency)
         error = np.where(off >= 1.0, np.inf, periods * off / (1.0 - off))
-        # 0 / 0 in both: rigid contact that stands still slips nowhere
+        # 0 / 0 in both: rigid contact at rest does not slip
         time = np.where(rate == 0.0, np.inf, time)
         error = np.where(rate == 0.0, np.inf, error)
     found = (periods, 2.0 * periods, time, slip_path, error)

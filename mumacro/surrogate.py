@@ -71,6 +71,11 @@ class Surrogate:
             Threads that large arrays are shared out to; 1 never starts one.  Left out: all processors when called from
             the main thread of a program; one in other threads and in child processes, which are shared out already.
 
+        Returns
+        -------
+        Surrogate
+            Ready to answer; kernels compile at the first call, see :meth:`mumacro.Surrogate.warm_up`.
+
         Raises
         ------
         TableError
@@ -189,7 +194,16 @@ class Surrogate:
         return batch.ratios(self._data, v, y, self.threads, bounds=False)[0].reshape(shape)
 
     def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
-        """:meth:`mu_ratio`, the bound of its absolute error, and the source code; as there."""
+        """mu~ [-], the bound of its absolute error [-], and the source code (index into SOURCES).
+
+        Arguments, shapes and errors as in :meth:`mu_ratio`.
+
+        Examples
+        --------
+        >>> mu, bound, source = Surrogate.open().ratio_with_bound(0.1, 0.5)
+        >>> round(mu, 6), bound < 1e-12, int(source)
+        (0.942004, True, 5)
+        """
         v, y, shape = _points(v_tilde, y_tilde)
         found = batch.ratios(self._data, v, y, self.threads, bounds=True)
         if not shape:
@@ -200,6 +214,16 @@ class Surrogate:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
 
         Scalar in, float out; infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.
+
+        Raises
+        ------
+        InputError
+            A negative scalar or NaN; in an array it gives NaN.
+
+        Examples
+        --------
+        >>> round(Surrogate.open().v_tilde_crit(1.0), 7)
+        0.3251783
         """
         if type(y_tilde) is float and y_tilde >= 0.0:
             return float(self.border(np.array((y_tilde,)))[0])
@@ -212,13 +236,24 @@ class Surrogate:
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
 
-        The slip dissipates v~ mu~ plus this power.  Tabulated at the nodes of mu~; the cells are prepared on first use.
-        ``v_tilde`` and ``y_tilde`` as in :meth:`mu_ratio`; an infinite amplitude gives infinite power.
+        Slip turns v~ mu~ plus this power into heat.  Arguments and errors as in :meth:`mu_ratio`; an infinite amplitude
+        gives infinite power.  The first call prepares the cells.
+
+        Examples
+        --------
+        >>> round(Surrogate.open().power(0.1, 0.5), 6)
+        0.012142
         """
         return self.power_with_bound(v_tilde, y_tilde)[0]
 
     def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
-        """Share of the period during which the contact sticks [-]; as :meth:`power`."""
+        """Share of the period during which the contact sticks [-], 0 to 1; arguments and errors as :meth:`power`.
+
+        Examples
+        --------
+        >>> round(Surrogate.open().stick_fraction(0.1, 0.5), 6)
+        0.224881
+        """
         return self.stick_fraction_with_bound(v_tilde, y_tilde)[0]
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
@@ -387,7 +422,7 @@ class Surrogate:
         return found
 
     def _scalar_if_plain(self, inputs: Mapping[str, Any], gradient: bool) -> Answer | None:
-        """The answer to six legal plain floats, which need no arrays; anything else takes the careful way."""
+        """The answer to six legal plain floats, which need no arrays; None where an input is anything else."""
         a, b, c, d, e, f = (
             inputs["mu0"], inputs["Fz"], inputs["k"], inputs["y0"], inputs["omega"], inputs["v0"],
         )  # fmt: skip

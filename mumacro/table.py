@@ -1,4 +1,4 @@
-"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, read with suspicion.
+"""The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on reading.
 
 Layout (all quantities dimensionless, units "1"):
 
@@ -358,7 +358,7 @@ def parse_table(image: bytes, path: str | Path) -> Table:
 
 
 def read_table(path: str | Path) -> Table:
-    """Read and check a table file; several threads may.
+    """Read and check a table file; several threads may do so at once.
 
     Raises
     ------

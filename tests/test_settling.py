@@ -1,4 +1,4 @@
-"""How fast a contact forgets: the multiplier and the bound against marching, limits, bad input."""
+"""How fast a disturbance decays: the multiplier and the bound against marching, limits, bad input."""
 
 import doctest
 import math

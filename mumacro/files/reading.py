@@ -380,7 +380,7 @@ class NdjsonSource(_TextSource):
             return self._by_line(path, records)
 
     def _by_line(self, path: Path, records: Records) -> Block:
-        """The block again, a line at a time: what is wrong with a line spoils that line."""
+        """The block again, line by line, so that a bad line rejects only itself."""
         first = records.place.rows - len(records.texts)
         objects, texts, rows, faults = [], [], [], []
         for row, text in enumerate(records.texts, first + 1):

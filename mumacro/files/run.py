@@ -123,7 +123,7 @@ def evaluate_files(
     on_error : str
         ``"list"`` puts rows without an answer into the side file, ``"stop"`` raises at the first one.
     force : bool
-        Replace an output that exists, and forget the parts of another run.
+        Replace an output that exists, and delete the parts of another run.
     part_rows : int, optional
         Rows after which a part ends: what a stopped run loses at the most.  Left out: 10 million of Parquet, 1 million
         of text.

@@ -38,7 +38,17 @@ class Root(NamedTuple):
 
 @dataclass(frozen=True)
 class Reach:
-    """The mu_macro [-] to be had in ``low <= unknown <= high``; an end that is only approached is not included."""
+    """Which mu_macro can be had in a range of the unknown.
+
+    Attributes
+    ----------
+    low, high : float
+        The range of the unknown [SI].
+    mu_min, mu_max : float
+        Smallest and largest mu_macro in it [-].
+    min_included, max_included : bool
+        False where that value is approached and never reached.
+    """
 
     low: float
     high: float
@@ -55,7 +65,21 @@ class Reach:
 
 @dataclass(frozen=True)
 class Solution:
-    """All roots of every target, ascending; ``constant`` when the unknown has no influence on mu_macro."""
+    """All roots of every target.
+
+    Attributes
+    ----------
+    unknown : str
+        The input that was asked for.
+    targets : tuple of float
+        The wanted mu_macro [-].
+    roots : tuple of tuple of Root
+        The roots of each target, ascending; empty where it cannot be had.
+    reach : Reach
+        What can be had in the range that was searched.
+    constant : bool
+        True when the unknown has no influence on mu_macro, such as v0 without oscillation.
+    """
 
     unknown: str
     targets: tuple[float, ...]

@@ -207,10 +207,23 @@ def solve_for(
         Where to look [SI].  Left out: everywhere for v0, y0, omega; for k, Fz and mu0 from where the contact is so soft
         that mu_macro = mu0 to where it is as good as rigid.
 
+    Returns
+    -------
+    Solution
+        All roots of every target, ascending, each with the interval that the error bound leaves; and what is in reach.
+
     Raises
     ------
     InputError
         A value out of bounds, an unknown that is given or does not exist, a range that is none.
+
+    Examples
+    --------
+    >>> import mumacro
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
+    >>> found = solve_for(mumacro.open(), "y0", [0.15, 0.4], case)
+    >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]      # 0.4 is more than mu0
+    [['2.8570e-06 m'], []]
     """
     known = checked_case(case, unknown)
     wanted = np.atleast_1d(np.asarray(targets, dtype=np.float64)).ravel()
