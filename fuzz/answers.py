@@ -271,7 +271,8 @@ def across_processors(n: int, tolerance: float) -> tuple[Array, Array]:
             environment = {
                 **os.environ,
                 "PYTHONPATH": str(reporting.ROOT),
-                **({"NUMBA_CPU_NAME": name} if name else {}),
+                # without features of its own a name gets those of this machine
+                **({"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} if name else {}),
             }
             path = Path(folder) / f"{name}.npy"
             command = [sys.executable, __file__, "dump", str(path), str(n), str(tolerance)]
