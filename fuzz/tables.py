@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import reporting
 from hostile_tables import HOSTILE
-from measuring import markdown
+from measuring import markdown, progress
 
 SMALLEST = min((reporting.ROOT / "tables").glob("*.nc"), key=lambda path: path.stat().st_size)
 STEP = 256  # bytes between truncations
@@ -65,6 +65,8 @@ def in_other_process(*arguments: str, timeout: float = PATIENCE) -> tuple[list[O
     """What the other process found, one outcome a line, and its exit code."""
     command = [sys.executable, __file__, "open", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+    if done.returncode:
+        progress(done.stderr)
     return [Outcome(*json.loads(line)) for line in done.stdout.splitlines()], done.returncode
 
 

@@ -406,7 +406,7 @@ def form(quantity: int, block: int, v: float, y: float, phi: float) -> tuple[flo
         return 0.0, v * y * y if block == S_LOW else (1.0 if block == S_MID else y)
     if block in (C_TAIL, S_TAIL):
         factor = v / y
-        if factor < 1e-100:  # stick-slip: the outer solution's logarithm and the layer's cancel in closed form
+        if block == S_TAIL and factor < 1e-100:  # the outer solution's logarithm and the layer's cancel in closed form
             return factor * TWO_OVER_PI * (math.log(4.0) + 0.5 * math.log(y)), factor
         first, _, _, _, _ = outer_expansion(1.0 / factor)
         return first + factor * TWO_OVER_PI * math.log(v / math.sqrt(y)) if block == S_TAIL else first, factor
@@ -467,7 +467,7 @@ def differential(
         return 0.0, a_y, b_v, b_y, 0.0, 0.0, rest, -rest
     if block in (C_TAIL, S_TAIL):
         factor = v / y
-        if factor < 1e-100:
+        if block == S_TAIL and factor < 1e-100:
             base_v, _ = form(MU, block, v, y, 0.0)
             base_y = 0.5 * factor * TWO_OVER_PI - base_v
         else:

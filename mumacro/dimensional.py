@@ -280,6 +280,8 @@ def evaluate_unusual(
     if r == 0.0:
         return 1.0, ROUNDING, RIGID, v, y
     mu, _, _, _, _ = outer_expansion(r)
+    if r == math.inf:  # eq. (35) is 2.5e-306 where r leaves double range
+        return 0.0, 3.0 * DENORMAL, RIGID, v, y
     # y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large
     return mu, ROUNDING * mu + (0.0 if k == math.inf or v > 1e150 else mu), RIGID, v, y
 

@@ -243,17 +243,15 @@ def common_ratio(
 def fast_ratio(v: float, y: float) -> tuple[float, float]:
     """mu~ and its bound for large v~: two terms in closed form."""
     # (35) at y~ / sqrt(1 + v~^2) is exact to O(y~^2) at every v~; what it takes from the second term is half r f'
-    if max(v, y) < 1e150:
-        share = 1.0 / (1.0 + v * v)
-        t = 1.0 + y * y * share
-    else:
-        share, t = 0.0, 1.0 + (y / v) * (y / v)
+    plain = max(v, y) < 1e150
+    share = 1.0 / (1.0 + v * v)
+    t = 1.0 + (y * y * share if plain else (y / v) * (y / v))
     if t < QUICK_MAX:
         first, rest = outer_quick(t)
     else:
         first, second, slope, _, _ = outer_expansion(y / math.hypot(v, 1.0))
         rest = second + 0.5 * slope
-    correction = rest * share
+    correction = rest * share if plain else rest / v / v
     # the next term is smaller by (y~/v~^2)^2 where y~ > v~, by 1/v~^2 elsewhere
     small = max(y / v / v, 1.0 / v)
     return min(first + correction, 1.0), 4.0 * abs(correction) * small * small + ROUNDING * first

@@ -1,0 +1,311 @@
+"""Numbers never lie: what answers promise, over the full double range of every input.
+
+    python fuzz/answers.py [--only promises] [--share 0.01] [--write]
+
+Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size whose groups v~ and
+y~ lie where the table works; and a share of inputs at the ends of the range.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import reporting
+from measuring import markdown, quantity
+from numpy.typing import NDArray
+
+from builder.measure import SEAMS
+from builder.sweep import Sweep
+from builder.verify import _both_sides
+from mumacro import Surrogate
+from mumacro.dimensional import FIELDS
+
+Array = NDArray[np.float64]
+Cases = dict[str, Array]
+N = 1_000_000  # cases of a promise in the full run
+ENDS = np.array([5e-324, 2.2250738585072014e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300, 1.7976931348623157e308])
+CPU = "x86-64-v2"  # without AVX, AVX-512 and fused multiply-add
+
+
+def any_bits(rng: np.random.Generator, n: int) -> Array:
+    """Positive finite doubles, every bit pattern as likely as the other; every tenth at an end of the range."""
+    out = rng.integers(1, 0x7FF0000000000000, n, dtype=np.uint64).view(np.float64)
+    ends = rng.random(n) < 0.1
+    out[ends] = rng.choice(ENDS, int(ends.sum()))
+    return out
+
+
+def draw(n: int, seed: int) -> Cases:
+    """``n`` legal cases; in half of them the groups lie between 1e-12 and 1e12."""
+    rng = np.random.default_rng(seed)
+    cases = {name: any_bits(rng, n) for name in FIELDS}
+    half = n // 2
+    v, y, mu0, Fz, k, omega = (
+        10.0 ** rng.uniform(low, high, half)
+        for low, high in ((-12, 12), (-12, 12), (-3, 1), (-60, 60), (-60, 60), (-60, 60))
+    )
+    length = mu0 * Fz / k
+    plain = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y * length, "omega": omega, "v0": v * omega * length}
+    for name, values in plain.items():
+        cases[name][:half] = values
+    for name in ("y0", "omega", "v0"):
+        cases[name][rng.random(n) < 0.01] = 0.0
+    cases["k"][rng.random(n) < 0.01] = np.inf
+    return cases
+
+
+def parts(total: int, share: float, size: int = 100_000) -> list[tuple[int, int]]:
+    """(how many, seed) of pieces that fit into memory."""
+    n = max(1000, int(total * share))
+    return [(min(size, n - low), low // size + 1) for low in range(0, n, size)]
+
+
+class Count:
+    """Cases tried, broken promises, and the largest of some measure."""
+
+    def __init__(self) -> None:
+        self.tried = self.broken = 0
+        self.worst = 0.0
+
+    def add(self, wrong: NDArray[np.bool_], measure: Array | float = 0.0) -> None:
+        self.tried += wrong.size
+        self.broken += int(np.count_nonzero(wrong))
+        self.worst = max(self.worst, float(np.max(measure, initial=0.0)))
+
+
+def excess(one: Any, other: Any, change: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Where a change of mu_macro is larger than both bounds together, and how large it is in units of them.
+
+    Below 2.3e-308 doubles are 5e-324 apart: there both numbers, and their bounds, are rounded to a multiple of that.
+    """
+    allowed = one.error_bound + other.error_bound
+    rounded = np.minimum(one.mu_macro, other.mu_macro) < 2.3e-308
+    allowed = np.where(rounded, allowed + 4 * 5e-324, allowed)
+    with np.errstate(all="ignore"):
+        return change > allowed, np.where(change > 0.0, change / np.where(allowed > 0.0, allowed, 5e-324), 0.0)
+
+
+# --- promises -----------------------------------------------------------------------------------------
+
+
+def finite(table: Surrogate, share: float) -> Count:
+    count = Count()
+    for n, seed in parts(N, share):
+        cases = draw(n, seed)
+        a = table.evaluate(cases)
+        good = np.isfinite(a.mu_macro) & (a.mu_macro >= 0.0) & (a.mu_macro <= cases["mu0"])
+        good &= (a.mu_ratio >= 0.0) & (a.mu_ratio <= 1.0) & np.isfinite(a.error_bound) & (a.error_bound >= 0.0)
+        count.add(~good)
+    return count
+
+
+def monotone(table: Surrogate, share: float) -> Count:
+    """mu_macro never falls as v0 rises, nor rises as y0 or omega rise, by more than both bounds."""
+    count = Count()
+    for n, seed in parts(N // 3, share):
+        cases, rng = draw(n, seed), np.random.default_rng(seed + 1000)
+        one = table.evaluate(cases)
+        for name, sign in (("v0", 1.0), ("y0", -1.0), ("omega", -1.0)):
+            with np.errstate(all="ignore"):
+                step = cases[name] * (1.0 + 10.0 ** rng.uniform(-16.0, 1.0, n))
+                step = np.minimum(np.maximum(step, np.nextafter(cases[name], np.inf)), 1.7976931348623157e308)
+            other = table.evaluate({**cases, name: step})
+            # omega = 0 is no oscillation at all, whatever v0 is: a limit of its own, as y0 = 0 is
+            count.add(*excess(one, other, sign * (one.mu_macro - other.mu_macro)))
+    return count
+
+
+def scale_invariant(table: Surrogate, share: float) -> tuple[Count, Count]:
+    """(Fz, k) and (v0, omega) by one power of two: the same bits; by any factor: within both bounds."""
+    bits, near = Count(), Count()
+    for n, seed in parts(N // 2, share):
+        cases, rng = draw(n, seed), np.random.default_rng(seed + 2000)
+        one = table.evaluate(cases)
+        for pair in (("Fz", "k"), ("v0", "omega")):
+            for factor, count in ((2.0 ** rng.integers(-60, 60, n), bits), (10.0 ** rng.uniform(-20, 20, n), near)):
+                with np.errstate(all="ignore"):
+                    moved = {name: cases[name] * factor for name in pair}
+                # a factor that leaves the normal range rounds the input itself
+                kept = np.ones(n, np.bool_)
+                for name in pair:
+                    normal = (moved[name] >= 1e-305) & (moved[name] < 1e305) & (cases[name] >= 1e-305)
+                    kept &= normal | ((cases[name] == 0.0) | np.isinf(cases[name]))
+                given = {name: values[kept] for name, values in {**cases, **moved}.items()}
+                other = table.evaluate(given)
+                change = np.abs(one.mu_macro[kept] - other.mu_macro)
+                if count is bits:
+                    count.add(change != 0.0)
+                else:
+                    first = table.evaluate({name: values[kept] for name, values in cases.items()})
+                    count.add(*excess(first, other, change))
+    return bits, near
+
+
+def neighbours(table: Surrogate, share: float) -> Count:
+    """One input moved to the next double: mu_macro moves by no more than both bounds."""
+    count = Count()
+    for n, seed in parts(N // 6, share):
+        cases = draw(n, seed)
+        one = table.evaluate(cases)
+        for name in FIELDS:
+            # zero is a limit of its own, and the last digit of a denormal number is a large part of it
+            ordinary = (cases[name] > 1e-300) & (cases[name] < 1e300)
+            moved = np.where(ordinary, np.nextafter(cases[name], 1.7e308), cases[name])
+            other = table.evaluate({**cases, name: moved})
+            change = np.abs(one.mu_macro - other.mu_macro)
+            if name == "mu0":
+                change = np.maximum(change - 2.3e-16 * one.mu_macro, 0.0)  # mu_macro is proportional to it
+            count.add(*excess(one, other, change))
+    return count
+
+
+def seams(table: Surrogate, share: float) -> Count:
+    """Points 2e-13 apart on both sides of every seam and of the border."""
+    count = Count()
+    for v1, v2, y1, y2 in _both_sides(table, max(200, int(N // (len(SEAMS) + 3) * share)), 7):
+        one, two = table.ratio_with_bound(v1, y1), table.ratio_with_bound(v2, y2)
+        change = np.maximum(np.abs(one[0] - two[0]) - 4e-13 * one[0], 0.0)  # mu~ rises by up to its own share
+        allowed = one[1] + two[1]
+        count.add(change > allowed, change / allowed)
+    return count
+
+
+def fresh_solves(table: Surrogate, share: float) -> Count:
+    """|table - full model| against bound + what the solver may be wrong by."""
+    count = Count()
+    with Sweep(os.cpu_count() or 1) as sweep:
+        for n, seed in parts(N // 10, share, 20_000):
+            a = table.evaluate(draw(n, seed), groups=True)
+            v, y = a.v_tilde, a.y_tilde
+            ordinary = (v > 0.0) & (y > 0.0) & np.isfinite(v) & np.isfinite(y)
+            v, y, mu = v[ordinary], y[ordinary], a.mu_ratio[ordinary]
+            _, bound, _ = table.ratio_with_bound(v, y)
+            solved = sweep.solve("full", v, y)
+            error = np.maximum(np.abs(mu - solved["mu_ratio"]) - solved["error_estimate"], 0.0)
+            with np.errstate(all="ignore"):
+                count.add(error > bound, np.where(bound > 0.0, error / bound, 0.0))
+    return count
+
+
+def same_bits(table: Surrogate, share: float) -> Count:
+    """Alone, in a batch, in another order, as columns, with gradients, with one and two threads."""
+    count = Count()
+    one_thread, two_threads = Surrogate.open(table.path, threads=1), Surrogate.open(table.path, threads=2)
+    for n, seed in parts(N, share):
+        cases, rng = draw(n, seed), np.random.default_rng(seed)
+        given = list(cases.values())
+        expected = table.evaluate(cases)
+        rows = np.stack([expected.mu_macro, expected.mu_ratio, expected.error_bound, expected.source_code])
+
+        def compare(found: Any, at: Any = slice(None), rows: Array = rows) -> None:  # every case of the batch by itself
+            other = np.stack([found.mu_macro, found.mu_ratio, found.error_bound, found.source_code])
+            count.add(np.any(rows[:, at].view(np.uint64) != other.view(np.uint64), axis=0))
+
+        order = rng.permutation(n)
+        compare(one_thread.evaluate(cases))
+        compare(two_threads.evaluate(cases))
+        compare(table.evaluate({name: values[order] for name, values in cases.items()}), order)
+        compare(table.evaluate(cases, gradient=True))
+        macro, mu, bound, source = table.evaluate_columns(*given)
+        count.add(np.any(rows.view(np.uint64) != np.stack([macro, mu, bound, source]).view(np.uint64), axis=0))
+        for i in rng.integers(0, n, max(1, n // 50)).tolist():
+            alone = table.evaluate(**{name: float(values[i]) for name, values in cases.items()})
+            said = np.array([alone.mu_macro, alone.mu_ratio, alone.error_bound, alone.source_code], np.float64)
+            count.add(np.array([np.any(said.view(np.uint64) != rows[:, i].copy().view(np.uint64))]))
+    return count
+
+
+def promises(share: float) -> str:
+    """Every promise, for the coarsest and the finest table."""
+    started = time.perf_counter()
+    rows = []
+    for tolerance in (1e-4, 1e-12):
+        table = Surrogate.open(tolerance)
+        scaled: dict[str, tuple[Count, ...]] = {}
+
+        def scales(table: Surrogate, share: float, i: int, scaled: dict[str, tuple[Count, ...]] = scaled) -> Count:
+            if not scaled:
+                scaled["both"] = scale_invariant(table, share)
+            return scaled["both"][i]
+
+        checks: dict[str, Callable[[Surrogate, float], Count]] = {
+            "finite, in [0, mu0], with a finite bound": finite,
+            "rises with v0, falls with y0 and omega": monotone,
+            "(Fz, k) or (v0, omega) by a power of two: the same bits": lambda t, s: scales(t, s, 0),
+            "(Fz, k) or (v0, omega) by any factor": lambda t, s: scales(t, s, 1),
+            "one input to the next double": neighbours,
+            "on both sides of every seam": seams,
+            "the bound covers a fresh solve": fresh_solves,
+            "the same bits alone, in any order, as columns, with 1 and 2 threads": same_bits,
+        }
+        for name, check in checks.items():
+            found = check(table, share)
+            worst = quantity(found.worst) if found.worst else ""
+            rows.append([name, f"{tolerance:g}", f"{found.tried:,}", f"{found.broken:,}", worst])
+    head = ("promise", "table", "tried", "broken", "largest change or error, bound = 1")
+    return f"{markdown(head, rows)}\n\n{reporting.took(started)}"
+
+
+# --- another processor --------------------------------------------------------------------------------
+
+
+def dump(path: str, n: str, tolerance: str) -> None:
+    """Answers to drawn cases, for another process."""
+    a = Surrogate.open(float(tolerance)).evaluate_columns(*draw(int(n), 99).values())
+    np.save(path, np.stack(a))
+
+
+def across_processors(n: int, tolerance: float) -> tuple[Array, Array]:
+    """(mu_macro, mu~, bound, source) of n drawn cases, rows (4, n), here and compiled for a plain processor."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("", CPU):
+            environment = {
+                **os.environ,
+                "PYTHONPATH": str(reporting.ROOT),
+                # without features of its own a name gets those of this machine
+                **({"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} if name else {}),
+            }
+            path = Path(folder) / f"{name}.npy"
+            command = [sys.executable, __file__, "dump", str(path), str(n), str(tolerance)]
+            subprocess.run(command, env=environment, check=True, timeout=1800)
+            found.append(np.load(path))
+    return found[0], found[1]
+
+
+def processors(share: float) -> str:
+    """The same cases with and without AVX and fused multiply-add."""
+    started = time.perf_counter()
+    rows = []
+    for tolerance in (1e-4, 1e-12):
+        n = max(1000, int(N * share))
+        here, there = across_processors(n, tolerance)
+        differ = here[0] != there[0]
+        change = np.abs(here[0] - there[0])
+        outside = change > here[2] + there[2]
+        with np.errstate(all="ignore"):
+            relative = np.nanmax(np.where(here[0] > 1e-300, change / here[0], 0.0))
+            units = np.nanmax(np.where(change > 0.0, change / (here[2] + there[2]), 0.0))
+        sources = np.count_nonzero(here[3] != there[3])
+        rows.append([f"{tolerance:g}", f"{n:,}", f"{np.count_nonzero(differ) / n:.1%}", f"{np.count_nonzero(outside)}",
+                     quantity(float(units)), quantity(float(relative)), f"{sources:,}"])  # fmt: skip
+    head = ("table", "cases", "other bits", "outside both bounds", "largest difference, both bounds = 1",
+            "largest, relative", "another source")  # fmt: skip
+    return f"{markdown(head, rows)}\n\n{reporting.took(started)}"
+
+
+SECTIONS = {"promises": promises, "processors": processors}
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["dump"]:
+        dump(*sys.argv[2:])
+    else:
+        reporting.report(__doc__ or "", SECTIONS)

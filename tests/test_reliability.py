@@ -1,0 +1,222 @@
+"""Samples of what the scripts in fuzz/ try in full for docs/reliability.md."""
+
+import importlib
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from builder.steady import solve
+from builder.sweep import CheckpointError, Sweep
+from mumacro import Surrogate
+from mumacro.writing import BusyError, alone_in, write_whole
+
+pytest.importorskip("pyarrow", reason="the extra files is not installed")
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "reliability.md"
+
+
+def load(name: str) -> ModuleType:
+    """A script of fuzz/ as a module, with its neighbours importable and the path as it was afterwards."""
+    before = sys.path[:]
+    sys.path.insert(0, str(ROOT / "fuzz"))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path[:] = before
+
+
+tables, hostile, faults, answers, strings = map(
+    load, ("tables", "hostile_tables", "faults", "answers", "number_strings")
+)
+
+
+# --- tables from strangers ----------------------------------------------------------------------------
+
+#: a table with other numbers and a checksum that fits them is another table; it may answer as it likes
+ANOTHER = {
+    "numbers of 1.7e308, checksum right", "random numbers of 1e100, checksum right",
+    "amplitudes of 1e300, checksum right", "errors of 1e308, checksum right",
+}  # fmt: skip
+HARMLESS = {"a group that holds itself", "3,000 groups, one in the other"}
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, str, float, float]]:
+    """Every hostile file, opened by one other process that may take 256 MB."""
+    folder = tmp_path_factory.mktemp("hostile")
+    for i, make in enumerate(hostile.HOSTILE.values()):
+        make(folder / f"{i}.nc")
+    outcomes, code = tables.in_other_process(*(str(folder / f"{i}.nc") for i in range(len(hostile.HOSTILE))))
+    names = list(hostile.HOSTILE)
+    assert len(outcomes) == len(names), f"died of: {names[len(outcomes)]}"
+    assert code == 0
+    return dict(zip(names, outcomes, strict=True))
+
+
+@pytest.mark.parametrize("name", hostile.HOSTILE)
+def test_a_hostile_file_is_refused_before_memory_is_taken(opened, name: str) -> None:
+    found = opened[name]
+    assert found.what == ("differs" if name in ANOTHER else "same" if name in HARMLESS else "refused"), found
+    assert found.megabytes < 128.0
+
+
+@pytest.mark.parametrize("change", tables.CHANGES)
+def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
+    size = tables.SMALLEST.stat().st_size
+    images = {}
+    for start in range(0, size, 4096 if change == "cut" else 2501):
+        images.update(tables.work(start, 1, change))
+    assert len(images) > 30
+    found = [tables.outcome(image, Path(f"{start}.nc")) for start, image in images.items()]
+    assert {one.what for one in found} <= {tables.REFUSED, tables.SAME}, found
+    assert sum(one.what == tables.REFUSED for one in found) > 0.7 * len(found)
+
+
+# --- answers ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=[1e-4, 1e-12])
+def table(request: pytest.FixtureRequest) -> Surrogate:
+    return Surrogate.open(request.param)
+
+
+@pytest.mark.parametrize("promise", ["finite", "monotone", "neighbours", "seams", "fresh_solves", "same_bits"])
+def test_answers_keep_their_promises_over_the_full_double_range(table: Surrogate, promise: str) -> None:
+    found = getattr(answers, promise)(table, 0.01)
+    assert found.tried >= 500
+    assert found.broken == 0
+
+
+@pytest.mark.parametrize("x", [0.6, 1.18, 2.68, 30.0, 54.0, 55.0, 125.0, 250.0])
+@pytest.mark.parametrize("y", [1e120, 1e149, 1e151, 1e181, 1e198, 1e202, 1e241, 1e296, 1e304])
+def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate, x: float, y: float) -> None:
+    """(mu~ - f(r)) r = G(v~/sqrt y~); f was taken without a logarithm above 1e200, G was left out above 1e150."""
+    v = x * np.sqrt(y)
+    found, bound, _ = table.ratio_with_bound(v, y)
+    expected = solve(v, y)
+    assert abs(found - expected.mu_ratio) <= bound + expected.error_estimate
+    along_v, along_y, error_v, error_y = table.slopes(v, y, bounds=True)[1:]
+    near = {h: (solve(v * (1.0 + h), y).mu_ratio, solve(v, y * (1.0 + h)).mu_ratio) for h in (-1e-4, 1e-4)}
+    noise = 1e-7 * found  # of differences
+    assert abs(along_v - (near[1e-4][0] - near[-1e-4][0]) / 2e-4) <= error_v + noise
+    assert abs(along_y - (near[1e-4][1] - near[-1e-4][1]) / 2e-4) <= error_y + noise
+
+
+def test_a_ratio_beyond_double_range_is_bounded(table: Surrogate) -> None:
+    """y0 omega/v0 beyond double range: eq. (35) is 2.5e-306 there, not 0."""
+    case = {"mu0": 1.0, "Fz": 1.0, "k": None, "y0": 1.7976931348623157e308, "v0": 1e160}
+    inside, beyond = (table.evaluate(**case, omega=omega) for omega in (1e160, np.nextafter(1e160, 1e161)))
+    assert inside.mu_ratio > 2.5e-306
+    assert abs(inside.mu_ratio - beyond.mu_ratio) <= inside.error_bound + beyond.error_bound
+
+
+def test_scales_that_the_groups_do_not_see_are_not_seen(table: Surrogate) -> None:
+    by_powers_of_two, by_any_factor = answers.scale_invariant(table, 0.01)
+    assert by_powers_of_two.tried > 5000
+    assert by_powers_of_two.broken == by_any_factor.broken == 0
+
+
+@pytest.mark.slow
+def test_another_processor_answers_within_the_bounds() -> None:
+    """What is promised across processors: not the bits, but both bounds, and the same source."""
+    here, there = answers.across_processors(20_000, 1e-12)
+    assert np.all(np.abs(here[0] - there[0]) <= here[2] + there[2])
+    assert np.array_equal(here[3], there[3])
+
+
+@pytest.mark.parametrize("kind", ["csv", "ndjson"])
+@pytest.mark.parametrize("what", strings.KINDS)
+def test_number_strings_give_the_bits_of_float_or_are_refused(tmp_path: Path, what: str, kind: str) -> None:
+    same, refused, other = strings.compare(strings.drawn(1000, 5, what), kind, tmp_path)
+    assert other == 0
+    if what in ("beyond the range", "no numbers"):
+        assert refused == 1000
+    elif what != "random digits and exponents":  # some of those are beyond the range, or no JSON
+        assert same == 1000
+
+
+# --- disks, permissions, processes --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "disk full while a table is written",
+        "no permission to write a table",
+        pytest.param("no permission to write eval's output", marks=pytest.mark.slow),
+        pytest.param("damaged kernel cache", marks=pytest.mark.slow),
+        pytest.param("a clock that steps", marks=pytest.mark.slow),
+    ],
+)
+def test_a_fault_loses_nothing(name: str) -> None:
+    what, seen = faults.tried(faults.FAULTS[name])
+    if what == "not tried":
+        pytest.skip(seen)
+    assert what == "held", seen
+
+
+def test_a_full_disk_in_a_sweep_is_told_and_what_is_finished_is_kept(tmp_path: Path) -> None:
+    v, y = np.full(60, 0.1), np.geomspace(0.1, 10.0, 60)
+    try:
+        with faults.small_disk(tmp_path, "16k") as disk, Sweep(1, checkpoint=disk / "work.checkpoint") as sweep:
+            sweep.solve("full", v[:20], y[:20])
+            kept = faults.left(disk)
+            many = np.geomspace(0.1, 10.0, 600)  # 29 kB of results
+            with pytest.raises(CheckpointError, match=r"work\.checkpoint: finished work cannot be kept: No space left"):
+                sweep.solve("full", many, many)
+            assert faults.left(disk) == kept
+    except faults.NotTriedError as error:
+        pytest.skip(str(error))
+
+
+def test_a_second_build_to_one_output_is_refused_in_a_line(run_builder, tmp_path: Path) -> None:
+    out = tmp_path / "rough.nc"
+    with alone_in(tmp_path / "rough.nc.checkpoint"):
+        done = run_builder("build", "--tolerance", "1e-2", "--out", out)
+    assert done.returncode == 1
+    assert "rough.nc.checkpoint: another process is at work here; wait for it, or stop it" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_given_back_at_the_end(tmp_path: Path) -> None:
+    folder = tmp_path / "work"
+    with alone_in(folder):
+        with pytest.raises(BusyError, match="another process is at work here"), alone_in(folder):
+            pass
+        (folder / "part").touch()
+    assert folder.is_dir()  # what was not finished stays
+    with alone_in(folder):
+        (folder / "part").unlink()
+    assert not folder.exists()
+
+
+def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_whole(tmp_path / "a", b"old")
+
+    def fail(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.fsync", fail)
+        with pytest.raises(KeyboardInterrupt):
+            write_whole(tmp_path / "a", b"new")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"old")]
+
+
+# --- the page -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("script", [tables, faults, answers, strings], ids=lambda script: script.__name__)
+def test_every_section_of_a_script_stands_on_the_page_and_nothing_failed(script: ModuleType) -> None:
+    page = PAGE.read_text("utf-8")
+    for name in script.SECTIONS:
+        section = re.search(rf"<!-- begin {name} -->\n(.*?)<!-- end {name} -->", page, re.DOTALL)
+        assert section is not None, name
+        assert "Machine: " in section[1]
+        assert "FAILED" not in section[1]
