@@ -84,7 +84,7 @@ class Page:
     def settle(self):
         """Wait until every question that follows from the state is answered."""
         self.run(
-            "while (document.getElementById('main')?.getAttribute('aria-busy') !== 'false')"
+            "while (document.getElementById('main')?.dataset.asking !== 'false')"
             " await new Promise((next) => setTimeout(next, 10));"
         )
         return self
@@ -115,7 +115,7 @@ class Page:
             self.settle_unless_bad()
 
     def settle_unless_bad(self):
-        if self.run("return document.querySelector('#main').getAttribute('aria-busy');") == "true":
+        if self.run("return document.querySelector('#main').dataset.asking;") == "true":
             self.settle()
 
     def wait_until_shown(self, selector):

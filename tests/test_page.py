@@ -8,6 +8,8 @@ import pytest
 
 from mumacro.input_names import UNITS_OF
 from mumacro.law import APPROXIMATIONS
+from service.routes import docs
+from service.routes import page as page_route
 from service.routes.page import ASSETS, POLICY
 
 
@@ -122,6 +124,10 @@ def test_the_description_is_accessible_and_leads_back(open_page, repository):
     page = open_page(path="docs")
     page.wait_for("#swagger-ui", "The value of one input that gives a wanted mu_macro")
     assert not page.find("#key-form").is_displayed()
+    # with a call of either kind open
+    page.run("for (const call of ['get', 'post'])"
+             " document.querySelector(`.opblock-${call} .opblock-summary-control`).click();")  # fmt: skip
+    page.wait_for("#swagger-ui", "Coulomb friction coefficient of the contact")
     assert inaccessible(page, repository) == {}
     page.find("#back").click()
     page.settle()
@@ -129,46 +135,46 @@ def test_the_description_is_accessible_and_leads_back(open_page, repository):
     assert page.complaints() == []
 
 
-def test_the_page_is_open_where_the_numbers_are_not(tables_dir, problem):
-    from starlette.testclient import TestClient
-
-    from service.app import create_app
-    from service.routes import docs, page
-    from service.settings import Settings
-
-    with TestClient(create_app(Settings(tables=(tables_dir,), api_key="sesame"), wait=True)) as client:
-        for path in page.OPEN_PATHS | docs.OPEN_PATHS:
-            assert client.get(path).status_code == 200, path
-        for path in ("/static/page/map.json", "/v1/mu-macro", "/openapi.json", "/v1/law.csv", "/Info", "/static/page/"):
-            problem(client.get(path), 401)
-        assert client.get("/static/page/map.json", headers={"X-API-Key": "sesame"}).status_code == 200
-
-
-def test_the_pages_ask_for_the_key_and_use_it(open_page, serving, tables_dir, tmp_path):
+@pytest.fixture(scope="module")
+def closed(serving, tables_dir):
+    """A service with an API key in force."""
     with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
-        url = f"http://127.0.0.1:{server.port}"
-        page = open_page(url=url, path="docs")
-        page.wait_until_shown("#key-form")
-        page.enter_key("open-sesame")
-        page.wait_for("#swagger-ui", "mu_macro over a range of one input")
-        assert not page.find("#key-form").is_displayed()
-        page.find("#back").click()  # the tab still has the key; forgotten, it has not
-        page.wait_for("#mu", "^0.240012$")
-        page.find("#forget").click()
-        page.wait_for("#mu", "^…$")
-        page.wait_until_shown("#key-form")
-        assert page.run("return sessionStorage.length;") == 0
-        for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
-            page.enter_key(wrong)
-            page.wait_for("#key-status", said)
-            assert page.text("#mu") == "…"
-        page.enter_key("open-sesame")
-        page.wait_for("#mu", "^0.240012$")
-        page.settle()
-        assert not page.find("#key-form").is_displayed()
-        time.sleep(0.2)  # the address follows with a delay
-        assert "sesame" not in page.browser.current_url + page.find("#link").get_attribute("href")
-        assert page.download("#csv", tmp_path, "friction-law-v0.csv").stat().st_size > 10_000
-        page.run("sessionStorage.clear();")
-        # a browser writes down every answer of 401; nothing else may be there
-        assert [entry for entry in page.complaints() if "401" not in entry] == []
+        yield server
+
+
+def test_the_page_is_open_where_the_numbers_are_not(closed):
+    for path in page_route.OPEN_PATHS | docs.OPEN_PATHS:
+        assert closed.ask("GET", path)[0] == 200, path
+    for path in ("/static/page/map.json", "/v1/mu-macro", "/openapi.json", "/v1/law.csv", "/Info", "/static/page/"):
+        status, headers, _ = closed.ask("GET", path)
+        assert (status, headers["content-type"]) == (401, "application/problem+json"), path
+    assert closed.ask("GET", "/static/page/map.json", headers={"X-API-Key": "open-sesame"})[0] == 200
+
+
+def test_the_pages_ask_for_the_key_and_use_it(open_page, closed, tmp_path):
+    url = f"http://127.0.0.1:{closed.port}"
+    page = open_page(url=url, path="docs")
+    page.wait_until_shown("#key-form")
+    page.enter_key("open-sesame")
+    page.wait_for("#swagger-ui", "mu_macro over a range of one input")
+    assert not page.find("#key-form").is_displayed()
+    page.find("#back").click()  # the tab still has the key; forgotten, it has not
+    page.wait_for("#mu", "^0.240012$")
+    page.find("#forget").click()
+    page.wait_for("#mu", "^…$")
+    page.wait_until_shown("#key-form")
+    assert page.run("return sessionStorage.length;") == 0
+    for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
+        page.enter_key(wrong)
+        page.wait_for("#key-status", said)
+        assert page.text("#mu") == "…"
+    page.enter_key("open-sesame")
+    page.wait_for("#mu", "^0.240012$")
+    page.settle()
+    assert not page.find("#key-form").is_displayed()
+    time.sleep(0.2)  # the address follows with a delay
+    assert "sesame" not in page.browser.current_url + page.find("#link").get_attribute("href")
+    assert page.download("#csv", tmp_path, "friction-law-v0.csv").stat().st_size > 10_000
+    page.run("sessionStorage.clear();")
+    # a browser writes down every answer of 401; nothing else may be there
+    assert [entry for entry in page.complaints() if "401" not in entry] == []

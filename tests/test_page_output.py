@@ -1,6 +1,7 @@
 """The page in a browser: the numbers, the map, the friction law, solving for an input, downloads."""
 
 import csv
+import re
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -196,6 +197,29 @@ def test_the_law_goes_along_every_input(open_page, along):
     assert page.text("#law-input") == head
     assert "Macroscopic friction from" in page.find("#law").get_attribute("aria-label")
     assert (page.text("#status"), page.text("#law-status")) == ("", "")
+    assert page.complaints() == []
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "#v0=1e307",
+        "#v0=1e-310&along=v0",
+        "#k=1e300&along=k",
+        "#y0=0&omega=0&v0=0",
+        "#k=rigid&y0=0&v0=0",
+        "#k=rigid&along=k&mu0.std=0.1",
+        "#y0=1e300&omega=1e200&along=omega",
+        "#mu0=1e-300&Fz=1e-10&along=mu0&scale=linear",
+        "#v0=0&y0=3e-6&y0.std=1e-9",
+    ],
+)
+def test_the_ends_of_every_range_are_answered(open_page, address):
+    page = open_page(address)
+    assert float(page.text("#mu")) >= 0
+    assert (page.text("#status"), page.text("#law-status")) == ("", "")
+    shown = page.run("return document.querySelector('main').innerText;")
+    assert not re.search(r"NaN|undefined|null|Infinity|\[object", shown)
     assert page.complaints() == []
 
 

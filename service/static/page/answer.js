@@ -17,7 +17,7 @@ export function showAnswer(found, state) {
   const { limits, groups, power } = found;
   const texts = {
     mu: show(found.mu_macro, 6), regime: REGIMES[found.regime], ratio: show(found.mu_ratio, 6),
-    "peak-speed": withUnit("v0", values.y0 * values.omega), stick: `${show(100 * found.stick_fraction, 4)} %`,
+    "peak-speed": withUnit("v0", values.y0 * values.omega), stick: found.stick_fraction === null ? "–" : `${show(100 * found.stick_fraction, 4)} %`,
     shaker: power.oscillation === null && state.rigid ? "– (rigid)" : watts(power.oscillation), saved: watts(power.saved), static: show(limits.mu_static, 6),
     crit: withUnit("v0", limits.v0_crit), "v-tilde": groups.v_tilde === null ? "∞" : show(groups.v_tilde, 5),
     "y-tilde": groups.y_tilde === null ? "∞" : show(groups.y_tilde, 5),

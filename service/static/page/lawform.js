@@ -1,5 +1,5 @@
 // The controls of the law: along what, from where to where, which curves beside it.
-import { INPUTS, NAMES, fromSI } from "./inputs.js";
+import { INPUTS, NAMES, fromSI, unitText } from "./inputs.js";
 import { lawRange, readCurves } from "./lawpanel.js";
 import { readValue } from "./read.js";
 import { show } from "./show.js";
@@ -71,6 +71,8 @@ export class LawForm {
     $("curves-label").hidden = $("curves-hint").hidden = !state.family;
     const text = (name, value) => show(fromSI(name, state.units[name], value), 6);
     if (state.family && !this.faults.curves) $("curves").value = state.curves.map((value) => text(state.family, value)).join("; ");
+    $("curves-unit").textContent = state.family ? unitText(state.units[state.family]) : "";
+    for (const place of document.querySelectorAll("#law-options .unit")) place.textContent = unitText(state.units[state.along]);
     const range = lawRange(state, border);
     ENDS.forEach((end, i) => {
       $(end).placeholder = text(state.along, range[i]);

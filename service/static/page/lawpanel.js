@@ -5,6 +5,7 @@ import { readNumber, readValue } from "./read.js";
 import { REGIMES, show, withUnit } from "./show.js";
 
 const POINTS = 301;
+const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 const MOST_CURVES = 20;
 const DASHES = [[7, 4], [2, 3], [12, 4], [7, 3, 2, 3]];
 
@@ -20,7 +21,7 @@ export function lawRange(state, border) {
   const unit = units[along];
   const here = (along === "v0" ? [border, values.v0] : [values[along]]).filter((value) => value > 0 && Number.isFinite(value));
   if (!here.length) here.push(INPUTS[along].start);
-  const [low, high] = [Math.min(...here), Math.max(...here)].map((value) => fromSI(along, unit, value));
+  const [low, high] = [Math.min(...here), Math.max(...here)].map((value) => fromSI(along, unit, Math.min(Math.max(value, LEAST), MOST)));
   const auto = scale === "linear"
     ? [INPUTS[along].positive ? Number((high / 100).toPrecision(1)) : 0, Number((4 * high).toPrecision(1))]
     : [Number(`1e${Math.floor(Math.log10(low)) - 2}`), Number(`1e${Math.ceil(Math.log10(high)) + 2}`)];

@@ -50,7 +50,7 @@ const asks = {
   map: channel(status, "map", () => get("static/page/map.json"), (data) => { map.show(data); keyTaken(); movePoint(); }),
   hover: new Channel({ ask: ([v, y]) => get("v1/mu-macro", { mu0: 1, Fz: 1, k: 1, omega: 1, y0: y, v0: v }), answer: showHover, fail: () => {} }),
 };
-const busy = () => $("main").setAttribute("aria-busy", String(![asks.point, asks.law, asks.family, asks.map].every((one) => one.idle)));
+const busy = () => { $("main").dataset.asking = String(![asks.point, asks.law, asks.family, asks.map].every((one) => one.idle)); };
 
 function ask() {
   status.set("typed", form.faults.size ? `${[...form.faults.values()].join(" ")} ${OLD}` : null);

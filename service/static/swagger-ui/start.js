@@ -20,6 +20,17 @@ const accessible = ({ React }) => ({
   },
 });
 
+// The same for what opens later: text that scrolls can be scrolled by keyboard, a choice has a name, and answers of
+// two calls are not two places of one name.
+function tidy() {
+  for (const text of document.querySelectorAll("pre.microlight:not([tabindex])")) text.tabIndex = 0;
+  for (const table of document.querySelectorAll(".responses-table[role=region]")) table.removeAttribute("role");
+  for (const choice of document.querySelectorAll("tr[data-param-name] select:not([aria-label])")) {
+    choice.setAttribute("aria-label", choice.closest("tr").dataset.paramName);
+  }
+}
+new MutationObserver(tidy).observe($("swagger-ui"), { childList: true, subtree: true });
+
 function show(spec) {
   $("status").textContent = "";
   keyTaken();
