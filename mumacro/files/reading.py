@@ -143,6 +143,7 @@ class ParquetSource(Source):
         return self.share(place, place.at / max(self.counts[place.file], 1))
 
     def blocks(self, place: Place) -> Iterator[Block]:
+        """The blocks of a file from a place on."""
         path = self.files[place.file]
         before = 0
         with pa.parquet.ParquetFile(path, pre_buffer=False) as file:
@@ -180,6 +181,7 @@ class _TextSource(Source):
     quotes: bool
 
     def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:
+        """Fix the schema, now that the inputs are known."""
         self.columns, self.verbatim = columns, verbatim
         self.inputs = [column for column, _ in columns.places.values()]
         self.bytes = max(2**14, min(BYTES, 64 * part_rows))
@@ -201,6 +203,7 @@ class _TextSource(Source):
         return pa.schema([pa.field(f.name, pa.string()) if pa.types.is_null(f.type) else f for f in fields])
 
     def blocks(self, place: Place) -> Iterator[Block]:
+        """The blocks of a file from a place on."""
         path = self.files[place.file]
         place = place if place.at else self.start(place.file)
         for records in records_of(path, place, self.bytes, self.quotes):
@@ -238,6 +241,7 @@ class CsvSource(_TextSource):
                 raise FilesError(f"{path}: its header differs from that of {files[0]}")
 
     def start(self, file: int) -> Place:
+        """Where the first record of a file begins."""
         return Place(file, self.starts[file], 0)
 
     def _read(
@@ -272,13 +276,16 @@ class CsvSource(_TextSource):
         return (batches[0] if batches else empty), wrong
 
     def inferred(self, path: Path, records: Records) -> pa.Schema:
+        """The types that these records would have by themselves."""
         types = dict.fromkeys(self.inputs, pa.string())
         return self._read(path, records, None, types)[0].schema
 
     def joined(self, one: pa.Schema, other: pa.Schema) -> pa.Schema:
+        """Types that hold both."""
         return pa.schema([pa.field(a.name, _joined_type(a.type, b.type)) for a, b in zip(one, other, strict=True)])
 
     def block(self, path: Path, records: Records) -> Block:
+        """These records, read."""
         if self.verbatim:
             batch, wrong = self._read(path, records, self.inputs, dict.fromkeys(self.inputs, pa.string()))
         else:
@@ -331,14 +338,17 @@ class NdjsonSource(_TextSource):
             raise FilesError(f"{files[0]}: holds no JSON object, one a line")
 
     def start(self, file: int) -> Place:
+        """Where the first record of a file begins."""
         return Place(file, 0, 0)
 
     def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:
+        """Fix the schema, now that the inputs are known."""
         super().settle(columns, verbatim, part_rows)
         if verbatim:
             self.schema = pa.schema([pa.field(name, pa.float64()) for name in self.inputs])
 
     def inferred(self, path: Path, records: Records) -> pa.Schema:
+        """The types that these records would have by themselves."""
         explicit = pa.schema([pa.field(name, pa.float64()) for name in self.inputs])
         try:
             schema = _json_table(records.texts, explicit, "infer").schema
@@ -361,6 +371,7 @@ class NdjsonSource(_TextSource):
             raise FilesError(f"{path}: up to row {last}: {name!r} holds mixed types: {one_line(error)}") from None
 
     def joined(self, one: pa.Schema, other: pa.Schema) -> pa.Schema:
+        """Types that hold both."""
         # text that looks like dates in one block and not in another is text
         for name in set(one.names) & set(other.names):
             kinds = one.field(name).type, other.field(name).type
@@ -369,6 +380,7 @@ class NdjsonSource(_TextSource):
         return pa.unify_schemas([one, other], promote_options="permissive")
 
     def block(self, path: Path, records: Records) -> Block:
+        """These records, read."""
         try:
             table = _json_table(records.texts, self.schema, "ignore")
             stiffness = next((column for name, (column, _) in self.columns.places.items() if name == "k"), None)
