@@ -1,0 +1,9 @@
+/* The gradient of mumacro.h in the form that Modelica calls. */
+#include "mumacro.h"
+
+static inline void mumacro_modelica_gradient(double mu0, double Fz, double k, double y0, double omega, double v0,
+                                             double *gradient) {
+    mumacro_answer answer;
+    mumacro_evaluate(mu0, Fz, k, y0, omega, v0, &answer);
+    memcpy(gradient, answer.gradient, sizeof answer.gradient);
+}

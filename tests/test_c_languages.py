@@ -1,0 +1,143 @@
+"""mumacro.h from Fortran, Octave, Abaqus' interface and Modelica's: each compiled by its own tool, each compared."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from builder.export import export_table
+from mumacro import Surrogate
+from mumacro.dimensional import FIELDS
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+V0 = [1e-6, 1e-3, 0.01, 0.0711, 0.5, 20.0]
+
+
+@pytest.fixture(scope="module")
+def table(tables_dir):
+    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+
+
+@pytest.fixture(scope="module")
+def folder(repository, table, compilers, tmp_path_factory):
+    """The examples with a header of the smallest table, and the functions as an object file."""
+    root = tmp_path_factory.mktemp("languages")
+    for source in (*(repository / "examples" / "c").iterdir(), *(repository / "tests" / "c").iterdir()):
+        shutil.copy(source, root)
+    export_table(table.path, "c", root / "mumacro.h")
+    compilers.run(*compilers.compiler("gcc"), "-O1", "-std=c99", *compilers.STRICT, "-c", "mumacro.c", cwd=root)
+    return root
+
+
+def numbers(text):
+    return np.array([[float(word) for word in line.split()] for line in text.strip().splitlines()])
+
+
+def test_fortran_has_the_same_answers(compilers, folder, table):
+    strict = ("-std=f2008", "-Wall", "-Wextra", "-pedantic", "-Werror")
+    sources = ("mumacro.f90", "friction.f90", "mumacro.o")
+    compilers.run(*compilers.compiler("gfortran"), *strict, *sources, "-o", "friction", "-lm", cwd=folder)
+    cases = "".join(" ".join(map(repr, {**CASE, "v0": v0}.values())) + "\n" for v0 in V0)
+    found = numbers(compilers.run(folder / "friction", given=cases))
+    answer = table.evaluate({**CASE, "v0": np.array(V0)}, gradient=True)
+    assert np.allclose(found[:, 0], answer.mu_macro, rtol=1e-14, atol=0.0)
+    assert np.allclose(found[:, 1], answer.error_bound, rtol=1e-6, atol=0.0)
+    for i, name in enumerate(FIELDS):
+        assert np.allclose(found[:, 2 + i], answer.gradient[name], rtol=1e-9, atol=0.0)
+    unit = CASE["mu0"] * CASE["Fz"] * answer.length_scale * CASE["omega"]
+    assert np.allclose(found[:, 8], table.power(answer.v_tilde, answer.y_tilde) * unit, rtol=1e-13, atol=0.0)
+    assert np.allclose(found[:, 9], table.stick_fraction(answer.v_tilde, answer.y_tilde), rtol=1e-9, atol=0.0)
+
+
+def test_octave_has_the_same_answers(compilers, folder, table):
+    octave = compilers.compiler("octave-cli")
+    compilers.compiler("mkoctfile")
+    text = compilers.run(*octave, "--norc", "friction.m", cwd=folder)
+    v0 = np.geomspace(1e-4, 10.0, 200)
+    answer = table.evaluate({**CASE, "v0": v0}, gradient=True)
+    shown = [float(word) for word in text.splitlines()[0].split() if word[0].isdigit()]
+    assert shown == pytest.approx([answer.mu_macro[0], 1e-4, answer.mu_macro[-1], 10.0], rel=1e-14)
+    steepest = v0[np.argmax(answer.gradient["v0"] * v0)]
+    begins = v0[np.flatnonzero(np.asarray(answer.regime) == "continuous")[0]]
+    expected = f"continuous sliding from {begins:.4g} m/s; steepest near {steepest:.3g} m/s"
+    assert text.splitlines()[1] == f"bound at most {answer.error_bound.max():.2g}; {expected}"
+    wrong = (
+        "a = mumacro_mex([0.3; 0.2], 10, Inf, 2e-6, 1.3e5, [0.01; -1]); printf('%.15g %d\\n', a(1), isnan(a(2)));"
+        "for c = {{1, 2, 3}, {1, 2, 3, 4, 5, 'x'}, {[1 2 3], 1, 1, 1, 1, [1 2]}, {[1 2], 1, 1, 1, 1, [1; 2]}};"
+        " try; mumacro_mex(c{1}{:}); catch e; disp(e.identifier); end; end"
+    )
+    first, *identifiers = compilers.run(*octave, "--norc", "--eval", wrong, cwd=folder).splitlines()
+    rigid = table.evaluate({**CASE, "k": None}).mu_macro
+    assert [float(word) for word in first.split()] == [pytest.approx(rigid, rel=1e-14), 1.0]
+    assert identifiers == ["mumacro:usage", "mumacro:type", "mumacro:size", "mumacro:size"]
+
+
+def test_abaqus_gets_the_coefficient_and_its_derivatives(compilers, folder, table):
+    (folder / "aba_param.inc").write_text("      implicit real*8(a-h,o-z)\n", "ascii")
+    sources = ("mumacro.f90", "fric_coef.f", "fric_coef_driver.f90", "mumacro.o")
+    options = ("-Wall", "-Wno-unused-dummy-argument", "-Wno-unused-parameter", "-Werror", "-o", "fric_coef", "-lm")
+    compilers.run(*compilers.compiler("gfortran"), "-ffixed-line-length-none", *sources, *options, cwd=folder)
+    stiffness = 1e10  # the driver's properties: mu0 = 0.3, k per area, y0 = 2 um, omega = 1.3e5 rad/s
+
+    def call(*lines):
+        return numbers(compilers.run(folder / "fric_coef", given="".join("{} {} {} {}\n".format(*x) for x in lines)))
+
+    cases = [(v0, p, a, w) for v0 in (1e-3, 0.02, 0.4) for p in (3e4, 1e5) for a, w in ((1.0, 1.0), (0.5, 2.0))]
+    found = call(*cases)
+    for row, (v0, p, a, w) in zip(found, cases, strict=True):
+        case = {"mu0": 0.3, "Fz": p, "k": stiffness, "y0": 2e-6 * a, "omega": 1.3e5 * w, "v0": v0}
+        answer = table.evaluate(case, gradient=True)
+        assert row[0] == pytest.approx(answer.mu_macro, rel=1e-14)
+        assert row[1:] == pytest.approx([answer.gradient["v0"], answer.gradient["Fz"]], rel=1e-9)
+        step = 1e-4
+        rate = call((v0 * (1 - step), p, a, w), (v0 * (1 + step), p, a, w))[:, 0]
+        load = call((v0, p * (1 - step), a, w), (v0, p * (1 + step), a, w))[:, 0]
+        assert row[1] == pytest.approx((rate[1] - rate[0]) / (2 * step * v0), rel=1e-4, abs=1e-9)
+        assert row[2] == pytest.approx((load[1] - load[0]) / (2 * step * p), rel=1e-4, abs=1e-12)
+    # without pressure: rigid contact; at rest on y~ = 1, where the slope is infinite: no slope
+    rigid, corner = call((0.01, 0.0, 1.0, 1.0), (0.0, 2e-6 * stiffness / 0.3, 1.0, 1.0))
+    assert rigid[0] == pytest.approx(table.evaluate({**CASE, "k": None}).mu_macro, rel=1e-14)
+    assert rigid[2] == 0.0
+    assert np.all(np.isfinite(corner))
+
+
+def test_modelicas_gradient_is_the_gradient(compilers, folder, table):
+    program = (
+        '#include <stdio.h>\n#include "mumacro_modelica.h"\nint main(void) { double g[6];\n'
+        "mumacro_modelica_gradient(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01, g);\n"
+        'for (int i = 0; i < 6; ++i) printf("%.17g ", g[i]);\nreturn 0; }\n'
+    )
+    (folder / "modelica.c").write_text(program, "ascii")
+    strict = ("-std=c99", *compilers.STRICT)
+    compilers.run(*compilers.compiler("gcc"), *strict, "modelica.c", "-o", "modelica", "-lm", cwd=folder)
+    expected = table.evaluate(CASE, gradient=True).gradient
+    found = numbers(compilers.run(folder / "modelica"))[0]
+    assert found == pytest.approx(list(expected.values()), rel=1e-9)
+    text = (folder / "Mumacro.mo").read_text("ascii")
+    assert "mumacro_modelica_gradient(mu0, Fz, k, y0, omega, v0, g)" in text
+    assert "mu = mumacro_mu_macro(mu0, Fz, k, y0, omega, v0)" in text
+    omc = shutil.which("omc")
+    if omc is not None:
+        (folder / "check.mos").write_text(
+            'loadFile("Mumacro.mo"); checkModel(Mumacro.SlidingMass); getErrorString();\n'
+        )
+        assert "Check of Mumacro.SlidingMass completed successfully" in compilers.run(omc, "check.mos", cwd=folder)
+
+
+def test_julia_has_the_same_answers(compilers, folder, table):
+    julia = compilers.compiler("julia")
+    compilers.run(*compilers.compiler("gcc"), "-shared", "-fPIC", "mumacro.c", "-o", "libmumacro.so", "-lm", cwd=folder)
+    first, *_ = compilers.run(*julia, "--startup-file=no", "friction.jl", cwd=folder).split()
+    assert float(first) == pytest.approx(table.evaluate(CASE).mu_macro, rel=1e-14)
+
+
+def test_the_examples_compile_to_one_library(compilers, folder):
+    compilers.run(
+        *compilers.compiler("gcc"), "-O1", "-shared", "-fPIC", "mumacro.c", "-o", "libm.so", "-lm", cwd=folder
+    )
+    table = compilers.run(*compilers.compiler("nm"), "-D", "--defined-only", "libm.so", cwd=folder)
+    public = {line.split()[-1] for line in table.splitlines() if "mumacro" in line}
+    assert public == {
+        "mumacro_evaluate", "mumacro_evaluate_cycle", "mumacro_evaluate_point", "mumacro_mu_macro", "mumacro_mu_ratio",
+        "mumacro_power", "mumacro_stick_fraction", "mumacro_v_tilde_crit", "mumacro_source_name", "mumacro_error_text",
+    }  # fmt: skip
