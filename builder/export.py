@@ -26,6 +26,7 @@ from scipy.io import savemat
 from mumacro.errors import MumacroError
 from mumacro.table import Table, json_attributes, read_table
 
+from .c.fmu.model import write_fmu2, write_fmu3
 from .c.header import write_header
 
 __all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
@@ -120,6 +121,8 @@ def _parquet(table: Table, out: BinaryIO) -> None:
 FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None]]] = {
     "c": ("mumacro.h", write_header),
     "csv": ("{}.csv", _csv),
+    "fmu": ("mumacro.fmu", write_fmu2),
+    "fmu3": ("mumacro.fmu", write_fmu3),
     "mat": ("{}.mat", _mat),
     "modelica": ("{}.txt", _modelica),
     "parquet": ("{}.parquet", _parquet),
