@@ -288,7 +288,7 @@ def check() -> list[str]:
         "import-linter": ("lint-imports",),
         "validate-pyproject": ("validate-pyproject", "pyproject.toml"),
         "codespell": ("codespell",),
-        "interrogate": ("interrogate", "--quiet", "mumacro", "builder", "service"),
+        "interrogate": ("interrogate", "mumacro", "builder", "service"),
         "sp-repo-review": ("sp-repo-review", "--show", "err", "."),
         "CF conventions": (
             *("compliance-checker", "--test=cf:1.11"),
