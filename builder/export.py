@@ -122,7 +122,7 @@ FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None]]] = {
     "c": ("mumacro.h", write_header),
     "csv": ("{}.csv", _csv),
     "fmu": ("mumacro.fmu", write_fmu2),
-    "fmu3": ("mumacro.fmu", write_fmu3),
+    "fmu3": ("mumacro-fmi3.fmu", write_fmu3),
     "mat": ("{}.mat", _mat),
     "modelica": ("{}.txt", _modelica),
     "parquet": ("{}.parquet", _parquet),

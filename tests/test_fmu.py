@@ -108,7 +108,7 @@ def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
         (along,) = made.getDirectionalDerivative([at["mu_macro"]], [at[name] for name in FIELDS], seeds)
         assert along == pytest.approx(expected, rel=1e-9)
     if hasattr(made, "getAdjointDerivative"):
-        adjoint = made.getAdjointDerivative([at["mu_macro"]], [at[name] for name in FIELDS], [2.0])
+        adjoint = made.getAdjointDerivative([at["mu_macro"]], [at[name] for name in FIELDS], [2.0], len(FIELDS))
         assert adjoint == pytest.approx([2.0 * answer.gradient[name] for name in FIELDS], rel=1e-9)
     made.terminate()
     made.freeInstance()
