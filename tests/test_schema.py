@@ -45,7 +45,6 @@ RELATIONS = (
     r"all curves together may have",
     r"(mu0|Fz|k) must be finite and > 0",
     r"is not in the answer",
-    r"must be finite, and so must omega = 2 pi f",
 )
 FIVE = ("mu0", "Fz", "y0", "omega", "v0")  # of which one is asked for, and the others are required
 
