@@ -41,11 +41,11 @@ from mumacro.dimensional import FIELDS
 from service.evaluation import answer_batch
 from service.formats import choose
 from service.formats.columns import numbers_ready
+from service.quantities import QUANTITIES
 from service.tables import LoadedTable
 
 PAGE = ROOT / "docs" / "service.md"
-DECISION = ROOT / "docs" / "decisions" / "0011-wire.md"
-PLACES = {"readers": DECISION, "over-http": ROOT / "README.md"}  # all else is on the page
+PLACES = {"over-http": ROOT / "README.md"}  # all else is on the page
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SERVER_CORE, CLIENT_CORE = 0, 1
@@ -60,7 +60,7 @@ KINDS = {
     "arrow": "application/vnd.apache.arrow.stream",
 }
 AT_ONCE = (1, 4, 8)  # the last: as many as are answered at a time
-INCLUDED = ("groups", "limits", "gradient", "stick_fraction", "power")
+INCLUDED = tuple(name for name in QUANTITIES if name != "std")  # which asks for deviations, too
 WAITED_FOR = 5  # batches that short requests are asked beside
 LABELS = {
     "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
@@ -408,13 +408,6 @@ def parts(rounds: int) -> dict[str, float]:
     return {name: statistics.median(values[1:]) for name, values in found.items()}
 
 
-def reader_rows(alone: dict[str, float]) -> list[list[str]]:
-    """The readers among the parts, both forms side by side."""
-    names = [name.removesuffix(", columns") for name in alone if name.endswith(", columns")]
-    pairs = [(name, alone.get(f"{name}, columns"), alone.get(f"{name}, rows")) for name in names]
-    return [[name, *("-" if rate is None else quantity(rate) for rate in rates)] for name, *rates in pairs]
-
-
 def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
     """Ways from the text of a batch to six arrays, and two that stop at Python objects."""
     from pydantic import BaseModel, ConfigDict, TypeAdapter
@@ -714,7 +707,6 @@ def report(
     sections["alone"] = markdown(
         ["alone, in one thread", "million cases/s"], [[k, quantity(v)] for k, v in alone.items()]
     )
-    sections["readers"] = markdown(["million cases/s from text to arrays", "columns", "rows"], reader_rows(alone))
     for name, measure in others(options, folder).items():
         sections[name] = measure()
     sections["over-http"] = overview(single, rates)
