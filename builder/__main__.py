@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 
 from mumacro import MumacroError, Surrogate
 from mumacro.extras import missing
+from mumacro.processors import processors
 from mumacro.writing import alone_in
 
 try:
@@ -59,8 +59,7 @@ def build(
     tolerance: Annotated[
         float, typer.Option(help="Largest absolute error of mu_macro/mu0; the relative one may be 10 times it.")
     ] = 1e-8,
-    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = os.cpu_count() or 1,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler, tcp://host:port.")] = None,
+    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = processors(),
 ) -> None:
     """Build a table; a killed build resumes from OUT.checkpoint and gives the same data."""
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
@@ -77,7 +76,7 @@ def build(
         checkpoint = out.with_name(out.name + ".checkpoint")
         with (
             alone_in(checkpoint),
-            Sweep(workers, scheduler, checkpoint) as sweep,
+            Sweep(workers, checkpoint) as sweep,
             Progress(*columns, console=console) as bar,
         ):
             task = bar.add_task("border", total=stages())
@@ -87,8 +86,6 @@ def build(
 
             surrogate = build_table(out, tolerance, sweep, progress)
             solves = sweep.n_solves
-    except ImportError as error:
-        raise _fail(f"--scheduler: {missing('dask', error)}", 2) from error
     except (MumacroError, BuildError, SolveError) as error:
         raise _fail(str(error)) from error
     except OSError as error:
@@ -127,7 +124,7 @@ def verify(
     table: Annotated[Path, typer.Argument(help="A table file.")],
     points: Annotated[int, typer.Option(min=100, max=10_000_000, help="Fresh solves to compare with.")] = 20_000,
     seed: Annotated[int, typer.Option(min=0, help="Of the drawn points.")] = 1,
-    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = os.cpu_count() or 1,
+    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = processors(),
 ) -> None:
     """Compare a table with fresh solves; exit code 1 when it misses its own tolerance."""
     try:

@@ -1,4 +1,4 @@
-"""Nodes to solved values: in parallel, resumable, on this machine or on a Dask cluster.
+"""Nodes to solved values: in parallel and resumable.
 
 Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not depend on how many
 workers there are or on whether a build was interrupted.
@@ -11,7 +11,6 @@ import io
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from . import steady
 from .compiled import SOURCES, solver_kernel
 from .model import OK
 
-__all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep"]
+__all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep", "solve_chunk"]
 
 Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
@@ -102,32 +101,20 @@ class Sweep:
     ----------
     workers : int
         Threads on this machine (the solver releases the interpreter lock).
-    scheduler : str, optional
-        Address of a Dask scheduler, ``tcp://host:port``; replaces the threads.  Needs the extra ``dask``.
     checkpoint : Path, optional
         Folder that keeps finished sweeps; a later build with the same nodes reads them instead of solving again.
     """
 
-    def __init__(self, workers: int = 1, scheduler: str | None = None, checkpoint: Path | None = None) -> None:
+    def __init__(self, workers: int = 1, checkpoint: Path | None = None) -> None:
         self.n_solves = 0
         self.checkpoint = checkpoint
-        self._client: Any = None
-        self._pool: ThreadPoolExecutor | None = None
-        if scheduler is None:
-            self._pool = ThreadPoolExecutor(max_workers=workers)
-        else:
-            from distributed import Client
-
-            self._client = Client(scheduler, timeout="10s")  # type: ignore[no-untyped-call]
+        self._pool = ThreadPoolExecutor(max_workers=workers)
 
     def __enter__(self) -> Sweep:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-        if self._client is not None:
-            self._client.close()
+        self._pool.shutdown(cancel_futures=True)
 
     def solve(self, kind: str, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
         """Solve at every (v~, y~); returns arrays of the broadcast shape by name of :data:`COLUMNS`.
@@ -159,11 +146,7 @@ class Sweep:
 
     def _run(self, kind: str, points: Array) -> Array:
         chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
-        if self._client is not None:
-            done = self._client.gather(self._client.map(lambda c: solve_chunk(kind, c), chunks, pure=False))
-        else:
-            assert self._pool is not None  # noqa: S101 (one of the two is always there)
-            done = list(self._pool.map(lambda c: solve_chunk(kind, c), chunks))
+        done = self._pool.map(lambda c: solve_chunk(kind, c), chunks)
         return np.concatenate([np.empty((0, len(COLUMNS))), *done])
 
     def _file(self, kind: str, points: Array) -> Path | None:

@@ -565,8 +565,9 @@ def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | N
 def _picked(cases: Any) -> dict[str, Any]:
     """The inputs among the columns of a mapping, DataFrame or Dataset."""
     try:
-        names = list(cases.keys())
-        picked = {name: cases[name] for name in (*dimensional.FIELDS, "f") if name in names}
+        cases.keys()  # which a list or a string has not
+        # coordinates of a Dataset are inputs, too, though no keys
+        picked = {name: cases[name] for name in (*dimensional.FIELDS, "f") if name in cases}
     except (AttributeError, TypeError, KeyError) as error:
         raise InputError(
             "cases", type(cases).__name__, "a mapping, DataFrame or Dataset with the inputs by name"

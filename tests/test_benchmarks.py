@@ -15,6 +15,7 @@ PAGES = {
     "solver": PAGE,
     "speed_against_error": PAGE,
     "build_cost": PAGE,
+    "scale": ROOT / "docs" / "scale.md",
 }
 Row = dict[str, str]
 

@@ -1,6 +1,5 @@
 """``python -m builder`` beyond the plain cases: whole builds, failures while working, help."""
 
-import importlib.util
 import json
 import shutil
 from collections.abc import Callable
@@ -53,15 +52,6 @@ def test_build_cannot_write_where_a_folder_stands(run_builder: Run, tmp_path: Pa
     (tmp_path / "taken.nc").mkdir()
     refused(run_builder("build", "--tolerance", "1e-2", "--out", tmp_path / "taken.nc"), "--out", "is a folder")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.nc"]
-
-
-def test_build_needs_dask_for_a_scheduler(run_builder: Run, tmp_path: Path) -> None:
-    if importlib.util.find_spec("distributed") is not None:
-        pytest.skip("dask is installed")
-    done = run_builder("build", "--tolerance", "1e-2", "--out", tmp_path / "x.nc", "--scheduler", "tcp://127.0.0.1:1")
-    refused(done, "--scheduler", "dask")
-    assert done.returncode == 2
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_solve_answers_at_the_ends_of_the_double_range(run_builder: Run) -> None:

@@ -1,0 +1,238 @@
+"""Cases a second from 1e6 to 1e9 cases: one thread, all threads, one and two worker processes of Dask.
+
+    python benchmarks/scale.py [--largest 1e8] [--write]
+
+Every case is made, answered and reduced (mean, extremes, a histogram) where it arises; nothing is stored.  The last
+table builds one lookup table with threads and with two worker processes, for docs/decisions/0019.  A worker's start is
+not timed, its kernels are loaded before.  Processor time is that of all processes together; the cost model is made from
+it, since other work on the machine counts little there.
+"""
+
+from __future__ import annotations
+
+import measuring  # isort: skip  (before numpy: one thread a library)
+
+import argparse
+import hashlib
+import resource
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import dask
+import numpy as np
+from measuring import machine, markdown, progress, quantity, write_section
+
+from builder.assemble import build_table
+from builder.sweep import CHUNK, COLUMNS, Sweep, solve_chunk
+from mumacro import Surrogate
+from mumacro.dimensional import FIELDS
+from mumacro.processors import processors
+from mumacro.scale import sobol
+
+PAGE = measuring.ROOT / "docs" / "scale.md"
+PACKAGES = ("dask", "distributed", "xarray")
+PLAN = 1e12  # cases of the worked plan
+CORES = 64  # of the plan's cluster
+Reduced = tuple[float, float, float, int]
+
+
+def design(n: int) -> Any:
+    """``n`` cases of six inputs, all of which vary over decades."""
+
+    def over(low: float, high: float) -> Callable[[Any], Any]:
+        return lambda u: np.exp(np.log(low) + np.log(high / low) * u)
+
+    return sobol(n, mu0=over(0.1, 1.0), Fz=over(1, 100), k=over(1e5, 1e8), y0=over(1e-7, 1e-5), omega=over(1e3, 1e6),
+                 v0=over(1e-4, 1.0))  # fmt: skip
+
+
+def lazy(surrogate: Surrogate, n: int) -> Reduced:
+    """Made, answered and reduced by Dask's current scheduler, chunk by chunk."""
+    import dask.array as da
+
+    ratio = surrogate.evaluate(design(n)).mu_ratio.data
+    counts, _ = da.histogram(ratio, bins=1000, range=(0.0, 1.0))
+    mean, least, largest, counts = dask.compute(ratio.mean(), ratio.min(), ratio.max(), counts.sum())
+    return float(mean), float(least), float(largest), int(counts)
+
+
+def stages(surrogate: Surrogate, n: int) -> dict[str, float]:
+    """Processor nanoseconds a case on one thread: to make the inputs, and to answer them."""
+    cases = design(n)
+    spent = {}
+    started = process_time()
+    columns = [cases[name].values for name in FIELDS]
+    spent["make"] = 1e9 * (process_time() - started) / n
+    started = process_time()
+    surrogate.evaluate_columns(*columns)
+    spent["answer"] = 1e9 * (process_time() - started) / n
+    return spent
+
+
+def _worker_memory() -> int:
+    """Peak resident memory of this process [kB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+@contextmanager
+def workers(n: int, surrogate: Surrogate) -> Iterator[Any]:
+    """``n`` worker processes with one thread each, kernels loaded; freed arrays are kept for the next chunk."""
+    from distributed import Client, LocalCluster
+
+    keep = {f"MALLOC_{name}_THRESHOLD_": 2**30 for name in ("TRIM", "MMAP")}
+    with (
+        dask.config.set({"distributed.nanny.pre-spawn-environ": {**keep, "OMP_NUM_THREADS": 1}}),
+        LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster,
+        Client(cluster) as client,
+    ):
+        client.run(_load, surrogate)
+        yield client
+
+
+def _load(surrogate: Surrogate) -> None:
+    with dask.config.set(scheduler="synchronous"):
+        lazy(surrogate, 1000)
+    for kind in ("full", "continuous", "border"):
+        solve_chunk(kind, np.array([[1.0, 1.0, 0.0]]))
+
+
+class DaskSweep(Sweep):
+    """A sweep whose chunks are solved by workers of Dask: what other physics, with longer solves, would take."""
+
+    def __init__(self, client: Any) -> None:
+        super().__init__()
+        self.client = client
+
+    def _run(self, kind: str, points: Any) -> Any:
+        chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
+        done = self.client.gather(self.client.map(solve_chunk, [kind] * len(chunks), chunks, pure=False))
+        return np.concatenate([np.empty((0, len(COLUMNS))), *done])
+
+
+def built(sweep: Sweep, tolerance: float) -> tuple[float, int, str]:
+    """Seconds of a build, its solves, and the digest of the table's data."""
+    with tempfile.TemporaryDirectory() as folder, sweep:
+        started = perf_counter()
+        table = build_table(Path(folder) / "table.nc", tolerance, sweep)
+        return perf_counter() - started, sweep.n_solves, hashlib.sha256(table.checksum.encode()).hexdigest()[:12]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--largest", type=float, default=1e8, help="cases of the largest run")
+    parser.add_argument("--quick", action="store_true", help="few cases; measures nothing")
+    parser.add_argument("--write", action="store_true", help="write the tables to docs/scale.md")
+    given = parser.parse_args()
+    if given.quick and given.write:
+        parser.error("--quick measures nothing worth writing down")
+    sizes = [10**e for e in range(6, 12) if 10**e <= given.largest] if not given.quick else [10_000, 100_000]
+    surrogate = Surrogate.open(1e-10)
+    _load(surrogate)
+    seconds: dict[str, dict[int, float]] = {}
+    busy: dict[str, dict[int, float]] = {}
+    memory: dict[str, float] = {}
+    found: dict[int, set[Reduced]] = {n: set() for n in sizes}
+
+    def measure(name: str, client: Any = None) -> None:
+        def processor_time() -> float:
+            remote = client.run(process_time).values() if client is not None else ()
+            return process_time() + sum(remote)
+
+        seconds[name], busy[name] = {}, {}
+        for n in sizes:
+            before, started = processor_time(), perf_counter()
+            mean, least, largest, count = lazy(surrogate, n)
+            seconds[name][n] = perf_counter() - started
+            busy[name][n] = processor_time() - before
+            found[n].add((round(mean, 12), least, largest, count))
+            progress(f"{name}, {n:.0e} cases: {seconds[name][n]:.2f} s, processor {busy[name][n]:.2f} s")
+
+    with dask.config.set(scheduler="synchronous"):
+        measure("one thread, no scheduler")
+        memory["one thread, no scheduler"] = _worker_memory() / 1024
+        parts = stages(surrogate, sizes[0])
+    with dask.config.set(scheduler="threads", num_workers=processors()):
+        measure(f"{processors()} threads")
+        memory[f"{processors()} threads"] = _worker_memory() / 1024
+    tolerance = 1e-3 if given.quick else 1e-10
+    builds = {f"{processors()} threads": built(Sweep(processors()), tolerance)}
+    for n in (1, 2):
+        name = f"{n} worker process{'es' * (n > 1)}"
+        with workers(n, surrogate) as client:
+            measure(name, client)
+            memory[name] = max(client.run(_worker_memory).values()) / 1024
+            if n == 2:
+                builds[name] = built(DaskSweep(client), tolerance)
+    if any(len(answers) != 1 for answers in found.values()):
+        raise SystemExit(f"error: not everybody found the same: {found}")
+    text = report(sizes, seconds, busy, memory, parts, builds, tolerance)
+    print(text)
+    if given.write:
+        write_section("scale", text, PAGE)
+
+
+def report(
+    sizes: list[int], seconds: dict[str, dict[int, float]], busy: dict[str, dict[int, float]],
+    memory: dict[str, float], parts: dict[str, float], builds: dict[str, tuple[float, int, str]], tolerance: float,
+) -> str:  # fmt: skip
+    """The section of docs/scale.md."""
+    base = seconds["one thread, no scheduler"]
+    rows = []
+    for name, times in seconds.items():
+        used = min(processors(), 2) if name.startswith("2 worker") else (processors() if "threads" in name else 1)
+        for n in sizes:
+            rows.append(  # noqa: PERF401 (reads better)
+                [name, f"{n:.0e}", quantity(times[n]), quantity(n / times[n] / 1e6),
+                 f"{base[n] / (times[n] * used):.2f}", quantity(1e9 * busy[name][n] / n), quantity(memory[name])]
+            )  # fmt: skip
+    fixed, each = fit(sizes, busy["2 worker processes"])
+    share = base[sizes[-1]] / (seconds["2 worker processes"][sizes[-1]] * min(processors(), 2))
+    core_hours = PLAN * each / 3600.0
+    stored = PLAN * 8 / 1e12
+    plan = [
+        ["work of one core", f"{quantity(core_hours)} core hours"],
+        [f"{CORES} workers of one thread, each with a core of its own", f"{quantity(60 * core_hours / CORES)} min"],
+        ["tasks of Dask, about twelve a chunk", quantity(12 * PLAN / 2**20)],
+        ["chunks of 2^20 cases", f"{quantity(PLAN / 2**20)}"],
+        ["mu_macro alone, if it were stored as doubles", f"{quantity(stored)} TB"],
+        ["the six inputs beside it", f"{quantity(6 * stored)} TB"],
+        ["what the reductions leave, 1000 bins", "10 kB"],
+    ]
+    local, remote = builds[f"{processors()} threads"], builds["2 worker processes"]
+    built_rows = [[name, quantity(t), f"{solves:,}", digest] for name, (t, solves, digest) in builds.items()]
+    return "\n\n".join(
+        [
+            machine(*PACKAGES),
+            "Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes and a "
+            "histogram in one pass, in chunks of 2^20. Wall clock, once each; efficiency is against one thread, for "
+            "each core used; processor time is that of all processes; memory is that of the largest process so far.",
+            markdown(["who", "cases", "seconds", "M cases/s", "efficiency", "processor ns a case", "peak MB"], rows, 2),
+            f"Cost model, least squares of the processor time of two worker processes: {quantity(fixed)} s + "
+            f"{quantity(1e9 * each)} ns a case; the two reach {share:.2f} of twice the rate of one thread. Between "
+            "processes travel the reduced numbers alone, 8 kB a chunk for the histogram.",
+            f"Of the processor time on one thread, making the six inputs is {quantity(parts['make'])} ns a case, "
+            f"answering {quantity(parts['answer'])} ns; the rest is the reductions and Dask.",
+            f"For {PLAN:.0e} cases it says:",
+            markdown(["what", "how much"], plan, 1),
+            f"A lookup table of {tolerance:.0e} built by threads and through Dask on the same {processors()} cores, "
+            f"{'the same data' if local[2] == remote[2] else 'OTHER data'}; time ratio {remote[0] / local[0]:.2f}:",
+            markdown(["who solves", "seconds", "solves", "digest"], built_rows, 1),
+        ]
+    )
+
+
+def fit(sizes: list[int], times: dict[int, float]) -> tuple[float, float]:
+    """Seconds before the first case, and seconds a case, weighted so that every size counts alike."""
+    n = np.array(sizes, float)
+    t = np.array([times[size] for size in sizes])
+    matrix = np.stack([1.0 / t, n / t], axis=1)
+    (fixed, each), *_ = np.linalg.lstsq(matrix, np.ones(n.size))
+    return max(float(fixed), 0.0), float(each)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""The programs of docs/scale.md run as they stand there, and say what the library says."""
+
+import math
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mumacro import Surrogate
+
+PAGE = (Path(__file__).parent.parent / "docs" / "scale.md").read_text("utf-8")
+CASES: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": np.array([1e-6, 2e-6]), "omega": 1.3e5, "v0": 0.01}
+
+
+def programs(heading: str) -> list[str]:
+    """The indented blocks below a heading, up to the next one."""
+    section = PAGE.split(f"# {heading}\n")[1].split("\n#")[0]
+    blocks, block = [], []
+    for line in [*section.splitlines(), "end"]:
+        if line.startswith("    ") or (not line and block):
+            block.append(line)
+        elif block:
+            blocks.append(textwrap.dedent("\n".join(block)))
+            block = []
+    return blocks
+
+
+def run(heading: str, *needs: str) -> dict[str, Any]:
+    """What the blocks below a heading leave behind, run one after another."""
+    for name in needs:
+        pytest.importorskip(name)
+    names: dict[str, Any] = {"__name__": "recipe"}
+    for block in programs(heading):
+        exec(compile(block, heading, "exec"), names)  # noqa: S102 (our own page)
+    return names
+
+
+@pytest.fixture(scope="module")
+def expected() -> Any:
+    return Surrogate.open().evaluate(CASES).mu_macro
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_designs_and_reductions() -> None:
+    found = run("Lazy designs, streaming reductions", "distributed")
+    mu = found["mu"].compute()
+    assert mu.size == 2**16
+    assert found["mean"] == pytest.approx(float(np.mean(mu)), rel=1e-12)
+    assert found["spread"] == pytest.approx(float(np.std(mu)), rel=1e-12)
+    assert found["least"] == float(np.min(mu))
+    assert found["on_two"] == found["mean"]
+    exact = np.quantile(mu, [0.05, 0.5, 0.95], method="inverted_cdf")
+    assert np.all((found["below"] <= exact) & (exact <= found["above"]))
+    allowed = found["answer"].mu_macro.compute() <= 0.2
+    assert allowed.any()
+    assert float(found["found"].objective) == float((found["plane"].y0 * 1.3e5).where(allowed).min())
+
+
+def test_pandas(expected: Any) -> None:
+    out = run("pandas", "pandas")["out"]
+    np.testing.assert_array_equal(out.mu_macro[:2], expected)
+    assert math.isnan(out.mu_macro[2])
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_polars(expected: Any) -> None:
+    out = run("Polars", "polars", "pyarrow")["out"]
+    assert out["mu_macro"].to_list() == [*expected, None]
+    assert out["regime"].to_list() == ["stick_slip", "stick_slip", None]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_duckdb(expected: Any) -> None:
+    assert run("DuckDB", "duckdb", "pyarrow")["out"] == [(expected[0],), (expected[1],), (None,)]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_joblib() -> None:
+    found = run("joblib", "joblib")
+    np.testing.assert_array_equal(found["out"], Surrogate.open().mu_ratio(0.1, found["y"]))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_files_over_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, expected: Any) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    pa = pytest.importorskip("pyarrow")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs").mkdir()
+    table = pa.table({name: np.broadcast_to(value, 2) for name, value in CASES.items()})
+    for i in range(3):
+        pq.write_table(table.slice(0, 1 + i % 2), tmp_path / "runs" / f"{i}.parquet")
+    assert run("Files over a cluster", "distributed")["rows"] == [1, 2, 1]
+    assert pq.read_table(tmp_path / "runs" / "1.out.parquet")["mu_macro"].to_pylist() == list(expected)
+
+
+def test_every_recipe_has_a_test() -> None:
+    recipes = {line.removeprefix("### ") for line in PAGE.splitlines() if line.startswith("### ")}
+    assert recipes == {"pandas", "Polars", "DuckDB", "joblib", "Files over a cluster", "Spark"}
+    compile("\n".join(programs("Spark")), "Spark", "exec")
