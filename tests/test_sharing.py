@@ -243,7 +243,7 @@ def child(work: Callable[[], bytes]) -> bytes:
 
 
 @forks
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
     assert child(lambda: _ask(1)) == everything(inherited)
     # a child of the child, and the parent afterwards
@@ -251,7 +251,7 @@ def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
 
 
 @forks
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_a_forked_pool_gives_the_same_bits(inherited: Surrogate) -> None:
     expected = [everything(inherited, N, seed) for seed in range(4)]
     with multiprocessing.get_context("fork").Pool(2) as pool:
@@ -259,7 +259,7 @@ def test_a_forked_pool_gives_the_same_bits(inherited: Surrogate) -> None:
 
 
 @forks
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_a_forked_executor_gives_the_same_bits(inherited: Surrogate) -> None:
     expected = [everything(inherited, N, seed) for seed in range(4)]
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
@@ -273,7 +273,7 @@ def _fail(what: str) -> None:
 
 
 @forks
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_errors_of_workers_reach_their_caller() -> None:
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
         with pytest.raises(InputError) as caught:
