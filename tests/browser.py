@@ -8,6 +8,8 @@ import time
 
 import numpy as np
 
+PATIENCE_S = 120  # a browser beside many other programs can be slow
+
 
 def start(folder):
     """A browser of its own that reaches nothing but this machine; its files are in the folder.
@@ -34,7 +36,9 @@ def start(folder):
     ):  # fmt: skip
         options.add_argument(f"--{argument}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    browser.set_script_timeout(PATIENCE_S)
+    return browser
 
 
 class Opened:
@@ -96,7 +100,7 @@ class Page:
         return self.find(selector).get_property("value")
 
     def wait_for(self, selector, pattern):
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + PATIENCE_S
         while not (found := re.search(pattern, self.text(selector))):
             assert time.monotonic() < deadline, f"{selector} is {self.text(selector)!r}, not {pattern}"
             time.sleep(0.03)
@@ -119,7 +123,7 @@ class Page:
             self.settle()
 
     def wait_until_shown(self, selector):
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + PATIENCE_S
         while not self.find(selector).is_displayed():
             assert time.monotonic() < deadline, f"{selector} does not appear"
             time.sleep(0.03)
@@ -176,7 +180,7 @@ class Page:
         behaviour = {"behavior": "allow", "downloadPath": str(folder)}
         self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
         self.run(f"document.querySelector({selector!r}).click();")
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + PATIENCE_S
         while not (folder / name).exists():
             assert time.monotonic() < deadline, [path.name for path in folder.iterdir()]
             time.sleep(0.03)
