@@ -7,7 +7,7 @@ negotiation and the description follow from the registry.
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Protocol
 
-from ..errors import BatchTooLargeError
+from ..errors import BatchTooLargeError, InvalidFieldsError
 from ..evaluation import Answers, Batch
 
 __all__ = ["FORMATS", "Format", "choose", "limit_values", "media_types", "register", "too_large"]
@@ -52,6 +52,7 @@ class Format(Protocol):
 
 
 FORMATS: list[Format] = []
+MOST_MEMBERS = 16  # of an object of columns: the inputs and the options
 
 
 def register(made: Format) -> None:
@@ -82,15 +83,19 @@ def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:
     """Refuse what holds more values than a batch may have, before anything is made of it.
 
     Every value of JSON but the first of its list or object has a comma before it, and every list or object a bracket:
-    counting those takes a millisecond a megabyte and bounds what decoding can make.
+    counting those takes a millisecond a megabyte and bounds what decoding can make.  Every member of an object has a
+    colon, and no object has more members than there are fields.
 
     Raises
     ------
-    BatchTooLargeError
+    BatchTooLargeError, InvalidFieldsError
     """
     room = max_batch + 64
-    if text.count(b",") > per_case * room or text.count(b"[") + text.count(b"{") > room:
+    objects = text.count(b"{")
+    if text.count(b",") > per_case * room or text.count(b"[") + objects > room:
         raise too_large(max_batch)
+    if text.count(b":") > MOST_MEMBERS * objects + 64:
+        raise InvalidFieldsError("the body has objects with more members than there are fields")
 
 
 def _load() -> None:
