@@ -43,20 +43,8 @@ class _Exchange:
     """One request and its answer."""
 
     __slots__ = (
-        "answered",
-        "body",
-        "connection",
-        "expects",
-        "gone",
-        "head",
-        "keep",
-        "left",
-        "more",
-        "scope",
-        "started",
-        "taken",
-        "task",
-        "waiter",
+        "answered", "body", "connection", "expects", "gone", "head", "keep", "left", "more", "scope", "started",
+        "taken", "task", "waiter",
     )  # fmt: skip
 
     def __init__(self, connection: "Connection", scope: Scope, keep: bool, expects: bool) -> None:
@@ -155,11 +143,11 @@ class _Exchange:
             fields.append(b"transfer-encoding: chunked")
         if not self.keep:
             fields.append(b"connection: close")
-        text = _END.join(fields)
-        if text.count(b"\n") != len(fields) - 1 or text.count(b"\r") != len(fields) - 1 or b"\0" in text:
+        text = b"".join([field + _END for field in fields])
+        if text.count(b"\n") != len(fields) or text.count(b"\r") != len(fields) or b"\0" in text:
             raise RuntimeError("a header holds a line break or a zero byte")
         self.started = True
-        head = _STATUS[status] + self.connection.defaults() + text + b"\r\n\r\n"
+        head = _STATUS[status] + self.connection.defaults() + text + _END
         if sized:
             self.head = head
         else:
@@ -231,13 +219,13 @@ class Connection(asyncio.Protocol):
         self.resume_writing()
 
     def eof_received(self) -> bool:
-        """The caller sends no more: answer what is complete, then close."""
+        """The caller sends no more: answer what is complete, then close.  False lets the transport close at once."""
         self._deaf = True
-        if self._coming is not None:
-            self._coming.gone = not self._coming.answered
-            self._coming.wake()
-        if self._now is None or self._now.answered:
+        now = self._now
+        if now is None or now.answered or now.gone or self._coming is now:
             return False
+        if self._coming is not None:
+            self._queue.remove(self._coming)  # never complete
         self._last().keep = False
         return True
 
@@ -410,6 +398,7 @@ class Connection(asyncio.Protocol):
             if exchange.started:
                 self._transport.abort()  # nothing but that can say that the answer is not complete
             else:
+                self._queue.clear()
                 self._break(500)
 
     def _next(self) -> None:

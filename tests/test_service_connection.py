@@ -1,10 +1,14 @@
 """HTTP/1.1 as bytes on a socket: what comes back, and in which order, however the bytes come."""
 
+import asyncio
 import http.client
 import json
 import socket
+from types import SimpleNamespace
 
 import pytest
+
+from service.connection import Connection
 
 pytestmark = pytest.mark.slow
 
@@ -73,10 +77,65 @@ def test_a_half_closed_caller_has_the_whole_answer(raw, case):
     assert received.endswith(b"0\r\n\r\n")
 
 
-def test_a_caller_who_ends_within_a_body_has_no_answer(raw):
-    raw.sendall(b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n{")
+@pytest.mark.parametrize("path", [SINGLE, BATCH])
+@pytest.mark.parametrize("before", [b"", GET])
+def test_a_caller_who_ends_within_a_body_is_let_go_at_once(raw, path, before):
+    raw.settimeout(10)  # less than the time that a slow caller has
+    raw.sendall(before + f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n".encode() + b"{")
     raw.shutdown(socket.SHUT_WR)
-    assert b" 200 " not in rest(raw)
+    received = rest(raw)
+    assert received.count(b" 200 ") == (1 if before else 0)
+
+
+def served(app, request):
+    """What the connection answers where the application is this one."""
+
+    async def talk():
+        state = SimpleNamespace(connections=set(), tasks=set(), total_requests=0, default_headers=[(b"date", b"now")])
+        config = SimpleNamespace(
+            loaded=True, loaded_app=app, asgi_version="3.0", root_path="", timeout_keep_alive=5, limit_concurrency=None
+        )
+        loop = asyncio.get_running_loop()
+        server = await loop.create_server(lambda: Connection(config, state, {}), "127.0.0.1", 0)
+        reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+        writer.write(request)
+        received = await asyncio.wait_for(reader.read(), 10)
+        writer.close()
+        await writer.wait_closed()
+        while state.connections:
+            await asyncio.sleep(0.01)
+        server.close()
+        await server.wait_closed()
+        return received
+
+    return asyncio.run(talk())
+
+
+def test_an_answer_without_fields_is_whole():
+    async def empty(_scope, _receive, send):
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body"})
+
+    answer = b"HTTP/1.1 204 No Content\r\ndate: now\r\n"
+    assert served(empty, GET + LAST) == answer + b"\r\n" + answer + b"connection: close\r\n\r\n"
+
+
+@pytest.mark.parametrize("behind", [b"", GET])
+def test_an_application_that_ends_without_an_answer_is_told_of(behind):
+    async def silent(_scope, _receive, _send):
+        pass
+
+    received = served(silent, GET + behind)
+    assert received.startswith(b"HTTP/1.1 500 ")
+    assert received.count(b"HTTP/1.1") == 1
+
+
+@pytest.mark.parametrize("field", [(b"x-a", b"1\r\nx-b: 2"), (b"x-a\n", b"1"), (b"x-a", b"\0")])
+def test_a_field_that_would_break_the_head_is_not_written(field):
+    async def broken(_scope, _receive, send):
+        await send({"type": "http.response.start", "status": 200, "headers": [field]})
+
+    assert served(broken, GET).startswith(b"HTTP/1.1 500 ")
 
 
 @pytest.mark.parametrize("try_number", range(10))
