@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import platform
+import socket
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ __all__ = [
     "ROOT",
     "Timed",
     "best_of",
+    "free_port",
     "machine",
     "markdown",
     "progress",
@@ -109,6 +111,13 @@ def best_of(rounds: int, work: Mapping[str, Callable[[], object]], clock: str = 
             wall, own = wall + seconds, own + min(seconds, busy)
             best[name] = min(best[name], seconds if clock == "wall" else busy)
     return Timed(best, own / wall, clock)
+
+
+def free_port() -> int:
+    """A port that nobody has now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def quantity(value: float, digits: int = 2) -> str:

@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 import orjson
-from measuring import IMAGES, ROOT, machine, markdown, progress, quantity, write_section
+from measuring import IMAGES, ROOT, free_port, machine, markdown, progress, quantity, write_section
 
 from mumacro.dimensional import FIELDS
 from service.evaluation import answer_batch
@@ -126,13 +126,6 @@ class Caller:
             pass
         sender.join()
         return reply.status
-
-
-def free_port() -> int:
-    """A port that nobody has now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @contextmanager

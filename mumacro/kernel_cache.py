@@ -20,7 +20,7 @@ from typing import Any, TypeVar, overload
 
 import llvmlite
 import numba
-from numba.core.compiler import CompileResult
+from numba.core.caching import CompileResultCacheImpl
 from numba.core.serialize import dumps
 
 from mumacro.writing import write_whole
@@ -32,6 +32,8 @@ _HERE = Path(__file__).resolve().parent
 _SUFFIX = ".kernel"
 _DIGEST = 32  # bytes in front of a file's content
 _log = logging.getLogger("mumacro.kernels")
+# How numba takes a compiled function apart and puts it together; its constructor would look for a folder of numba's.
+_form: Any = CompileResultCacheImpl.__new__(CompileResultCacheImpl)
 
 
 def source_digest(*folders: Path) -> str:
@@ -129,14 +131,14 @@ class _Stored:
         if data[:_DIGEST] != hashlib.sha256(what + content).digest():
             return None
         parts = pickle.loads(content)  # noqa: S301 (ours: see _private)
-        return CompileResult._rebuild(target, *parts)  # type: ignore[no-untyped-call]
+        return _form.rebuild(target, parts)
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Keep a kernel, if that is possible: it answers in any case."""
         if compiled.lifted or compiled.library.has_dynamic_globals:  # such code is of this process alone
             return
         path, what = self._place(signature, compiled.codegen)
-        content = dumps(compiled._reduce())  # type: ignore[no-untyped-call]
+        content = dumps(_form.reduce(compiled))
         try:
             write_whole(path, hashlib.sha256(what + content).digest() + content)
         except OSError as error:

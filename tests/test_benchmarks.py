@@ -15,6 +15,7 @@ PAGES = {
     "solver": PAGE,
     "speed_against_error": PAGE,
     "build_cost": PAGE,
+    "cold_start": PAGE,
     "scale": ROOT / "docs" / "scale.md",
 }
 Row = dict[str, str]
@@ -160,6 +161,14 @@ def test_build_cost_script_prints_its_tables() -> None:
     assert number(built["solves, nodes"]) < number(built["solves, all"])
     assert [row["plain grid"] for row in plain] == ["24 x 24", "48 x 48"]
     assert number(plain[0]["max abs error"]) > number(plain[1]["max abs error"])
+
+
+def test_cold_start_script_prints_its_table() -> None:
+    done = run("cold_start", "--quick")
+    assert done.returncode == 0, done.stderr
+    ((row,),) = tables(done.stdout)
+    assert number(row["empty [s]"]) > number(row["kept [s]"]) > 0.0
+    assert number(row["kernels [MB]"]) > 0.0
 
 
 def test_picture_of_the_surface_is_drawn(tmp_path: Path) -> None:

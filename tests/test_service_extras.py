@@ -108,7 +108,7 @@ def test_power_and_stick_fraction_are_the_surrogates(client, case, surrogate, v0
     assert answer["stick_fraction"] == pytest.approx(surrogate.stick_fraction(v, y), rel=1e-12)
     assert (answer["stick_fraction"] > 0) == (v0 < answer["limits"]["v0_crit"])
     assert answer["stick_fraction_bound"] == pytest.approx(surrogate.stick_fraction_with_bound(v, y)[1], rel=1e-9)
-    bounds = answer["power"]["oscillation_bound"], answer["power"]["saved_bound"]
+    bounds = answer["power_bound"]["oscillation"], answer["power_bound"]["saved"]
     assert bounds[0] == pytest.approx(surrogate.power_with_bound(v, y)[1] * unit, rel=1e-9)
     assert bounds[1] == pytest.approx(answer["error_bound"] * case["Fz"] * v0, rel=1e-2, abs=1e-14)
     assert all(0.0 <= bound < 1e-6 for bound in bounds)
@@ -122,8 +122,8 @@ def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, p
     answer = ask(client, {**case, **change}, include=["power", "stick_fraction"])
     assert (answer["power"]["oscillation"], answer["stick_fraction"]) == (power, 0.0)
     assert answer["power"]["saved"] == pytest.approx((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
-    assert (answer["power"]["oscillation_bound"], answer["stick_fraction_bound"]) == (power, 0.0)
-    assert 0.0 <= answer["power"]["saved_bound"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
+    assert (answer["power_bound"]["oscillation"], answer["stick_fraction_bound"]) == (power, 0.0)
+    assert 0.0 <= answer["power_bound"]["saved"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
 
 
 def test_an_amplitude_below_double_range_leaves_the_stick_fraction_open(client, case):
@@ -145,8 +145,9 @@ def test_power_and_stick_fraction_come_in_batches(client, case):
         single = ask(client, row, include=["stick_fraction", "power"])
         assert result["stick_fraction"] == pytest.approx(single["stick_fraction"], rel=1e-12)
         assert result["stick_fraction_bound"] == pytest.approx(single["stick_fraction_bound"], rel=1e-12)
-        for name, power in single["power"].items():
-            assert result["power"][name] == (None if power is None else pytest.approx(power, rel=1e-12))
+        for part in ("power", "power_bound"):
+            for name, power in single[part].items():
+                assert result[part][name] == (None if power is None else pytest.approx(power, rel=1e-12))
     assert results[-1] is None
 
 
@@ -162,7 +163,7 @@ def test_bounds_of_power_and_stick_fraction_come_as_columns_lines_and_arrow(clie
     assert columns["power"].keys() == rows[0]["power"].keys()
     for row, line in zip(rows, map(json.loads, lines), strict=True):
         assert line["stick_fraction_bound"] == row["stick_fraction_bound"] > 0.0 or row["stick_fraction"] == 0.0
-        assert line["power"] == row["power"]
+        assert (line["power"], line["power_bound"]) == (row["power"], row["power_bound"])
     pa = pytest.importorskip("pyarrow")
     given = pa.record_batch({name: v0 if name == "v0" else [value] * len(v0) for name, value in case.items()})
     sink = pa.BufferOutputStream()
@@ -172,19 +173,19 @@ def test_bounds_of_power_and_stick_fraction_come_as_columns_lines_and_arrow(clie
     answer = client.post(f"{PATH}/batch", params=query, content=sink.getvalue().to_pybytes(), headers=headers)
     found = pa.ipc.open_stream(answer.content).read_all().to_pydict()
     assert found["stick_fraction_bound"] == columns["stick_fraction_bound"]
-    for key, values in columns["power"].items():
-        assert found[f"power.{key}"] == values
+    for part in ("power", "power_bound"):
+        assert {key: found[f"{part}.{key}"] for key in columns[part]} == columns[part]
 
 
 @pytest.mark.parametrize("v0", [1e-4, 0.01, 5.0])
 @pytest.mark.parametrize("y0", [1e-7, 2e-6, 1e-4])
 def test_settling_is_the_librarys(client, case, surrogate, v0, y0):
     at = {**case, "v0": v0, "y0": y0}
-    found, expected = ask(client, at, include=["settling"])["settling"], settling(surrogate, **at)
-    assert list(found.values()) == [
-        expected.periods, expected.periods_any, expected.time, expected.slip_path, expected.error_bound,
-    ]  # fmt: skip
-    assert 0.0 < found["periods_bound"] < 1e-3 * found["periods"]
+    answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
+    found = answer["settling"]
+    assert list(found.values()) == [expected.periods, expected.periods_any, expected.time, expected.slip_path]
+    assert answer["settling_bound"] == {"periods": expected.error_bound}
+    assert 0.0 < expected.error_bound < 1e-3 * found["periods"]
     batch = {**at, "v0": [v0, 0.3], "include": ["settling"]}
     columns = client.post(f"{PATH}/batch", json=batch).json()["settling"]
     assert {name: column[0] for name, column in columns.items()} == pytest.approx(found, rel=1e-12)
