@@ -25,6 +25,7 @@ __all__ = [
     "Law",
     "approximations",
     "border_speeds",
+    "borders",
     "friction_law",
     "sweep_values",
 ]
@@ -223,6 +224,28 @@ def _creep(surrogate: Surrogate, law: Law, full: Mapping[str, Any]) -> Array:
     return out
 
 
+def borders(y: Array) -> dict[str, Array]:
+    """v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN outside the stated range.
+
+    Examples
+    --------
+    >>> found = borders(np.array([0.5, 2.0]))
+    >>> found["eq_24"].round(4).tolist(), found["eq_26"].round(4).tolist()
+    ([0.1124, nan], [nan, 0.6667])
+    """
+    low, high = np.minimum(y, 1.0), np.maximum(y, 1.0)
+    small, large = y <= 1.0, y >= 1.0
+    return {
+        "eq_23": np.where(small, closed_forms.border_23(low), np.nan),
+        "eq_24": np.where(small, closed_forms.border_24(low), np.nan),
+        "eq_26": np.where(large, closed_forms.border_26(high), np.nan),
+        "eq_27": closed_forms.border_27(y),
+        "small_amplitude": np.where(small, closed_forms.border_small_amplitude(low), np.nan),
+        "large_amplitude": np.where(large, closed_forms.border_large_amplitude(high), np.nan),
+        "blend": closed_forms.border_blend(y),
+    }
+
+
 def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
     """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in :data:`BORDERS`; (n,).
 
@@ -236,17 +259,7 @@ def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | Non
     never = np.broadcast_to((np.asarray(full["y0"]) == 0.0) | (omega == 0.0) | rigid, y.shape)
     usable = np.isfinite(y) & ~never
     y_safe = np.where(usable, y, 1.0)
-    low, high = np.minimum(y_safe, 1.0), np.maximum(y_safe, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):
         unit = np.where(usable, np.asarray(law.answer.length_scale) * omega, np.nan)
-        found = {
-            "exact": surrogate.v_tilde_crit(y_safe),
-            "eq_23": np.where(y_safe <= 1.0, closed_forms.border_23(low), np.nan),
-            "eq_24": np.where(y_safe <= 1.0, closed_forms.border_24(low), np.nan),
-            "eq_26": np.where(y_safe >= 1.0, closed_forms.border_26(high), np.nan),
-            "eq_27": closed_forms.border_27(y_safe),
-            "small_amplitude": np.where(y_safe <= 1.0, closed_forms.border_small_amplitude(low), np.nan),
-            "large_amplitude": np.where(y_safe >= 1.0, closed_forms.border_large_amplitude(high), np.nan),
-            "blend": closed_forms.border_blend(y_safe),
-        }
+        found = {"exact": surrogate.v_tilde_crit(y_safe), **borders(y_safe)}
         return {name: np.where(never, 0.0, unit * column) for name, column in found.items()}

@@ -6,8 +6,9 @@ import time
 import numpy as np
 import pytest
 
+from mumacro import closed_forms
 from mumacro.input_names import UNITS_OF
-from mumacro.law import APPROXIMATIONS
+from mumacro.law import APPROXIMATIONS, BORDERS
 from service.routes import docs
 from service.routes import page as page_route
 from service.routes.page import ASSETS, POLICY
@@ -34,6 +35,9 @@ def test_every_part_is_served_and_names_no_other_host(client, name):
         assert imported in ASSETS
 
 
+RANGES = {"eq_23": (1e-2, 1.0), "eq_24": (1e-2, 1.0), "eq_26": (1.0, 1e3), "eq_27": (1e-2, 1e3)}  # of y~
+
+
 def test_the_map_is_the_surrogates(client, surrogate):
     response = client.get("/static/page/map.json")
     data = response.json()
@@ -42,6 +46,11 @@ def test_the_map_is_the_surrogates(client, surrogate):
     assert np.max(np.abs(grid - surrogate.mu_ratio(v[None, :], y[:, None]))) <= 0.5001 * data["unit"]
     border = np.array(data["border"])
     assert border[:, 0] == pytest.approx(surrogate.v_tilde_crit(border[:, 1]), rel=1e-5)
+    for name, line in data["borders"].items():  # each formula in its stated range only
+        v, y = np.array(line).T
+        assert v == pytest.approx(getattr(closed_forms, f"border_{name.removeprefix('eq_')}")(y), rel=1e-5)
+        assert (y.min(), y.max()) == pytest.approx(RANGES[name], rel=0.03)
+    assert data["borders"].keys() == RANGES.keys()
     etag = response.headers["etag"]
     assert client.get("/static/page/map.json", headers={"If-None-Match": etag}).status_code == 304
 
@@ -54,6 +63,10 @@ def test_units_and_approximations_are_the_librarys(client):
         }
     assert {name: one["text"] for name, one in told["approximations"].items()} == APPROXIMATIONS
     assert told["approximations"]["static"]["equations"] == [16, 38]
+    assert {name: one["equations"] for name, one in told["borders"].items()} == {
+        "eq_23": [23], "eq_24": [24, 39], "eq_26": [26], "eq_27": [27],
+    }  # fmt: skip
+    assert all(one["text"] == BORDERS[name] for name, one in told["borders"].items())
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path, problem):

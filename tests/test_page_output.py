@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from mumacro.closed_forms import border_23, border_24, border_26, border_27
 from mumacro.law import APPROXIMATIONS
 from service.routes.page import ASSETS
 
@@ -223,13 +224,64 @@ def test_the_ends_of_every_range_are_answered(open_page, address):
     assert page.complaints() == []
 
 
+def legend_of(page, name="legend"):
+    return page.run(f"return [...document.querySelectorAll('#{name} li')].map((item) => item.textContent);")
+
+
+def borders_told(page):
+    """The border by the paper's formulas, as the legend says it: equations -> values."""
+    told = {}
+    for text in legend_of(page):
+        found = re.fullmatch(r"border by (.+): (.+)", text)
+        if found:
+            told[found[1]] = [float(part.split()[0]) for part in found[2].split(" and ")]
+    return told
+
+
+def test_the_border_by_the_papers_equations(open_page, surrogate, case):
+    page = open_page("#approximations=1")
+    speed = 1e3 * 3e-6 * 1.3e5  # l0 omega [mm/s]
+    small = {"(23)": border_23, "(24), (39)": border_24, "(27)": border_27}
+    found = borders_told(page)
+    assert found.keys() == small.keys()  # (26) is meant for y~ >= 1
+    for numbers, formula in small.items():
+        assert found[numbers] == pytest.approx([speed * float(formula(2 / 3))], rel=1e-3)
+    assert legend_of(page, "map-legend") == [f"border by {one}" for one in ("(23)", "(24), (39)", "(26)", "(27)")]
+    page = open_page("#approximations=1&y0=6e-6&scale=linear")  # y~ = 2, of which (23) and (24) say nothing
+    found = borders_told(page)
+    assert found.keys() == {"(26)", "(27)"}
+    for numbers, formula in (("(26)", border_26), ("(27)", border_27)):
+        assert found[numbers] == pytest.approx([speed * float(formula(2.0))], rel=1e-3)
+    # along the amplitude: where the border's speed is v0 = 10 mm/s; l0 = 3 um
+    page = open_page("#approximations=1&along=y0")
+    for numbers, formula in small.items():
+        (amplitude,) = borders_told(page)[numbers]
+        assert speed * float(formula(amplitude / 3)) == pytest.approx(10.0, rel=2e-3)
+    page.click("#approximations")
+    assert legend_of(page) == legend_of(page, "map-legend") == []
+    assert page.complaints() == []
+
+
+@pytest.mark.parametrize("name", ["law", "map"])
+def test_the_papers_borders_are_drawn(open_page, name):
+    without = open_page().pixels(name)
+    page = open_page("#approximations=1")
+    assert not np.array_equal(page.pixels(name), without)
+    if name == "map":
+        colour = (0xB8, 0x4D, 0xFF)  # of (26), which is given for y~ >= 1: the upper three fifths of the frame
+        rows, _ = np.nonzero(np.all(page.pixels(name)[..., :3] == colour, axis=-1))
+        frame = page.pixels(name).shape[0] - 56
+        assert rows.max() == pytest.approx(10 + 0.6 * frame, abs=6)
+
+
 def test_curves_approximations_and_downloads(open_page, surrogate, tmp_path, case):
     page = open_page("#approximations=1")
     # every column that the service has here has its line in the legend, with the paper's equations
-    legend = page.run("return [...document.querySelectorAll('#legend li')].map((item) => item.textContent);")
+    legend = legend_of(page)
     assert "master curve (28)" in legend
     assert "critical (32), (40)" in legend
-    assert len(legend) == 8 == len(APPROXIMATIONS) - 1  # the corner is too far for its own
+    curves = [text for text in legend if not text.startswith("border")]
+    assert len(curves) == 8 == len(APPROXIMATIONS) - 1  # the corner is too far for its own
     page.choose("#family", "y0")
     assert page.value("#curves") == "1; 2; 4"
     page.type("#curves", "1; 2 mm")
@@ -241,6 +293,7 @@ def test_curves_approximations_and_downloads(open_page, surrogate, tmp_path, cas
     assert header[:4] == ["v₀ [mm/s]", "mu_macro [-]", "mu_static [-]", "regime"]
     assert header[-2:] == ["mu_macro [-] at y₀ = 0.5 µm", "mu_macro [-] at y₀ = 2.5 µm"]
     assert "master_curve [-]" in header
+    assert {row[header.index("border_eq_24 [m/s]")] for row in rows} == {str(3e-6 * 1.3e5 * border_24(2 / 3))}
     assert len(rows) == 301
     v0 = 1e-3 * np.array([float(row[0]) for row in rows])
     for column, y0 in ((1, 2e-6), (-2, 0.5e-6), (-1, 2.5e-6)):

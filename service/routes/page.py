@@ -10,7 +10,7 @@ from starlette.responses import FileResponse, Response
 
 from mumacro import Surrogate
 from mumacro.input_names import UNITS_OF
-from mumacro.law import APPROXIMATIONS, EQUATIONS
+from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, borders
 
 from .. import __version__
 from ..formats.columns import dump
@@ -38,6 +38,8 @@ POLICY = (
 # The window of the map [-]: from deep in creep to fast sliding, twenty places a decade.
 _PER_DECADE = 20
 _V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
+# Formulas of the paper for the border; "small_amplitude" is eq. (31) among the approximations, not among the borders.
+_PAPER_BORDERS = tuple(name for name in BORDERS if name in EQUATIONS.values() and name not in APPROXIMATIONS)
 _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
 
 
@@ -63,7 +65,7 @@ for _name, _media_type in ASSETS.items():
 @router.head(_NAMES)
 @router.get(_NAMES)
 async def names() -> Response:
-    """Return what the page must not say in words of its own: inputs, units, bounds, approximations."""
+    """Return what the page must not say in words of its own: inputs, units, bounds, approximations, borders."""
     inputs = {
         name: {
             "unit": UNITS[name], "bound": BOUNDS[name], "positive": name in POSITIVE,
@@ -71,16 +73,16 @@ async def names() -> Response:
         }
         for name, known in UNITS_OF.items()
     }  # fmt: skip
-    numbers = {name: [number for number, found in EQUATIONS.items() if found == name] for name in APPROXIMATIONS}
-    about = {name: {"equations": numbers[name], "text": text} for name, text in APPROXIMATIONS.items()}
-    content = dump({"inputs": inputs, "approximations": about})
+    about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
+    of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
+    content = dump({"inputs": inputs, "approximations": about, "borders": of_paper})
     return Response(content, headers={"Cache-Control": "no-cache"}, media_type="application/json")
 
 
 @router.head("/static/page/map.json")
 @router.get("/static/page/map.json")
 async def map_data(request: Request) -> Response:
-    """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and the border."""
+    """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and the border, exact and by equation."""
     surrogate = tables_of(request).pick().surrogate
     etag = f'"{surrogate.checksum[:32]}-{__version__}"'
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
@@ -90,6 +92,11 @@ async def map_data(request: Request) -> Response:
     return Response(content, headers=headers, media_type="application/json")
 
 
+def _equations(name: str) -> list[int]:
+    """Numbers of the paper's equations that an approximation stands for."""
+    return [number for number, found in EQUATIONS.items() if found == name]
+
+
 def _map(surrogate: Surrogate) -> bytes:
     axes = {}
     for name, (low, high) in {"v_tilde": _V_DECADES, "y_tilde": _Y_DECADES}.items():
@@ -97,7 +104,13 @@ def _map(surrogate: Surrogate) -> bytes:
     v, y = (np.geomspace(axis["start"], axis["stop"], int(axis["n"])) for axis in axes.values())
     ratio = surrogate.mu_ratio(v[None, :], y[:, None])
     amplitudes = np.geomspace(y[0], y[-1], 4 * y.size)
-    border = np.column_stack((surrogate.v_tilde_crit(amplitudes), amplitudes))
     rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
-    line = [[float(f"{x:.6g}") for x in place] for place in border.tolist()]
-    return dump({**axes, "unit": _UNIT, "mu_ratio": rounded, "border": line})
+    lines = {name: _line(column, amplitudes) for name, column in borders(amplitudes).items() if name in _PAPER_BORDERS}
+    border = _line(surrogate.v_tilde_crit(amplitudes), amplitudes)
+    return dump({**axes, "unit": _UNIT, "mu_ratio": rounded, "border": border, "borders": lines})
+
+
+def _line(v: np.ndarray, y: np.ndarray) -> list[list[float]]:
+    """Places (v~, y~) of a curve, in six digits; without those at which it is not given."""
+    places = np.column_stack((v, y))[np.isfinite(v)]
+    return [[float(f"{x:.6g}") for x in place] for place in places.tolist()]

@@ -14,8 +14,12 @@ export const INPUTS = {
 };
 export const NAMES = Object.keys(INPUTS);
 
-/** What the service says of its approximations: name -> { equations, text }. */
+/** What the service says of its approximations, and of the paper's formulas for the border: name -> { equations, text }. */
 export let approximations = {};
+export let borders = {};
+
+/** The paper's equation numbers of an entry of these: "(24), (39)". */
+export const equations = ({ equations: numbers }) => numbers.map((number) => `(${number})`).join(", ");
 
 /** Fetches units and bounds; nothing here works before that. */
 export async function loadNames() {
@@ -27,7 +31,7 @@ export async function loadNames() {
   // a frequency f stands for omega = 2 pi f; a unit of both (1/s) says neither
   const { units } = INPUTS.omega;
   for (const [unit, [times, over]] of Object.entries(found.inputs.f.units)) units[unit] = unit in units ? null : [times * TURN, over];
-  approximations = found.approximations;
+  ({ approximations, borders } = found);
 }
 
 /** Whether it is a unit of the input. */

@@ -18,7 +18,7 @@ export class LawPlot {
     });
   }
 
-  /** `law`: { title, values, mu, still, regime, border, scale, top, approximations: [{ column, shade, dash }] }. */
+  /** `law`: { title, values, mu, still, regime, border, scale, top, approximations: [{ column, shade, dash }], borders: [{ numbers, places }] }. */
   show(law) {
     Object.assign(this, { law, cursor: null });
     this.plot.redraw();
@@ -43,7 +43,7 @@ export class LawPlot {
   draw(context, width, height) {
     if (!this.law) return;
     const colour = theme();
-    const { values, mu, still, regime, border, title, scale, approximations } = this.law;
+    const { values, mu, still, regime, border, title, scale, approximations, borders } = this.law;
     const curves = this.family?.curves ?? [];
     const top = 1.06 * Math.max(this.law.top, 1e-300, ...mu, ...curves.flatMap((one) => one.mu));
     const x = new Axis(values[0], values.at(-1), scale === "log", 58, width - 14);
@@ -67,6 +67,7 @@ export class LawPlot {
     this.curve(context, values, mu, colour("curve"), 2.8, []);
     context.restore();
     this.drawMarks(context, colour, border, approximations.length ? null : still[0]);
+    this.drawFormulas(context, colour, borders.filter(({ places }) => places.length));
     if (this.cursor !== null) this.drawCursor(context, colour);
     if (this.point) {
       const [value, friction] = this.point;
@@ -98,6 +99,26 @@ export class LawPlot {
     context.beginPath();
     context.arc(at, up, 4, 0, 2 * Math.PI);
     context.fill();
+  }
+
+  /** The border by the paper's formulas: a short line for each, in a row of its own above the word "border", with its numbers. */
+  drawFormulas(context, colour, formulas) {
+    Object.assign(context, { font: "12px system-ui, sans-serif", textBaseline: "middle", lineWidth: 2, lineJoin: "round" });
+    formulas.forEach(({ numbers, places }, row) => {
+      const middle = this.y.from - 30 - 15 * row;
+      for (const place of places) {
+        const at = this.x.pixel(place);
+        const right = at < this.x.to - 70;
+        context.strokeStyle = colour("mark");
+        context.beginPath();
+        context.moveTo(at, middle - 6);
+        context.lineTo(at, middle + 6);
+        context.stroke();
+        Object.assign(context, { textAlign: right ? "left" : "right", strokeStyle: colour("card"), fillStyle: colour("mark") });
+        context.strokeText(numbers, at + (right ? 5 : -5), middle);
+        context.fillText(numbers, at + (right ? 5 : -5), middle);
+      }
+    });
   }
 
   drawMarks(context, colour, border, still) {

@@ -1,6 +1,6 @@
 // What is asked of the friction law, its legend, its table, and its downloads.
 import { post } from "./api.js";
-import { INPUTS, NAMES, approximations, fromSI, symbolOf, toSI, unitText } from "./inputs.js";
+import { INPUTS, NAMES, approximations, borders, equations, fromSI, symbolOf, toSI, unitText } from "./inputs.js";
 import { readNumber, readValue } from "./read.js";
 import { REGIMES, show, withUnit } from "./show.js";
 
@@ -49,16 +49,26 @@ export function familyQuestion(state, border) {
 export const askLaw = (request) => post("v1/law", request);
 
 /** Short name of an approximation, with the paper's equations. */
-const titled = (name) => {
-  const numbers = approximations[name].equations.map((number) => `(${number})`).join(", ");
-  return `${name.replaceAll("_", " ")} ${numbers}`.trim();
-};
+const titled = (name) => `${name.replaceAll("_", " ")} ${equations(approximations[name])}`.trim();
 
-/** What the plot draws of an answer: in the unit of the field. */
-export function drawn(found, state) {
+/** Values of the swept input at which its speed reaches the border by a formula: `speeds` of that formula at each value, null where it is not given. */
+function crossings(values, speeds, speedAt, log) {
+  const over = speeds.map((speed, i) => (speed === null ? NaN : speedAt(values[i]) - speed));
+  return over.flatMap((here, i) => {
+    const next = over[i + 1];
+    if (!(here < 0 ? next >= 0 : here >= 0 && next < 0)) return [];
+    const share = here / (here - next);
+    const [from, to] = [values[i], values[i + 1]];
+    return [log ? from * (to / from) ** share : from + share * (to - from)];
+  });
+}
+
+/** What the plot draws of an answer to a request: in the unit of the field. */
+export function drawn(found, state, request) {
   const unit = state.units[state.along];
   const shown = (value) => fromSI(state.along, unit, value);
   const known = Object.entries(found.approximations ?? {});
+  const speedAt = state.along === "v0" ? (value) => value : () => request.v0;
   return {
     title: heading(state),
     values: found.values.map(shown), mu: found.mu_macro, still: found.mu_static, regime: found.regime,
@@ -66,6 +76,9 @@ export function drawn(found, state) {
     // only those that are meant to hold somewhere here
     approximations: known.map(([name, column], i) => ({ name, column, label: titled(name), about: approximations[name].text, token: `a${i + 1}`, shade: (colour) => colour(`a${i + 1}`), dash: DASHES[i % DASHES.length] }))
       .filter(({ column }) => column.some((value) => value !== null)),
+    // the paper's formulas for the border, where they are given
+    borders: Object.entries(found.border_speeds ?? {}).filter(([name, column]) => borders[name] && column.some((value) => value !== null))
+      .map(([name, column]) => ({ name, column, numbers: equations(borders[name]), about: borders[name].text, places: crossings(found.values, column, speedAt, state.scale === "log").map(shown) })),
   };
 }
 
@@ -95,9 +108,17 @@ export function readCurves(name, text, unit) {
   return { values: found.map((one) => one.si) };
 }
 
-/** Fills the legend: a line of the curve's style and its name, what it is as a hint. */
-export function showLegend(list, law, family) {
-  const entries = [...law.approximations.map((one) => ({ ...one, css: `var(--${one.token})` })), ...(family?.curves ?? [])];
+/** The rows of the legend: approximations, the border by each of the paper's formulas ("border by (24), (39): 70.1 mm/s"), curves of the family. */
+export function lawRows(law, family, state) {
+  const unit = unitText(state.units[state.along]);
+  const marks = law.borders.filter(({ places }) => places.length).map(({ numbers, about, places }) => ({
+    label: `border by ${numbers}: ${places.map((place) => `${show(place, 4)} ${unit}`.trim()).join(" and ")}`, about, css: "var(--mark)", shade: (colour) => colour("mark"), dash: [],
+  }));
+  return [...law.approximations.map((one) => ({ ...one, css: `var(--${one.token})` })), ...marks, ...(family?.curves ?? [])];
+}
+
+/** Fills a legend: a line of the curve's style and its name, what it is as a hint. */
+export function showLegend(list, entries) {
   list.replaceChildren(...entries.map(({ label, about, css, dash }) => {
     const item = Object.assign(document.createElement("li"), { title: about ?? "" });
     const sample = document.createElement("span");
@@ -126,6 +147,7 @@ export function asCsv(law, family) {
   const columns = [
     [law.title, law.values.map((value) => Number(value.toPrecision(15)))], ["mu_macro [-]", law.mu], ["mu_static [-]", law.still], ["regime", law.regime],
     ...law.approximations.map(({ name, column }) => [`${name} [-]`, column]),
+    ...law.borders.map(({ name, column }) => [`border_${name} [m/s]`, column]),
     ...(family?.curves ?? []).map(({ label, mu }) => [`mu_macro [-] at ${label}`, mu]),
   ];
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);

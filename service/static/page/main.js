@@ -2,12 +2,12 @@
 import { question, showAnswer } from "./answer.js";
 import { Channel, KeyWanted, get } from "./api.js";
 import { Form } from "./form.js";
-import { INPUTS, fromSI, loadNames, symbolOf, toSI } from "./inputs.js";
+import { INPUTS, borders, equations, fromSI, loadNames, symbolOf, toSI } from "./inputs.js";
 import { keyTaken, onKey, wantKey } from "./keyform.js";
 import { LawPlot } from "./law.js";
 import { LawForm } from "./lawform.js";
-import { asCsv, askLaw, drawn, drawnFamily, familyQuestion, heading, lawQuestion, showLegend, showTable } from "./lawpanel.js";
-import { FrictionMap } from "./map.js";
+import { asCsv, askLaw, drawn, drawnFamily, familyQuestion, heading, lawQuestion, lawRows, showLegend, showTable } from "./lawpanel.js";
+import { FORMULAS, FrictionMap } from "./map.js";
 import { theme } from "./plot.js";
 import { caption, save } from "./save.js";
 import { REGIMES, show, withUnit } from "./show.js";
@@ -21,7 +21,7 @@ const status = new Status($("status"), $("main"));
 const lawStatus = new Status($("law-status"), $("law-section"));
 let state, form, lawForm, solver;
 let answer = null; // the last one
-const law = { found: null, family: null, drawn: null, drawnFamily: null, asked: "", askedFamily: "" };
+const law = { found: null, request: null, family: null, drawn: null, drawnFamily: null, rows: [], asked: "", askedFamily: "" };
 
 // --- questions ----------------------------------------------------------------------------------------
 
@@ -45,7 +45,7 @@ const channel = (place, topic, ask, use) => new Channel({
 
 const asks = {
   point: channel(status, "point", (asked) => get("v1/mu-macro", question(asked)), showPoint),
-  law: channel(lawStatus, "law", askLaw, (found) => { law.found = found; drawLaw(); }),
+  law: channel(lawStatus, "law", askLaw, (found, request) => { Object.assign(law, { found, request }); drawLaw(); }),
   family: channel(lawStatus, "family", askLaw, (found) => { law.family = found; drawLaw(); }),
   map: channel(status, "map", () => get("static/page/map.json"), (data) => { map.show(data); keyTaken(); movePoint(); }),
   hover: new Channel({ ask: ([v, y]) => get("v1/mu-macro", { mu0: 1, Fz: 1, k: 1, omega: 1, y0: y, v0: v }), answer: showHover, fail: () => {} }),
@@ -84,6 +84,7 @@ function change(changed) {
   form.sync(state);
   solver.sync(state);
   lawForm.sync(state, answer?.limits.v0_crit);
+  compareOnMap();
   $("link").href = toAddress(state);
   // browsers refuse an address that changes with every step of a slider
   clearTimeout(addressTimer);
@@ -132,19 +133,27 @@ function movePoint() {
 function drawLaw() {
   const { found, family } = law;
   if (!found || found.along !== state.along) return;
-  law.drawn = drawn(found, state);
+  law.drawn = drawn(found, state, law.request);
   law.drawnFamily = family && family.along === state.along && family.family === state.family ? drawnFamily(family, state) : null;
   plot.show(law.drawn);
   plot.showFamily(law.drawnFamily);
   const { along } = state;
   const unit = state.units[along];
   if (answer) plot.move(along === "k" && state.rigid ? Infinity : fromSI(along, unit, answer.asked.values[along]), answer.mu_macro);
-  showLegend($("legend"), law.drawn, law.drawnFamily);
+  law.rows = lawRows(law.drawn, law.drawnFamily, state);
+  showLegend($("legend"), law.rows);
   showTable($("law-table").tBodies[0], law.drawn);
   $("law-input").textContent = heading(state);
   const at = (i) => `${show(found.mu_macro.at(i), 4)} at ${symbolOf(along, unit)} = ${withUnit(along, found.values.at(i), unit)}`;
   const border = found.border.map((mark) => withUnit(along, mark.value, unit)).join(" and ");
   $("law").setAttribute("aria-label", `Macroscopic friction from ${at(0)} to ${at(-1)}${border ? `; border of continuous sliding at ${border}` : ""}.`);
+}
+
+/** The paper's formulas for the border on the map, with their legend. */
+const mapRows = () => (state.approximations ? Object.entries(FORMULAS).map(([name, [style, dash]]) => ({ label: `border by ${equations(borders[name])}`, about: borders[name].text, css: style, dash })) : []);
+function compareOnMap() {
+  map.compare(state.approximations);
+  showLegend($("map-legend"), mapRows());
 }
 
 function showHover(found, [v, y]) {
@@ -211,10 +220,10 @@ $("csv").addEventListener("click", () => law.drawn && save(new Blob([asCsv(law.d
 $("law-image").addEventListener("click", async () => {
   if (!law.drawn) return;
   const colour = theme();
-  const rows = [{ text: caption(state, state.along) }, ...[...law.drawn.approximations, ...(law.drawnFamily?.curves ?? [])].map(({ label, shade, dash }) => ({ text: label, style: shade(colour), dash }))];
+  const rows = [{ text: caption(state, state.along) }, ...law.rows.map(({ label, shade, dash }) => ({ text: label, style: shade(colour), dash }))];
   save(await plot.plot.picture(rows), `friction-law-${state.along}.png`);
 });
-$("map-image").addEventListener("click", async () => save(await map.plot.picture([{ text: caption(state) }]), "friction-map.png"));
+$("map-image").addEventListener("click", async () => save(await map.plot.picture([{ text: caption(state) }, ...mapRows().map(({ label, css, dash }) => ({ text: label, style: css, dash }))]), "friction-map.png"));
 
 /** Asks for everything, the map included: at the start, and when there is a key. */
 function begin() {

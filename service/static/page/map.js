@@ -5,6 +5,8 @@ import { Axis, Plot, drawAxes, drawPoint, theme } from "./plot.js";
 const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
 // label -> where along v~ it stands, so that labels keep clear of each other and of the border
 const LABELS = new Map([[0.01, 0.45], [0.1, 0.55], [0.3, 0.66], [0.5, 0.75], [0.7, 0.83], [0.9, 0.9], [0.99, 0.94]]);
+/** How the border by each of the paper's formulas is drawn: colours that are seen on the map and on the card. */
+export const FORMULAS = { eq_23: ["#e07000", [6, 3]], eq_24: ["#e5246f", [3, 3]], eq_26: ["#b84dff", [8, 3, 2, 3]], eq_27: ["#e53935", []] };
 const BAR = 66; // room on the right for the colour bar and its numbers
 
 /** Where to mark a case: { place: [v~, y~], out: [-1 | 0 | 1, ...] }; null where nothing moves at all. */
@@ -21,7 +23,7 @@ export function placed(x, y, v, a, slope) {
 export class FrictionMap {
   /** `pick(vTilde, yTilde)` when the user moves the point, `hover(vTilde, yTilde, ratio)` or `hover(null)`. */
   constructor(canvas, pick, hover) {
-    Object.assign(this, { grid: null, point: null });
+    Object.assign(this, { grid: null, point: null, formulas: false });
     this.plot = new Plot(canvas, (...place) => this.draw(...place));
     const at = (x, y) => [this.x.clamp(this.x.value(x)), this.y.clamp(this.y.value(y))];
     this.plot.follow({
@@ -37,7 +39,14 @@ export class FrictionMap {
   }
 
   show(data) {
-    Object.assign(this, { grid: new Grid(data), border: data.border, image: null, lines: null });
+    Object.assign(this, { grid: new Grid(data), border: data.border, borders: data.borders, image: null, lines: null });
+    this.plot.redraw();
+  }
+
+  /** Draws the paper's formulas for the border, or does not. */
+  compare(formulas) {
+    if (formulas === this.formulas) return;
+    this.formulas = formulas;
     this.plot.redraw();
   }
 
@@ -71,13 +80,15 @@ export class FrictionMap {
     context.clip();
     this.drawLines(context, px, py);
     this.drawLabels(context, px, py);
-    for (const [style, lineWidth, dash] of [["rgb(0 0 0 / 60%)", 4, []], ["#ffffff", 2, [9, 6]]]) {
+    const formulas = this.formulas ? Object.entries(FORMULAS).map(([name, [style, dash]]) => [this.borders[name], style, 2, dash]) : [];
+    for (const [line, style, lineWidth, dash] of [[this.border, "rgb(0 0 0 / 60%)", 4, []], ...formulas, [this.border, "#ffffff", 2, [9, 6]]]) {
       Object.assign(context, { strokeStyle: style, lineWidth });
       context.setLineDash(dash);
       context.beginPath();
-      this.border.forEach(([v, amplitude], i) => context[i ? "lineTo" : "moveTo"](x.pixel(v), y.pixel(amplitude)));
+      line.forEach(([v, amplitude], i) => context[i ? "lineTo" : "moveTo"](x.pixel(v), y.pixel(amplitude)));
       context.stroke();
     }
+    context.setLineDash([]);
     context.restore();
     context.font = "600 13px system-ui, sans-serif";
     this.tag(context, "stick–slip", x.from + 0.16 * (x.to - x.from), y.pixel(0.3));
