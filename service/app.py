@@ -13,6 +13,7 @@ import threading
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 
 import numpy as np
 from fastapi import FastAPI
@@ -23,6 +24,7 @@ from starlette.middleware import Middleware
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
 
 from mumacro.errors import MumacroError
 from mumacro.processors import processors
@@ -161,7 +163,7 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
         middleware=[
             *cors,
             Middleware(RequestRecord, metrics=metrics, log=access_log, tables=tables),
-            Middleware(Guard, keys=keys, open_paths=_OPEN_PATHS, max_bytes=settings.max_body_bytes),
+            Middleware(Guard, keys=keys, open_paths=_OPEN_PATHS | _guide_paths(settings.guide), max_bytes=settings.max_body_bytes),
             Middleware(SingleCase, tables=tables, settings=settings, metrics=metrics),
             Middleware(Compression),
         ],
@@ -175,8 +177,18 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
     app.add_exception_handler(RequestValidationError, _answer_invalid)
     for router in _ROUTERS:
         app.include_router(router)
+    if settings.guide is not None:
+        app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
     install(app, keys=bool(keys))
     return app
+
+
+def _guide_paths(folder: Path | None) -> set[str]:
+    """Paths of the documentation.  It holds nothing of a user, so it needs no API key."""
+    if folder is None:
+        return set()
+    below = ((path.relative_to(folder).as_posix(), path.is_dir()) for path in folder.rglob("*"))
+    return {"/guide/", *(f"/guide/{name}/" if is_folder else f"/guide/{name}" for name, is_folder in below)}
 
 
 async def _answer_invalid(request: Request, error: Exception) -> Response:
@@ -205,7 +217,7 @@ async def _answer_http(request: Request, error: Exception) -> Response:
 
 
 def _allowed_methods(path: str) -> str:
-    methods: set[str] = {"GET", "HEAD"} if path == "/openapi.json" else set()
+    methods: set[str] = {"GET", "HEAD"} if path == "/openapi.json" or path.startswith("/guide/") else set()
     for router in _ROUTERS:
         for route in router.routes:
             if isinstance(route, APIRoute) and route.path == path:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, SecretStr, ValidationError, field_validator
+from pydantic import BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 __all__ = ["PREFIX", "Settings", "SettingsError", "cache_fields", "load_settings", "unknown_variables"]
@@ -85,6 +85,7 @@ class Settings(BaseSettings):
     )
     root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
     trusted_proxies: str = Field("127.0.0.1", description="addresses or networks joined by commas, or *")
+    guide: DirectoryPath | None = Field(None, description="a directory with the built documentation")
     tracing: bool = Field(False, description="true or false")
     log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
         "info", description="one of debug, info, warning, error, critical"

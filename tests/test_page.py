@@ -105,6 +105,29 @@ def test_it_fits_the_screen(open_page, width, height):
         assert 0 <= mu[0] < law[0] < law[1] <= slider[0] < slider[1] <= height + 1
 
 
+def test_the_built_documentation_is_served_where_a_folder_is_named(tmp_path, tables_dir, client, problem):
+    from starlette.testclient import TestClient
+
+    from service.app import create_app
+    from service.settings import Settings
+
+    (tmp_path / "how-to").mkdir()
+    (tmp_path / "index.html").write_text("<h1>Guide</h1>")
+    (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
+    settings = Settings(tables=(tables_dir,), guide=tmp_path, api_key="open-sesame")
+    with TestClient(create_app(settings, wait=True)) as guided:  # it needs no key
+        assert guided.get("/guide/").text == guided.get("/guide/index.html").text == "<h1>Guide</h1>"
+        assert guided.get("/guide/how-to/").text == "<h1>How to</h1>"
+        assert guided.get("/static/page/names.json").json()["guide"] is True
+        key = {"X-API-Key": "open-sesame"}
+        for path in ("/guide/none.html", "/guide/..%2Fsecret"):
+            assert guided.get(path).status_code == 401
+            problem(guided.get(path, headers=key), 404)
+        assert problem(guided.post("/guide/", headers=key), 405)["detail"].endswith("allowed: GET, HEAD")
+    problem(client.get("/guide/"), 404)
+    assert client.get("/static/page/names.json").json()["guide"] is False
+
+
 AXE = "tests/data/axe-core/axe.min.js"
 
 

@@ -24,6 +24,7 @@ BAD = {
     "MUMACRO_KEEP_ALIVE_S": ("0", "3601"),
     "MUMACRO_API_KEYS": ("alice", "alice=", "two words=x", "a=same,b=same"),
     "MUMACRO_ROOT_PATH": ("friction", "/a/", "/a b"),
+    "MUMACRO_GUIDE": ("no/such/directory", __file__),
     "MUMACRO_TRACING": ("maybe",),
     "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
     "MUMACRO_TIME_LIMIT_S": ("0", "86401"),

@@ -64,8 +64,8 @@ for _name, _media_type in ASSETS.items():
 
 @router.head(_NAMES)
 @router.get(_NAMES)
-async def names() -> Response:
-    """Return what the page must not say in words of its own: inputs, units, bounds, approximations, borders."""
+async def names(request: Request) -> Response:
+    """Return what the page must not say in words of its own: inputs, units, bounds, approximations, borders, guide."""
     inputs = {
         name: {
             "unit": UNITS[name], "bound": BOUNDS[name], "positive": name in POSITIVE,
@@ -75,7 +75,7 @@ async def names() -> Response:
     }  # fmt: skip
     about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
     of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
-    content = dump({"inputs": inputs, "approximations": about, "borders": of_paper})
+    content = dump({"inputs": inputs, "approximations": about, "borders": of_paper, "guide": request.app.state.settings.guide is not None})
     return Response(content, headers={"Cache-Control": "no-cache"}, media_type="application/json")
 
 

@@ -21,7 +21,7 @@ export let borders = {};
 /** The paper's equation numbers of an entry of these: "(24), (39)". */
 export const equations = ({ equations: numbers }) => numbers.map((number) => `(${number})`).join(", ");
 
-/** Fetches units and bounds; nothing here works before that. */
+/** Fetches units and bounds; nothing here works before that.  Returns all that was found. */
 export async function loadNames() {
   const found = await get("static/page/names.json");
   for (const name of NAMES) {
@@ -32,6 +32,7 @@ export async function loadNames() {
   const { units } = INPUTS.omega;
   for (const [unit, [times, over]] of Object.entries(found.inputs.f.units)) units[unit] = unit in units ? null : [times * TURN, over];
   ({ approximations, borders } = found);
+  return found;
 }
 
 /** Whether it is a unit of the input. */

@@ -247,8 +247,9 @@ function build() {
 
 new Channel({
   ask: loadNames,
-  answer: () => {
+  answer: ({ guide }) => {
     status.set("names", null);
+    $("guide").hidden = !guide;
     build();
   },
   fail: (error) => status.set("names", `${error.message} Asking again by itself.`),
