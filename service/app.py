@@ -142,7 +142,7 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
     if settings is None:
         settings = load_settings()
     metrics, access_log, tables, work = Metrics(), AccessLog(), Tables(settings.tables), Work(settings)
-    keys = settings.keys()
+    keys, open_paths = settings.keys(), _OPEN_PATHS | _guide_paths(settings.guide)
     cors = [
         Middleware(
             CORSMiddleware, allow_origins=list(settings.cors_origins), allow_methods=["GET", "HEAD", "POST"],
@@ -163,7 +163,7 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
         middleware=[
             *cors,
             Middleware(RequestRecord, metrics=metrics, log=access_log, tables=tables),
-            Middleware(Guard, keys=keys, open_paths=_OPEN_PATHS | _guide_paths(settings.guide), max_bytes=settings.max_body_bytes),
+            Middleware(Guard, keys=keys, open_paths=open_paths, max_bytes=settings.max_body_bytes),
             Middleware(SingleCase, tables=tables, settings=settings, metrics=metrics),
             Middleware(Compression),
         ],

@@ -33,6 +33,23 @@ def test_links_within_the_project_lead_somewhere(page: Path) -> None:
             assert anchor in anchors(target), f"{page.name}: {link}"
 
 
+def test_the_rest_reference_names_the_fields_within_fields(monkeypatch) -> None:
+    from service.app import create_app
+    from service.settings import Settings
+
+    monkeypatch.syspath_prepend(ROOT / "docs" / "_ext")
+    from interface import _operations
+
+    text = "\n".join(_operations(create_app(Settings(tables=(ROOT / "tables",))).openapi()))
+    for name in ("power.saved", "results[].roots[].settling.periods", "curves[].border[].value", "errors[].reason"):
+        assert f"| `{name}`" in text
+    # an object is followed by its fields, unless the description leaves them open
+    rows = re.findall(r"^\| `(\S+?)`(?:, required)? \| (.*?) \|", text, re.MULTILINE)
+    objects = [place for place, (_, kind) in enumerate(rows) if re.search(r"\bobject\b(?! of)", kind)]
+    bare = {rows[place][0] for place in objects if not rows[place + 1][0].startswith(rows[place][0])}
+    assert bare == {"attributes", "blocks"}
+
+
 def project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 

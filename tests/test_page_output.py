@@ -238,7 +238,7 @@ def borders_told(page):
     return told
 
 
-def test_the_border_by_the_papers_equations(open_page, surrogate, case):
+def test_the_border_by_the_papers_equations(open_page):
     page = open_page("#approximations=1")
     speed = 1e3 * 3e-6 * 1.3e5  # l0 omega [mm/s]
     small = {"(23)": border_23, "(24), (39)": border_24, "(27)": border_27}

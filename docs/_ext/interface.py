@@ -64,6 +64,8 @@ class RestReference(SphinxDirective):
 
 def _operations(description: dict[str, Any]) -> Iterator[str]:
     schemas = description["components"]["schemas"]
+    yield "\n## Errors\n\nEvery error of these operations has this form, but for those of UM-Bridge.\n"
+    yield from _fields(schemas["Problem"], schemas, "problem")
     for path, methods in description["paths"].items():
         for method, operation in methods.items():
             yield f"\n## {method.upper()} {path}\n\n{operation['summary']}. {operation.get('description', '')}\n"
@@ -81,7 +83,7 @@ def _operations(description: dict[str, Any]) -> Iterator[str]:
 
 
 def _resolved(schema: dict[str, Any], schemas: dict[str, Any]) -> list[dict[str, Any]]:
-    """The objects that a schema may be, references followed."""
+    """What a schema may be, references followed."""
     if "$ref" in schema:
         return _resolved(schemas[schema["$ref"].rsplit("/", 1)[1]], schemas)
     options = [*schema.get("oneOf", []), *schema.get("anyOf", [])]
@@ -90,30 +92,48 @@ def _resolved(schema: dict[str, Any], schemas: dict[str, Any]) -> list[dict[str,
 
 def _fields(schema: dict[str, Any], schemas: dict[str, Any], what: str) -> Iterator[str]:
     for found in _resolved(schema, schemas):
-        required = found.get("required", [])
-        entries = [(name, entry, name in required) for name, entry in found.get("properties", {}).items()]
         title = f"{what} {found['title']}" if "title" in found else what
-        yield from _table(title, entries, schemas)
+        yield from _table(title, _entries(found), schemas)
+
+
+def _entries(found: dict[str, Any]) -> list[tuple[str, dict[str, Any], bool]]:
+    """Name, schema and whether it is required, of each field of an object."""
+    required = found.get("required", [])
+    return [(name, entry, name in required) for name, entry in found.get("properties", {}).items()]
 
 
 def _table(what: str, fields: list[tuple[str, dict[str, Any], bool]], schemas: dict[str, Any]) -> Iterator[str]:
     if fields:
         yield f"\n| {what} | | |\n| --- | --- | --- |"
     for name, schema, required in fields:
-        kinds = " or ".join(dict.fromkeys(_kind(found) for found in _resolved(schema, schemas)))
-        text = schema.get("description", "").replace("|", "\\|").replace("\n", " ")
-        yield f"| `{name}`{', required' if required else ''} | {kinds} | {text} |"
+        yield from _rows(name, schema, required, schemas)
 
 
-def _kind(schema: dict[str, Any]) -> str:
+def _rows(name: str, schema: dict[str, Any], required: bool, schemas: dict[str, Any]) -> Iterator[str]:
+    """One field, then the fields within it: ``power.saved``, ``results[].target``."""
+    options = _resolved(schema, schemas)
+    kinds = " or ".join(dict.fromkeys(_kind(found, schemas) for found in options))
+    text = schema.get("description", "").replace("|", "\\|").replace("\n", " ")
+    yield f"| `{name}`{', required' if required else ''} | {kinds} | {text} |"
+    for found in options:
+        inner = [(f"{name}.", found)]
+        if "items" in found:
+            inner = [(f"{name}[].", one) for one in _resolved(found["items"], schemas)]
+        for prefix, one in inner:
+            for part, entry, _ in _entries(one):
+                yield from _rows(prefix + part, entry, False, schemas)
+
+
+def _kind(schema: dict[str, Any], schemas: dict[str, Any]) -> str:
     """Type and bounds in words."""
-    words = {"exclusiveMinimum": "> {}", "minimum": ">= {}", "maximum": "<= {}", "maxItems": "at most {}"}
+    words = {"exclusiveMinimum": "> {:g}", "minimum": ">= {:g}", "maximum": "<= {:g}", "maxItems": "at most {}"}
     bounds = [text.format(schema[key]) for key, text in words.items() if key in schema]
     if "enum" in schema or "const" in schema:
         return ", ".join(f"`{value}`" for value in schema.get("enum", [schema.get("const")]))
     kind = str(schema.get("type", "any"))
-    if kind == "array" and schema.get("items", {}).get("type"):
-        kind = f"array of {schema['items']['type']}"
+    inner = schema.get("items") or schema.get("additionalProperties")
+    if kind in ("array", "object") and isinstance(inner, dict):
+        kind = f"{kind} of {' or '.join(_kind(found, schemas) for found in _resolved(inner, schemas))}"
     return " ".join([kind, *bounds])
 
 

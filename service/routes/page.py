@@ -75,14 +75,15 @@ async def names(request: Request) -> Response:
     }  # fmt: skip
     about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
     of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
-    content = dump({"inputs": inputs, "approximations": about, "borders": of_paper, "guide": request.app.state.settings.guide is not None})
+    guide = request.app.state.settings.guide is not None
+    content = dump({"inputs": inputs, "approximations": about, "borders": of_paper, "guide": guide})
     return Response(content, headers={"Cache-Control": "no-cache"}, media_type="application/json")
 
 
 @router.head("/static/page/map.json")
 @router.get("/static/page/map.json")
 async def map_data(request: Request) -> Response:
-    """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and the border, exact and by equation."""
+    """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and borders by name."""
     surrogate = tables_of(request).pick().surrogate
     etag = f'"{surrogate.checksum[:32]}-{__version__}"'
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
