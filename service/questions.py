@@ -23,6 +23,7 @@ from .schemas import (
     canonical,
     examples,
     relation,
+    split_names,
     std_fault,
 )
 
@@ -218,17 +219,13 @@ class LawQuery(BaseModel):
     tolerance: QueryPositive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
     include: Annotated[
         list[Literal["approximations"]],
-        Field(max_length=4),
-        BeforeValidator(
-            lambda v: [p.strip() for n in v for p in n.split(",") if p.strip()] if isinstance(v, list) else v
-        ),
+        Field(min_length=1, max_length=4),
+        BeforeValidator(split_names),
     ] = Field([], description="approximations: those of the paper beside the exact values")
 
     def form(self) -> LawRequest:
         """The same as a body would have it."""
         given = {name: getattr(self, name) for name in self.model_fields_set}
-        if not given.get("include"):
-            given.pop("include", None)
         return LawRequest.model_validate(given)
 
 

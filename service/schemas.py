@@ -25,7 +25,7 @@ __all__ = [
     "INCLUDES", "Answered", "BatchColumns", "BatchFault", "BatchQuery", "Case", "CaseAnswer", "CaseQuery",
     "CaseRequest", "ColumnsAnswer", "Health", "InputStd", "NotNegative", "Options", "Positive", "Problem",
     "RequestFields", "Result", "RowsAnswer", "Stiffness", "TableAnswer", "TableChoice", "TableLabel", "canonical",
-    "examples", "relation", "std_fault",
+    "examples", "relation", "split_names", "std_fault",
 ]  # fmt: skip
 
 INCLUDES = tuple(QUANTITIES)
@@ -224,14 +224,14 @@ QueryNotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), _Number]
 QueryFrequency = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False), _Number]
 
 
-def _split(names: Any) -> Any:
-    """``include=a,b`` and ``include=a&include=b`` are the same."""
+def split_names(names: Any) -> Any:
+    """``include=a,b`` and ``include=a&include=b`` are the same; an empty name is a name, and unknown."""
     if isinstance(names, list) and all(isinstance(part, str) for part in names):
-        return [part.strip() for name in names for part in name.split(",") if part.strip()]
+        return [part.strip() for name in names for part in name.split(",")]
     return names
 
 
-QueryInclude = Annotated[list[Include], Field(max_length=MAX_INCLUDE), BeforeValidator(_split)]
+QueryInclude = Annotated[list[Include], Field(min_length=1, max_length=MAX_INCLUDE), BeforeValidator(split_names)]
 
 
 class BatchQuery(BaseModel):
