@@ -6,7 +6,7 @@ API_VERSION = "1"
 
 
 def __getattr__(name: str) -> str:
-    # Read when asked for: a health check starts this package every few seconds and must not pay for numba.
+    # Imported on first use: a health check imports this package every few seconds and must not load numba.
     if name == "__version__":
         from mumacro.version import __version__
 

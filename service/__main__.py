@@ -16,7 +16,7 @@ from types import FrameType
 try:
     from .settings import PREFIX, Settings, SettingsError, load_settings
 except ModuleNotFoundError as error:
-    # Said without mumacro.extras, which needs numba: here nothing at all may be installed.
+    # Without mumacro.extras, which needs numba: perhaps no package is installed here.
     raise SystemExit(
         f"python -m service: {error.name} is not installed: pip install 'mumacro[service]' "
         "(in a checkout: pip install -e '.[service]')"
@@ -81,7 +81,7 @@ def _serve(settings: Settings) -> int:
     # Set before the slow imports: as a container's first process this one would ignore the signal until then.
     signal.signal(signal.SIGTERM, _stop)
 
-    # Imported here: a health check must not pay for the server and the kernels.
+    # Imported here: a health check must not load the server and the kernels.
     try:
         import uvicorn
     except ModuleNotFoundError as error:

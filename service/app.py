@@ -51,21 +51,21 @@ _ROUTERS = (
     mu_macro.router, batch.router, solve_for.router, law.router, table.router, health.router, metrics_route.router,
     docs.router, umbridge.router, page.router,
 )  # fmt: skip
-# The pages are the same for everyone and tell nothing; they ask their user for the key and send it with every question.
+# The pages are the same for everyone and hold no number. They ask for the key and send it with every request.
 _OPEN_PATHS = HEALTH_PATHS | page.OPEN_PATHS | docs.OPEN_PATHS
 _NICENESS = 5  # of threads for batches: a third of the weight
 _log = logging.getLogger("mumacro.app")
 
 
 def _stand_back() -> None:
-    """Let who answers short requests go first where both want one processor.  On Linux threads have priorities."""
+    """Lower the priority of this thread, so that short requests are answered first.  Only Linux has it for threads."""
     if sys.platform == "linux":
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
 
 def load(tables: Tables) -> None:
-    """Load the tables, then what is compiled and not needed by the first answers."""
+    """Load the tables, then the compiled code that the first answers do not need."""
     tables.load()
     _load_more(tables)
 
@@ -78,7 +78,7 @@ def _load_more(tables: Tables) -> None:
 
 
 async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
-    """Become ready, then warm; ``/livez`` is answered meanwhile."""
+    """Load the tables, become ready, then load the rest; ``/livez`` is answered meanwhile."""
     loop = asyncio.get_running_loop()
     tables: Tables = app.state.tables
     await loop.run_in_executor(threads, tables.load)
@@ -89,8 +89,8 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
     except Exception:
         _log.exception("not everything could be loaded")
     if threading.current_thread() is threading.main_thread():
-        # The collector would walk through a hundred thousand objects of libraries again and again, for some fifty
-        # milliseconds, and nobody is answered meanwhile.
+        # Each full garbage collection looks at a hundred thousand objects of the libraries.  It takes about fifty
+        # milliseconds, in which no request is answered.  Frozen objects are left out.
         gc.collect()
         gc.freeze()
 
@@ -98,7 +98,7 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     for name in unknown_variables():
-        _log.warning("%s is no setting and has no effect", name)
+        _log.warning("%s is not a setting and has no effect", name)
     end_with_parent()
     state = app.state
     Connection.timeout_s = state.settings.client_timeout_s
@@ -106,7 +106,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     threads = ThreadPoolExecutor(count, thread_name_prefix="batch", initializer=_stand_back)
     state.work.threads = threads
     state.access_log.start()
-    # A thread of its own, which neither waits behind batches nor stands back.
+    # A separate thread: it does not wait behind batches and keeps its priority.
     start = ThreadPoolExecutor(1, thread_name_prefix="start")
     starting = asyncio.create_task(_start(app, start))
     sharing = asyncio.create_task(state.metrics.share())
@@ -131,8 +131,8 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
     settings : Settings, optional
         Left out: read from the environment.
     wait : bool
-        End the start only when everything is loaded.  By default the tables are loaded while the application listens,
-        and ``/readyz`` says when they are.
+        Finish the start only when everything is loaded.  By default the application listens at once, and ``/readyz``
+        answers 200 when the tables are loaded.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
 
 
 def _guide_paths(folder: Path | None) -> set[str]:
-    """Paths of the documentation.  It holds nothing of a user, so it needs no API key."""
+    """Paths of the documentation.  They need no API key."""
     if folder is None:
         return set()
     below = ((path.relative_to(folder).as_posix(), path.is_dir()) for path in folder.rglob("*"))
@@ -200,7 +200,7 @@ async def _answer_invalid(request: Request, error: Exception) -> Response:
 async def _answer_http(request: Request, error: Exception) -> Response:
     """Answer 404 and 405.  The framework's Allow names the methods of the first route of a path only."""
     path = path_of(request.scope)
-    if isinstance(error.__cause__, MumacroError):  # the framework met it while it read the body
+    if isinstance(error.__cause__, MumacroError):  # raised while the framework read the body
         return await answer_problem(request, error.__cause__)
     if isinstance(error, HTTPException) and error.status_code == 405:
         allowed = _allowed_methods(path)

@@ -1,4 +1,4 @@
-"""Cases -> answers, one or many.  Nothing is computed that is not asked for."""
+"""Cases -> answers, one or many.  Only what is asked for is computed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

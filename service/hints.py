@@ -1,4 +1,4 @@
-"""What a caller may have meant: advice that goes into the reason of a refusal."""
+"""Advice in the reason of a refusal: which field or number was probably meant."""
 
 import re
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ _WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A
 
 
 def unknown_name(name: str, known: Iterable[str]) -> str:
-    """The reason for refusing a name, with the one that may have been meant."""
+    """The reason for refusing a name, with the known name that is closest to it."""
     names = list(known)
     meant = suggestion(name[:80], loosely=False)
     if meant not in names:

@@ -24,7 +24,7 @@ __all__ = [
 
 request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 
-# Letters, digits and a few marks only: an id goes into a header and into logs, and is nobody's free text.
+# Letters, digits and a few marks only: an id goes into a header and into logs.
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,128}", re.ASCII)
 
 _FLUSH_AFTER_S = 0.05
@@ -100,7 +100,7 @@ def _access_lines(entries: list[Entry]) -> str:
 
 
 class LineHandler(logging.StreamHandler[Any]):
-    """Writes records as they come, and finished requests many at a time: a write for each would cost more than it."""
+    """Writes records at once, and the lines of finished requests together, which saves time."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -142,7 +142,7 @@ class AccessLog:
         self._texts = _Texts()
 
     def start(self) -> None:
-        """Look where the lines go."""
+        """Find the handler that the lines go to."""
         found = [handler for handler in logging.getLogger().handlers if isinstance(handler, LineHandler)]
         straight = found and self._log.propagate and not self._log.handlers and self._log.isEnabledFor(logging.INFO)
         self._put = found[0].put if straight else None
@@ -151,7 +151,7 @@ class AccessLog:
         self, identity: str, method: str, path: str, status: int, seconds: float, client: str | None, key: str | None,
         *, quiet: bool = False,
     ) -> None:  # fmt: skip
-        """Write the line of one finished request; ``quiet`` for probes, which say nothing while they succeed."""
+        """Write the line of one finished request; ``quiet`` requests (successful probes) are logged at ``debug``."""
         if self._put is not None and not quiet and status == 200 and path in _KNOWN and method in _METHODS:
             self._put((time.time(), identity, self._texts[method, path, status], seconds, client, key))
             return

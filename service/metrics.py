@@ -1,8 +1,8 @@
 """Counters of one worker, and their sum over all workers for ``/metrics``.
 
-Counting is adding to a list of numbers, cheap enough for every request.  Several workers leave copies of their lists in
-a folder that the parent process made; whoever is asked adds them up.  A worker that ended keeps its share, so that no
-counter ever falls.
+Counting adds to a list of numbers, which is cheap enough for every request.  Several workers write copies of their
+lists to a folder that the parent process made.  The worker that answers ``/metrics`` adds them up.  The copy of a
+worker that has ended stays, so that no counter falls.
 """
 
 import asyncio
@@ -69,7 +69,7 @@ class Metrics:
         self._tables: list[dict[str, Any]] = []
 
     def start(self, tables: list[dict[str, Any]]) -> None:
-        """Make room for the cases of each table; find the shared folder.  The same tables in every worker."""
+        """Add counters for each table; find the shared folder.  Every worker has the same tables."""
         self._tables = tables
         self.cells.extend([0.0] * (_CASES + len(tables) * _PER_TABLE - len(self.cells)))
         folder = os.environ.get(FOLDER_VARIABLE)
@@ -95,13 +95,13 @@ class Metrics:
         self.cells[first + _PER_TABLE - 1] += bad
 
     async def share(self) -> None:
-        """Leave copies in the shared folder if there is one, for ever."""
+        """Write a copy to the shared folder, if there is one, again and again."""
         while True:
             self.save()
             await asyncio.sleep(_SHARE_EVERY_S)
 
     def save(self) -> None:
-        """Leave a copy in the shared folder.  Replacing the file is atomic: nobody reads half a copy."""
+        """Write a copy to the shared folder.  The file is replaced in one step, so no reader sees half a copy."""
         if self._file is None or self.cells == self._saved:
             return
         self._saved = self.cells.copy()
@@ -113,7 +113,7 @@ class Metrics:
             self._saved = []  # the folder is gone or full; the next time may do better
 
     def total(self) -> list[float]:
-        """Sum over all workers; of the others, what they last left, at most a quarter of a second ago."""
+        """Sum over all workers; the copies of the others are at most a quarter of a second old."""
         cells = self.cells.copy()
         if self._file is None:
             return cells

@@ -1,7 +1,7 @@
 """Plain numeric columns, compiled: JSON text straight into arrays, without the interpreter's lock.
 
 Accepts only the ordinary: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one number,
-``null`` for ``k``.  Everything else it leaves to :mod:`service.formats.columns`.  Why it is here and no library is:
+``null`` for ``k``.  Everything else is read by :mod:`service.formats.columns`.  Why no library is used here:
 docs/decisions/0011-wire.md.
 
 Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at a gigabyte per second", Software:
@@ -261,7 +261,7 @@ def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: in
                     return 0, 0, 0
                 bits, end = _U(0x7FF0_0000_0000_0000), i + 4
             elif bits >= _SIGN or (bits == _0 and row < 3):
-                return 0, 0, 0  # a bad number that would hold for every case is for others to refuse
+                return 0, 0, 0  # a bad number that would hold for every case: refused by service.formats.columns
             if first == words.shape[1]:
                 return NO_ROOM, 0, 0
             words[row, first] = bits

@@ -1,4 +1,4 @@
-"""What the description of the interface says beside what follows from the routes' types."""
+"""The parts of the OpenAPI description that do not follow from the types of the routes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,19 +21,19 @@ _DESCRIPTION = (
 )
 _WHY = {
     400: "The body is empty or cannot be read, or a header is given twice",
-    408: "The body did not come in time",
-    401: "An API key is in force, and none or a wrong one was sent",
+    408: "The body was not complete in time",
+    401: "The service needs an API key, and none or a wrong one was sent",
     413: "The body or the batch is too large",
     415: "The body has another media type",
     422: "Invalid, missing or unknown fields",
     503: "Not ready or overloaded; see Retry-After",
 }
-_ID = {"description": "That of the request, as in the log", "schema": {"type": "string"}}
+_ID = {"description": "The request's id, as in the log", "schema": {"type": "string"}}
 _RETRY = {"description": "Seconds after which to ask again", "schema": {"type": "integer"}}
 #: headers of an answer that may be kept
 ANSWER_HEADERS = {
-    "ETag": {"description": "Of this answer, for If-None-Match", "schema": {"type": "string"}},
-    "Cache-Control": {"description": "How long, and by whom, it may be kept", "schema": {"type": "string"}},
+    "ETag": {"description": "The tag of this answer, for If-None-Match", "schema": {"type": "string"}},
+    "Cache-Control": {"description": "How long, and by whom, the answer may be cached", "schema": {"type": "string"}},
 }
 # Models that no route names by its type.
 _REQUESTS: tuple[Any, ...] = (models.Case, models.BatchColumns)
@@ -70,7 +70,7 @@ def batch_operation(forms: Sequence[Format]) -> dict[str, Any]:
 
 
 def umbridge_body(example: dict[str, Any]) -> dict[str, Any]:
-    """Describe the body of a UM-Bridge call; what it holds beside the model's name is the protocol's business."""
+    """Describe the body of a UM-Bridge call: the model's name.  The protocol defines the rest."""
     schema = {
         "type": "object",
         "required": ["name"],

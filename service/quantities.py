@@ -201,8 +201,8 @@ def _regime_certain(cases: Cases) -> Sequence[Array]:
 register(
     Quantity(
         "regime_certain",
-        "Whether the regime is beyond doubt",
-        (Part("regime_certain", "-", "false: closer to the border than this table knows it", bool),),
+        "Whether the regime is certain",
+        (Part("regime_certain", "-", "false: within the error of this table's border", bool),),
         _regime_certain,
         cost=3,
     )
@@ -303,7 +303,7 @@ register(
             Part("std_sampled", "-", f"Over {SAMPLES} evenly spread samples of normal inputs, those in bounds"),
             Part(
                 "std_first_order_enough", "-",
-                f"false: std and std_sampled differ by more than {ENOUGH:.0%}, so believe the samples", bool,
+                f"false: std and std_sampled differ by more than {ENOUGH:.0%}, use the sampled value", bool,
             ),
         ),
         _std,
@@ -360,8 +360,8 @@ register(
         "power",
         "Mean powers; null: not finite in double precision",
         (
-            Part("power.oscillation", "W", "What the shaker puts in: mu0 Fz l0 omega <y~ cos tau u_y>; null for rigid"),
-            Part("power.saved", "W", "What the drive is spared: (mu0 - mu_macro) Fz v0"),
+            Part("power.oscillation", "W", "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid"),
+            Part("power.saved", "W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
             Part("power_bound.oscillation", "W", "Bound of the absolute error; null also where not in this table"),
             Part("power_bound.saved", "W", "Bound of the absolute error of saved"),
         ),

@@ -1,4 +1,4 @@
-"""Requests and answers: the one truth about what is legal, and what OpenAPI says of it."""
+"""Requests and answers: what is legal, in one place, and what OpenAPI says of it."""
 
 import math
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ IncludeList = Annotated[list[Include], Field(max_length=MAX_INCLUDE)]
 _TEXTS = {
     "mu0": "Coulomb friction coefficient of the contact [-], finite and > 0",
     "Fz": "Normal force [N], finite and > 0",
-    "k": "Tangential contact stiffness [N/m], finite and > 0; rigid contact has to be said",
+    "k": "Tangential contact stiffness [N/m], finite and > 0; rigid contact must be stated",
     "y0": "Amplitude of the transverse oscillation [m], finite and >= 0",
     "omega": "Angular frequency of the oscillation [rad/s], finite and >= 0; or f in its place",
     "f": "Frequency of the oscillation [Hz], finite and >= 0; in place of omega",
@@ -50,22 +50,22 @@ _TEXTS = {
 }
 _INCLUDE = "More to compute: " + "; ".join(f"{name} ({entry.text})" for name, entry in QUANTITIES.items())
 _TOLERANCE = "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
-_STD = "Standard deviations of the inputs; needed where include asks for std, and nowhere else"
+_STD = "Standard deviations of the inputs; required if include asks for std, refused otherwise"
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
 def examples(*found: Mapping[str, JsonValue]) -> ConfigDict:
-    """Strict checks (``"0.3"`` and true are no numbers), no unknown fields, and examples."""
+    """Strict checks (``"0.3"`` and true are not numbers), no unknown fields, and examples."""
     return ConfigDict(strict=True, extra="forbid", json_schema_extra={"examples": [dict(case) for case in found]})
 
 
 def relation(field: str, reason: str) -> PydanticCustomError:
-    """What is wrong between fields, and which one is to be mended."""
+    """A fault in the relation of several fields, and which of them is to be changed."""
     return PydanticCustomError("relation", "{field}: {reason}", {"field": field, "reason": reason})
 
 
 class CaseFields(BaseModel):
-    """One case, in SI units, without what has to hold between its fields."""
+    """One case, in SI units, without the relations between its fields."""
 
     model_config = examples(_EXAMPLE)
 
@@ -78,7 +78,7 @@ class CaseFields(BaseModel):
     v0: NotNegative = Field(description=_TEXTS["v0"])
 
     def fault(self) -> PydanticCustomError | None:
-        """What does not hold between the fields."""
+        """The relation between fields that does not hold, or None."""
         if (self.omega is None) == (self.f is None):
             return frequency_fault(self.f is not None)
         return None
@@ -92,7 +92,7 @@ class CaseFields(BaseModel):
 
 
 def _related(value: Any, handler: ModelWrapValidatorHandler[Any], title: str) -> Any:
-    """Check a case, and what has to hold between its fields; a missing frequency is told beside other faults."""
+    """Check a case and the relations between its fields; a missing frequency is reported with the other faults."""
     try:
         made = handler(value)
     except ValidationError as error:
@@ -122,7 +122,7 @@ class Case(CaseFields):
 
 
 def frequency_fault(both: bool) -> PydanticCustomError:
-    """omega and f, or neither."""
+    """The fault of a case with both omega and f, or with neither."""
     if both:
         return relation("f", ONE_FREQUENCY)
     return relation("omega", STATE_OMEGA)
@@ -135,7 +135,7 @@ class InputStd(BaseModel):
 
     mu0: NotNegative = Field(0.0, description="[-]")
     Fz: NotNegative = Field(0.0, description="[N]")
-    k: NotNegative = Field(0.0, description="[N/m]; means nothing where contact is rigid")
+    k: NotNegative = Field(0.0, description="[N/m]; no effect on rigid contact")
     y0: NotNegative = Field(0.0, description="[m]")
     omega: NotNegative = Field(0.0, description="[rad/s]; or f in its place")
     f: Frequency = Field(0.0, description="[Hz]; in place of omega")
@@ -155,7 +155,7 @@ class InputStd(BaseModel):
 
 
 class Options(BaseModel):
-    """What a request asks for beside its cases."""
+    """The options of a request: everything but its cases."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
@@ -175,8 +175,8 @@ class Options(BaseModel):
 
 
 def std_fault(missing: bool) -> PydanticCustomError:
-    """Standard deviations are given exactly where they are asked for."""
-    reason = "is required where include asks for std" if missing else "is of no use unless include asks for std"
+    """The fault of standard deviations that are missing, or given without ``std`` in ``include``."""
+    reason = "is required where include asks for std" if missing else "has no effect unless include asks for std"
     return relation("std", reason)
 
 
@@ -187,14 +187,14 @@ def canonical(include: Any) -> tuple[str, ...]:
 
 
 class RequestFields(CaseFields):
-    """One case, and what is wanted beside the default answer; without what has to hold between the fields."""
+    """One case and the options of its answer, without the relations between the fields."""
 
     include: IncludeList | None = Field(None, description=_INCLUDE)
     tolerance: Positive | None = Field(None, description=_TOLERANCE)
     std: InputStd | None = Field(None, description=_STD)
 
     def fault(self) -> PydanticCustomError | None:
-        """What does not hold between the fields."""
+        """The relation between fields that does not hold, or None."""
         found = super().fault()
         if found is not None:
             return found
@@ -208,7 +208,7 @@ class RequestFields(CaseFields):
 
 
 class CaseRequest(RequestFields):
-    """One case, and what is wanted beside the default answer; ``omega`` or ``f``, exactly one of them."""
+    """One case and the options of its answer; ``omega`` or ``f``, exactly one of them."""
 
     @model_validator(mode="wrap")
     @classmethod
@@ -225,7 +225,7 @@ QueryFrequency = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False), 
 
 
 def split_names(names: Any) -> Any:
-    """``include=a,b`` and ``include=a&include=b`` are the same; an empty name is a name, and unknown."""
+    """``include=a,b`` and ``include=a&include=b`` are the same; an empty name is refused as unknown."""
     if isinstance(names, list) and all(isinstance(part, str) for part in names):
         return [part.strip() for name in names for part in name.split(",")]
     return names
@@ -269,13 +269,13 @@ class CaseQuery(BatchQuery):
     v0: QueryNotNegative = Field(description=_TEXTS["v0"], examples=[0.01])
 
     def case(self) -> CaseRequest:
-        """The same as a body would have it."""
+        """The same case as a JSON body would give it."""
         named = {name: getattr(self, name) for name in Case.model_fields}
         return CaseRequest.model_validate({**named, **self.given()})
 
 
 class TableChoice(BaseModel):
-    """Which table is meant: by one of the two, or the tightest."""
+    """Choice of a table: by id or by tolerance; with neither, the tightest."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
@@ -322,7 +322,7 @@ class TableLabel(BaseModel):
 
 
 class Answered(BaseModel):
-    """What every answer carries."""
+    """The fields of every answer."""
 
     table: TableLabel
     api_version: str
@@ -391,7 +391,7 @@ def _included(listed: bool) -> dict[str, Any]:
 
 
 _made: Any = create_model
-Result: type[BaseModel] = _made("Result", __base__=_Default, __doc__="What is known of one case.", **_included(False))
+Result: type[BaseModel] = _made("Result", __base__=_Default, __doc__="Answer to one case.", **_included(False))
 CaseAnswer: type[BaseModel] = _made("CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.")
 ColumnsAnswer: type[BaseModel] = _made(
     "ColumnsAnswer", __base__=_DefaultColumns, __doc__="Answer to a batch in columns, order kept; null: a bad case.",
@@ -404,7 +404,7 @@ RowsAnswer: type[BaseModel] = _made(
 
 
 class TableAnswer(Answered):
-    """What is known of a table."""
+    """Properties of a table."""
 
     id: str
     tolerance: float
@@ -434,7 +434,7 @@ class FieldProblem(BaseModel):
     pointer: str | None = Field(None, description="JSON pointer into the body")
     parameter: str | None = Field(None, description="Query parameter")
     field: str
-    value: Any = Field(None, description="As given; what JSON cannot hold is a text, such as NaN")
+    value: Any = Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")
     reason: str
     bound: str | None = None
 

@@ -57,7 +57,7 @@ def _default_tables() -> tuple[Path, ...]:
 
 
 class Settings(BaseSettings):
-    """What an operator can choose.  Each description says what a value must be."""
+    """All settings.  Each description says what a value must be."""
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
@@ -101,7 +101,7 @@ class Settings(BaseSettings):
     @field_validator("api_key")
     @classmethod
     def _usable_key(cls, key: SecretStr | None) -> SecretStr | None:
-        # An empty variable must not pass for "no key": whoever set it meant the service to be closed.
+        # An empty variable must not count as "no key": a variable that is set shows that a key was intended.
         if key is not None:
             text = key.get_secret_value()
             if not (1 <= len(text) <= 512 and all("!" <= character <= "~" for character in text)):
@@ -128,7 +128,7 @@ class Settings(BaseSettings):
 
 
 def cache_fields(settings: Settings) -> dict[str, str]:
-    """How long an answer may be kept, and by whom.  With an API key in force it is for its caller alone."""
+    """How long, and by whom, an answer may be cached: with an API key, only by the client that asked."""
     if not settings.keys():
         return {"cache-control": f"public, max-age={_MAX_AGE_S}", "vary": "accept"}
     return {"cache-control": f"private, max-age={_MAX_AGE_S}", "vary": "accept, x-api-key, authorization"}
@@ -156,6 +156,6 @@ def load_settings(**chosen: Any) -> Settings:
 
 
 def unknown_variables() -> list[str]:
-    """Variables that look like ours and are not: most often a spelling mistake, so worth a warning."""
+    """Variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so the log warns of them."""
     known = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
     return sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)

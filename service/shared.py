@@ -1,4 +1,4 @@
-"""The folder that several workers share.  Whoever makes it only watches over them, and is spared what they import."""
+"""The folder that several workers share.  The process that makes it only starts and stops them, and imports little."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ def shared_folder() -> Iterator[None]:
             break
         except OSError:
             continue
-    else:  # nowhere to write: every worker tells its own numbers
+    else:  # no writable place: every worker gives its own numbers
         yield
         return
     os.environ[FOLDER_VARIABLE] = folder

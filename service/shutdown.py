@@ -1,4 +1,4 @@
-"""Stopping in order: first the service says that it is not ready, a while later it stops listening, then it ends."""
+"""Order of a stop: ``/readyz`` answers 503, after ``drain_s`` the service stops listening, then it ends."""
 
 import asyncio
 import multiprocessing
@@ -18,7 +18,7 @@ _MARGIN_S = 2.0  # for the server's own end, after drain and grace
 
 
 def end_with_parent() -> None:
-    """Stop this worker when the process that started it is gone: nobody else would, and it would hold the port."""
+    """Stop this worker when its parent process is gone; else it would keep the port."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -32,10 +32,10 @@ def end_with_parent() -> None:
 
 @contextmanager
 def draining(tables: Tables, settings: Settings) -> Iterator[None]:
-    """Between SIGTERM and what the server does about it, answer as before for ``drain_s``, but not ``/readyz``.
+    """After SIGTERM, answer as before for ``drain_s``, but ``/readyz`` with 503; then the server stops.
 
-    Answers of that time end their connections.  A second SIGTERM, or any other signal, is the server's at once.  The
-    process ends when drain and grace are over, whatever a thread is doing.
+    Each answer in that time ends its connection.  A second SIGTERM, or any other signal, stops the server at once.  The
+    process ends when drain and grace are over, even if a thread still runs.
     """
     usual = signal.getsignal(signal.SIGTERM)
     if not callable(usual) or threading.current_thread() is not threading.main_thread():

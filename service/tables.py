@@ -1,4 +1,4 @@
-"""The loaded tables: opened, checksummed and asked a known answer, once, before the service says that it is ready."""
+"""The loaded tables.  Each is opened and its checksum and a known answer are checked before the service is ready."""
 
 import logging
 import os
@@ -54,7 +54,7 @@ def _stamp(path: Path) -> tuple[int, int, int]:
 
 @dataclass(frozen=True)
 class LoadedTable:
-    """A table in memory, and what its file looked like when it was read."""
+    """A table in memory, and the state of its file when it was read."""
 
     surrogate: Surrogate
     kernel: Kernel
@@ -82,7 +82,7 @@ class LoadedTable:
 
     @cached_property
     def label(self) -> dict[str, object]:
-        """What every reply says about the table that it came from."""
+        """The table's label in every answer."""
         return {"id": self.surrogate.id, "tolerance": self.surrogate.tolerance}
 
     @cached_property
@@ -92,7 +92,7 @@ class LoadedTable:
 
     @cached_property
     def tag_key(self) -> bytes:
-        """What entity tags depend on beside the question: this table, this version."""
+        """The part of entity tags that depends on the table and the version."""
         text = repr((self.kernel.checksum, self.surrogate.id, __version__, API_VERSION))
         return blake2b(text.encode(), digest_size=32).digest()
 
@@ -102,12 +102,12 @@ class LoadedTable:
         return self.stamp[0]
 
     def check(self) -> None:
-        """Ask the known answer again, and look whether the file is still the one that was read.
+        """Check the known answer again, and whether the file is unchanged.
 
         Raises
         ------
         TableError
-            Otherwise.  A file that was replaced would no longer be the source of the answers.
+            The answer is wrong, or the file was changed after it was loaded.
         """
         self.surrogate.self_check()
         path = self.surrogate.path
@@ -131,7 +131,7 @@ class Tables:
         self.warm = False  # whether everything compiled is loaded, not only what the first answers need
 
     def load(self) -> None:
-        """Load everything.  A table that is refused makes the service not ready; it never stops the process."""
+        """Load all tables.  A refused table makes the service not ready; it never stops the process."""
         try:
             tables = [LoadedTable.open(path) for path in table_files(self.paths)]
             names = [table.surrogate.id for table in tables]
@@ -151,7 +151,7 @@ class Tables:
             _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in self.loaded]}})
 
     def check(self) -> None:
-        """Raise NotReadyError unless every table would answer rightly now, and go on doing so."""
+        """Raise NotReadyError if a table does not give its known answer, or if the service is stopping."""
         if self.draining:
             raise NotReadyError("the service is stopping")
         self._ready()
@@ -201,14 +201,14 @@ class Tables:
         return self.loaded
 
     def warm_up_more(self) -> None:
-        """Load or compile what the first answers do not need; those that do are slower until then."""
+        """Load or compile the code that the first answers do not need."""
         for table in self.loaded[:1]:
             table.kernel.warm_up_more()
         self.warm = True
 
 
 def signature(table: LoadedTable) -> dict[str, object]:
-    """What every reply carries: the table and the version of the interface."""
+    """Fields of every answer: the table and the version of the interface."""
     return {"table": table.label, "api_version": API_VERSION}
 
 

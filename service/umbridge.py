@@ -1,9 +1,9 @@
-"""UM-Bridge 1.0: its two models, how its requests are read, its answers and its errors.  No HTTP but the status codes.
+"""UM-Bridge 1.0: two models, reading of requests, answers and errors.  Of HTTP it knows only the status codes.
 
-The protocol's obligations that are easy to miss, each met here:
+Rules of the protocol that are easily missed:
 
 - An error is ``{"error": {"type", "message"}}`` with 400 or 500 and nothing else; a reply has no keys beyond its own.
-- The model's name is judged before anything else of the request.
+- The model's name is checked first.
 - ``config`` may be missing, null, or an empty list (that is how R writes an empty one).  These models have no options.
 - Clients that unbox vectors of one element send a scalar ``sens``.  A scalar ``vec`` stands for every component.
 - An answer is never NaN or infinite: JSON has no such numbers, and clients would read them as friction.
@@ -66,7 +66,7 @@ def model_of(body: Any) -> str:
     Raises
     ------
     UmBridgeError
-        InvalidInput where the body is no object; ModelNotFound where it names no model of ours.
+        InvalidInput: the body is not an object.  ModelNotFound: no such model.
     """
     if not isinstance(body, dict):
         raise _invalid("the body must be a JSON object")
@@ -113,7 +113,7 @@ def _case(model: str, body: Mapping[str, Any]) -> list[float]:
     values = _numbers(vectors[0], "input[0]", _N)
     if model == "mu_macro":
         return values
-    # 10.0**x overflows as an exception from 308.26 on; too small an exponent gives 0, which the model judges.
+    # 10.0**x overflows as an exception from 308.26 on; too small an exponent gives 0, which the model refuses.
     if any(value > 308.25 for value in values):
         raise _invalid("input[0] holds a logarithm beyond 308.25, the end of double precision")
     return [10.0**value for value in values]
@@ -146,7 +146,7 @@ def _slopes(surrogate: Surrogate, model: str, values: list[float]) -> list[float
 
 
 def model_info(_surrogate: Surrogate, _model: str, _body: Mapping[str, Any]) -> Reply:
-    """What can be asked of a model."""
+    """The features of a model."""
     return {"support": dict(_SUPPORT)}
 
 

@@ -24,7 +24,7 @@ from service.settings import Settings  # noqa: E402
 EXAMPLES = 25
 ARROW, NDJSON = "application/vnd.apache.arrow.stream", "application/x-ndjson"
 RELATIONS = (
-    r"is of no use unless include asks for std",
+    r"has no effect unless include asks for std",
     r"is required where include asks for std",
     r"must be left out: it is what is asked for",
     r"no loaded table is that tight; the tightest has 1e-12",

@@ -80,7 +80,7 @@ def too_large(max_batch: int) -> BatchTooLargeError:
 
 
 def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:
-    """Refuse what holds more values than a batch may have, before anything is made of it.
+    """Refuse a body that holds more values than a batch may have, before it is decoded.
 
     Every value of JSON but the first of its list or object has a comma before it, and every list or object a bracket:
     counting those takes a millisecond a megabyte and bounds what decoding can make.  Every member of an object has a

@@ -1,4 +1,4 @@
-"""Arrow streams in and out: the columns are used where they lie, and nothing is turned into text.  Needs pyarrow."""
+"""Arrow streams in and out, without copies of the columns and without text.  Needs pyarrow."""
 
 from collections.abc import Iterator, Mapping
 from struct import error, unpack_from
@@ -85,7 +85,7 @@ class Arrow:
 
 
 class _Sink:
-    """What a stream is written to; gives away what came in."""
+    """A buffer that a stream is written to, and read from piece by piece."""
 
     closed = False
 
@@ -104,7 +104,7 @@ class _Sink:
         """Do nothing."""
 
     def taken(self) -> bytes:
-        """All that came since the last time."""
+        """All that was written since the last call."""
         pieces, self._pieces = self._pieces, []
         return b"".join(pieces)
 
@@ -112,8 +112,8 @@ class _Sink:
 def _read(text: bytearray, max_batch: int) -> tuple[Any, list[Any]]:
     """Schema and record batches.
 
-    Nothing is unpacked: a compressed buffer announces its length and could claim any, so compressed streams are
-    refused by their messages' metadata; dictionaries and nested columns are refused by the schema.
+    A compressed buffer states its unpacked length, which may be false.  So compressed streams are refused by their
+    messages' metadata, before anything is unpacked.  Dictionaries and nested columns are refused by the schema.
     """
     batches, size = [], 0
     try:
@@ -140,10 +140,10 @@ def _read(text: bytearray, max_batch: int) -> tuple[Any, list[Any]]:
 
 
 def _is_compressed(metadata: Any) -> bool:
-    """Whether a record batch says that its buffers are compressed: member 3 of RecordBatch, member 2 of Message.
+    """Whether a record batch states compressed buffers: member 3 of RecordBatch, which is member 2 of Message.
 
-    The layout of flatbuffers: a table begins with the distance back to its list of members, which begins with its size
-    and that of the table; a member is its distance from the table, 0 where it is not there.
+    The layout of flatbuffers: a table begins with the distance back to its list of members.  The list begins with its
+    own size and the size of the table.  Each member is given by its distance from the table, 0 if it is absent.
     """
     text = memoryview(metadata)
 

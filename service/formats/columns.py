@@ -1,10 +1,10 @@
 """JSON columns: an object of lists and plain numbers.
 
-Only what makes a batch unreadable refuses it as a whole: text that is not JSON, an unknown or missing column, lists of
-different lengths, a bad plain number that would hold for every case.  A bad entry of a list spoils its own case.
+A batch is refused as a whole only if it cannot be read: text that is not JSON, an unknown or missing column, lists of
+different lengths, a bad plain number that would hold for every case.  A bad entry of a list affects its own case only.
 
 Plain numbers go from text to arrays in compiled code (:mod:`service.numbers`), ordinary columns with options through
-msgspec; what either of them refuses is read again, entry by entry, by :func:`read_values`, which finds the words.
+msgspec.  If either refuses a body, :func:`read_values` reads it again, entry by entry, and gives the reasons.
 """
 
 import math
@@ -39,7 +39,7 @@ Stiff = float | None | Literal["rigid"]
 
 
 class _Plain(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    """Columns as they mostly come; anything else is not refused but read again."""
+    """The usual form of columns; any other form is read again, entry by entry."""
 
     mu0: Column
     Fz: Column
@@ -67,7 +67,7 @@ def decode(text: bytearray) -> Any:
     Raises
     ------
     MalformedBodyError, InvalidFieldsError
-        No JSON; an integer of more digits than anybody reads.
+        Not JSON; an integer with too many digits.
     """
     try:
         return from_json(memoryview(text).tobytes())
@@ -78,7 +78,7 @@ def decode(text: bytearray) -> Any:
 
 
 def read_entry(value: Any, name: str) -> tuple[float, str | None]:
-    """The number that an entry stands for, NaN if none, and the reason if it is none."""
+    """The number that an entry stands for and None; or NaN and the reason why it is not a number."""
     if name == "k" and (value is None or value == "rigid"):
         return math.inf, None
     if type(value) is float or type(value) is int:
@@ -141,7 +141,7 @@ def _converted(value: Any) -> Array | float:
 
 
 def _read_numbers(text: bytearray, max_batch: int) -> Batch | None:
-    """What the compiled reader makes of it; None where it is not ordinary."""
+    """The batch from the compiled reader; None if that reader does not accept the text."""
     if not numbers_ready():
         return None
     stop = len(text)
@@ -160,7 +160,7 @@ _ready = False
 
 
 def numbers_ready(*, now: bool = False) -> bool:
-    """Whether the compiled reader is loaded; with ``now`` it is from here on."""
+    """Whether the compiled reader is loaded; with ``now`` it is marked as loaded."""
     global _ready
     _ready = _ready or now
     return _ready
@@ -193,7 +193,7 @@ def read_values(found: Mapping[str, Any], max_batch: int) -> tuple[Batch, dict[s
 
 
 def _entries(name: str, values: list[Any], reasons: dict[int, Reason]) -> Array:
-    """A list as an array, with why entries are no numbers."""
+    """A list as an array, with the reasons of entries that are not numbers."""
     column = np.empty(len(values))
     told = 0
     for i, value in enumerate(values):
@@ -211,7 +211,7 @@ def _batch(
     faults: list[FieldFault],
     max_batch: int,
 ) -> Batch:
-    """Check what holds between columns.
+    """Check the relations between columns.
 
     Raises
     ------

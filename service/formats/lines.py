@@ -1,8 +1,8 @@
-"""NDJSON: lines in, lines out, each answered as soon as it is there.
+"""NDJSON: lines in, lines out, each answered as soon as it arrives.
 
-Most lines of a stream that is worth one are blocks: an object of lists.  Those are read, evaluated and written some at
-a time, in memory that is used again.  Lines of one case each are answered together.  Every other line, and every line
-with a bad case in it, is answered by itself, as a batch of its own would be.
+Large streams mostly hold blocks: lines with an object of lists.  Several blocks are read, evaluated and written
+together, in memory that is used again.  Lines of one case each are answered together too.  Every other line, and every
+line with a bad case, is answered alone, like a batch.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -75,9 +75,9 @@ class LineAnswers:
     Parameters
     ----------
     table : LoadedTable
-        That of lines which choose none themselves.
+        The table for lines without a ``tolerance``.
     include, std
-        What is asked for beside the lines.
+        The options of the query.
     max_batch : int
         Cases of one line.
     answer : callable

@@ -1,7 +1,7 @@
-"""JSON rows: a list of objects, each one case.  A bad row spoils itself.
+"""JSON rows: a list of objects, each one case.  A bad row affects only itself.
 
-Ordinary rows go through msgspec, a quarter of a megabyte at a time, since it keeps the interpreter's lock; what it
-refuses is read again, row by row, by :func:`read_values`, which finds the words.
+Ordinary rows go through msgspec, a quarter of a megabyte at a time, since it keeps the interpreter's lock.  What it
+refuses is read again, row by row, by :func:`read_values`, which gives the reasons.
 """
 
 import math
@@ -29,7 +29,7 @@ _SLICE = 8192  # cases that are written at a time
 
 
 class _Row(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    """A row as it mostly comes."""
+    """The usual form of a row."""
 
     mu0: float
     Fz: float
@@ -147,7 +147,7 @@ def read_values(found: list[Any]) -> Batch:
 
 
 def read_row(row: Any) -> tuple[list[float], Reason | None]:
-    """The six inputs of a row, and why it is no case."""
+    """The six inputs of a row, or the reason why it is not a case."""
     if not isinstance(row, dict):
         return [], (None, "must be an object")
     for name in row:

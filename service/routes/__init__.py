@@ -16,7 +16,7 @@ async def no_query(request: Request) -> None:
     """Refuse a query where there is a body."""
     if request.scope["query_string"]:
         pairs = request.query_params.multi_items()[:100]
-        faults = [FieldFault(name, "belongs into the body", text, place="parameter") for name, text in pairs]
+        faults = [FieldFault(name, "belongs in the body", text, place="parameter") for name, text in pairs]
         if faults:
             raise refusal(faults)
 
@@ -36,7 +36,7 @@ async def once_each(request: Request) -> None:
 
 @contextmanager
 def parameters_of(path: str) -> Iterator[None]:
-    """Tell what a model finds wrong as faults of the query of that path."""
+    """Report the errors of a model as faults of the query of that path."""
     try:
         yield
     except ValidationError as error:
@@ -45,7 +45,7 @@ def parameters_of(path: str) -> Iterator[None]:
 
 
 def etag_matches(request: Request, etag: str) -> bool:
-    """Whether the caller already has this answer (If-None-Match, weak comparison)."""
+    """Whether the client has this answer already (If-None-Match, weak comparison)."""
     offered = request.headers.get("if-none-match")
     if offered is None:
         return False

@@ -1,7 +1,7 @@
 """Many cases at once: ``POST /v1/mu-macro/batch``, in every form of :mod:`service.formats`.
 
 The form is that of the Content-Type; ``/v1/mu-macro/batch/<name>`` takes one form only, so that generated clients are
-typed.  Answers are sent piece by piece, no faster than the caller takes them.
+typed.  Answers are sent piece by piece, no faster than the client reads them.
 """
 
 import asyncio
@@ -43,7 +43,7 @@ _BYTES_PER_UNIT = 16  # of a body, for the time of a plain case: what reading it
 
 
 class Batches:
-    """What batches share; made once an application."""
+    """Objects that all batches share; one per application."""
 
     def __init__(self, tables: Tables, work: Work, metrics: Metrics, max_body_bytes: int, max_batch: int) -> None:
         self.tables = tables
@@ -96,7 +96,7 @@ class BatchResponse(Response):
                 await self._whole(receive, send_noted, media_type)
         except MumacroError as error:
             if started:
-                raise ClientDisconnect from error  # nothing but the end of the connection can say it now
+                raise ClientDisconnect from error  # the answer has begun: end the connection
             await problem_of(error, scope["path"])(scope, receive, send)
         finally:
             if self._placed:
@@ -116,7 +116,7 @@ class BatchResponse(Response):
         size = len(text)
         chosen = self._chosen or choose(media_type, memoryview(text))
         query = self._options({}, "parameter")[0]
-        # What is read costs by its bytes, what is computed by its cases: small texts can ask for much.
+        # Reading costs by the byte, computing by the case: a small body can ask for much work.
         batch, given = await self._run(partial(chosen.read, text, self._batches.max_batch), size / _BYTES_PER_UNIT)
         options, place = self._options(given, "pointer") if given else (query, "parameter")
         if given and self._query.given().get("tolerance") is not None:
@@ -138,7 +138,7 @@ class BatchResponse(Response):
         return await self._batches.work.run(work, cost)
 
     async def _body(self, receive: Receive) -> bytearray:
-        """The body; above 64 KiB in a place."""
+        """The body; one of more than 64 KiB needs a place."""
         limit, work = self._batches.max_body_bytes, self._batches.work
         length = self._request.headers.get("content-length", "0")
         if not length.isdigit() or len(length) > 18 or int(length) > limit:
@@ -178,7 +178,7 @@ class BatchResponse(Response):
     async def _send(
         self, send: Send, media_type: str, pieces: Iterator[bytes], *, cost: float, table: LoadedTable
     ) -> None:
-        """Send the pieces; the size is told where there is only one."""
+        """Send the pieces, with a Content-Length if there is only one."""
         work = self._batches.work
         piece, following = await work.run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [(b"content-type", media_type.encode("ascii")), (b"x-table", table.surrogate.id.encode("latin-1"))]
@@ -193,7 +193,7 @@ class BatchResponse(Response):
     # --- streams --------------------------------------------------------------------------------------
 
     async def _stream(self, receive: Receive, send: Send, media_type: str) -> None:
-        """Answer line by line, each as soon as it is there: what is held does not grow with the stream."""
+        """Answer each line as soon as it arrives; memory does not grow with the stream."""
         batches, work = self._batches, self._batches.work
         length = self._request.headers.get("content-length")
         if length is not None and (not length.isdigit() or len(length) > 18 or int(length) > batches.max_body_bytes):
@@ -209,8 +209,8 @@ class BatchResponse(Response):
         patience = self._request.app.state.settings.client_timeout_s
         source.until = asyncio.get_running_loop().time() + patience
         text, more = bytearray(), True
-        # Who tells a length may send all of it before reading, and gets the answer then; others may send nothing until
-        # they see that the answer begins.
+        # A client that gives a length may send all of the body before it reads: the answer then comes after the body.
+        # A client that gives no length may wait for the start of the answer before it sends more.
         while length is not None and more:
             if len(text) > SMALL_BODY:
                 self._place()
@@ -265,7 +265,7 @@ class BatchResponse(Response):
 
 
 class _Pieces:
-    """A body as it comes, read ahead of the answers: some callers send all before they read."""
+    """A body that is read ahead of the answers: some clients send all of it before they read."""
 
     def __init__(self, receive: Receive, work: Work) -> None:
         self._receive = receive
@@ -274,7 +274,7 @@ class _Pieces:
         self._size = 0
         self._more = True
         self._fault: BaseException | None = None
-        self.until = 0.0  # when the line that is coming has to be complete
+        self.until = 0.0  # time at which the current line must be complete
         self._came, self._went = asyncio.Event(), asyncio.Event()
 
     async def next(self) -> tuple[bytearray, bool]:
@@ -298,7 +298,7 @@ class _Pieces:
             self._came.set()
 
     async def taken(self) -> tuple[bytes, bool]:
-        """All that has come since the last time; waits for something."""
+        """All bytes since the last call; waits until there are some."""
         while not self._held and self._more:
             if self._fault is not None:
                 raise self._fault
@@ -334,7 +334,7 @@ def _answered(answers: LineAnswers, text: bytearray, number: int) -> tuple[list[
 
 
 def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes in pieces of a size that is worth a message."""
+    """The same bytes in larger pieces."""
     gathered: list[bytes] = []
     size = 0
     for piece in pieces:

@@ -14,7 +14,7 @@ ASSETS = {
     "swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css", "start.js": "text/javascript",
     "docs.css": "text/css",
 }  # fmt: skip
-#: what needs no API key: the page and its parts; the description itself does
+#: paths without an API key: the page and its parts; /openapi.json needs the key
 OPEN_PATHS = frozenset({"/docs", *(f"/static/swagger-ui/{name}" for name in ASSETS)})
 
 # Styles inline: the interface sets some on its elements.  Scripts, and all else, from this host alone.

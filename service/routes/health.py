@@ -1,4 +1,4 @@
-"""Health: ``/livez`` (the process answers), ``/readyz`` and its alias ``/healthz`` (it answers rightly)."""
+"""Health: ``/livez`` (the process answers), ``/readyz`` and its alias ``/healthz`` (answers are right)."""
 
 from fastapi import APIRouter
 from starlette.responses import Response
@@ -25,7 +25,7 @@ _VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
     response_model=Health,
 )
 async def livez() -> Response:
-    """Say that the process answers.  It does so without a table, too: a restart would not mend a table."""
+    """Say that the process answers, also without a table: a restart would not repair a table."""
     return Response(dump({"status": "alive", **_VERSIONS}), headers=_NO_STORE, media_type="application/json")
 
 
@@ -41,12 +41,12 @@ async def livez() -> Response:
 @router.get(
     "/readyz",
     operation_id="readyz",
-    summary="The service answers rightly",
+    summary="The service is ready",
     response_model=Health,
     responses=problems(503),
 )
 async def readyz(tables: TablesDep) -> Response:
-    """Say whether every table is loaded, was checksummed, gives its known answer and still is the file it was."""
+    """Say whether every table is loaded, has the right checksum, gives its known answer and has an unchanged file."""
     tables.check()
     answer = {"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}
     return Response(dump(answer), headers=_NO_STORE, media_type="application/json")

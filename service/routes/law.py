@@ -92,7 +92,7 @@ def _answer(table: LoadedTable, form: LawRequest, place: str) -> dict[str, Any]:
 
 
 def _per(name: str) -> float:
-    """What a value of the name is multiplied with inside: omega [rad/s] of f [Hz]."""
+    """Factor from a value of this name to the library's input: omega [rad/s] from f [Hz]."""
     return RAD_PER_CYCLE if name == "f" else 1.0
 
 

@@ -38,7 +38,7 @@ class ValueQuery(CaseQuery):
 
 
 async def _answered(request: Request, table: LoadedTable, case: RequestFields) -> dict[str, Any]:
-    # What is not loaded yet, or takes its time, is computed in a thread.
+    # Code that is not loaded yet, or takes long, runs in a thread.
     costly = case.include and (not request.app.state.tables.warm or cost_of(case.names()) > 100)
     work = request.app.state.work
     values, source = await work.run(lambda: answer_case(table, case), float("inf") if costly else 0.0)
@@ -49,7 +49,7 @@ async def _answered(request: Request, table: LoadedTable, case: RequestFields) -
 
 
 async def _get(request: Request, tables: Any, query: CaseQuery) -> tuple[dict[str, Any] | None, dict[str, str]]:
-    """The answer, None where the caller has it already, and its headers."""
+    """The answer, None if the client has it already, and its headers."""
     with parameters_of(request.url.path):
         case = query.case()
     table = tables.pick(case.tolerance, "parameter")

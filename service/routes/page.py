@@ -26,7 +26,7 @@ _FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(_FOLDER.iterdir()) if path.suffix in _TYPES}
 _NAMES = "/static/page/names.json"
-#: what needs no API key: the page and its parts, but no number
+#: paths without an API key: the page and its parts, which hold no number
 OPEN_PATHS = frozenset({"/", _NAMES, *(f"/static/page/{name}" for name in ASSETS)})
 
 # No inline script, no inline style, nothing from another host.
@@ -65,7 +65,7 @@ for _name, _media_type in ASSETS.items():
 @router.head(_NAMES)
 @router.get(_NAMES)
 async def names(request: Request) -> Response:
-    """Return what the page must not say in words of its own: inputs, units, bounds, approximations, borders, guide."""
+    """Return the library's inputs, units, bounds, approximations and borders, and whether there is a guide."""
     inputs = {
         name: {
             "unit": UNITS[name], "bound": BOUNDS[name], "positive": name in POSITIVE,
@@ -83,7 +83,7 @@ async def names(request: Request) -> Response:
 @router.head("/static/page/map.json")
 @router.get("/static/page/map.json")
 async def map_data(request: Request) -> Response:
-    """Return what the map draws: mu~ on a grid, rows of constant y~ from below, and borders by name."""
+    """Return the data of the map: mu~ on a grid, rows of constant y~ from below, and borders by name."""
     surrogate = tables_of(request).pick().surrogate
     etag = f'"{surrogate.checksum[:32]}-{__version__}"'
     headers = {"ETag": etag, "Cache-Control": "no-cache"}

@@ -37,7 +37,7 @@ accepts("/v1/solve-for", SolveForRequest.model_fields)
     dependencies=[Depends(no_query)],
 )
 async def post_solve_for(form: SolveForRequest, tables: TablesDep, request: Request) -> Response:
-    """Return every root of every target.  A target that cannot be had has none; ``reachable`` says what can."""
+    """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
     table = tables.pick(form.tolerance)
     content = await request.app.state.work.run_in_place(lambda: dump(_answer(table, form)))
     return Response(content, media_type="application/json")
@@ -85,7 +85,7 @@ def _answer(table: LoadedTable, form: SolveForRequest) -> dict[str, Any]:
 
 
 def _included(table: LoadedTable, form: SolveForRequest, solution: Solution, unknown: str, case: dict[str, Any]) -> Any:
-    """What is included, of every root in order."""
+    """The included quantities of every root, in order."""
     include = canonical(form.include)
     values = np.array([root.value for roots in solution.roots for root in roots])
     if not include or values.size == 0:

@@ -36,7 +36,7 @@ ChosenTable = Annotated[LoadedTable, Depends(_chosen)]
 @router.get(
     "/v1/table",
     operation_id="get_table",
-    summary="What is known of a table",
+    summary="Properties of a table",
     response_model=TableAnswer,
     responses=problems(401, 422, 503),
     dependencies=[Depends(once_each)],
@@ -77,8 +77,8 @@ async def get_table(table: ChosenTable, tables: TablesDep) -> Response:
     dependencies=[Depends(once_each)],
 )
 async def get_table_file(table: ChosenTable, request: Request) -> Response:
-    """Stream the file from disk; ranges are supported.  It is the very file that the answers come from."""
-    # A file that was replaced after loading would be another table under this one's name.
+    """Stream the file from disk; ranges are supported.  It is the file that the answers come from."""
+    # A file that was replaced after loading is another table with the same name.
     table.check()
     path = table.surrogate.path
     etag = f'"{table.kernel.checksum}"'

@@ -1,7 +1,7 @@
 """UM-Bridge 1.0 at the root: ``GET /Info`` and seven POSTs; the protocol itself is :mod:`service.umbridge`.
 
 At the root, because the C++ client fails with a path prefix.  The body is read raw: several clients send no JSON
-content type.  Whatever goes wrong here is told in the protocol's own form, never as problem details.
+content type.  Errors here have the form of the protocol, never that of problem details.
 """
 
 import json
