@@ -5,11 +5,14 @@ import json
 import logging
 import os
 import re
+import threading
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from contextvars import ContextVar
 from datetime import UTC, datetime
+from functools import lru_cache
+from queue import SimpleQueue
 from typing import Any
 
 __all__ = [
@@ -28,6 +31,9 @@ request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,128}", re.ASCII)
 
 _FLUSH_AFTER_S = 0.05
+_MOST_WAITING = 1 << 20  # characters of lines that wait to be written; what comes while there are more is dropped
+_LAST_S = 1.0  # how long the end of the process waits for them
+_MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is whatever the caller says
 # Lines of the most frequent requests are written without a record; their texts hold nothing that JSON escapes.
 _KNOWN, _METHODS = frozenset({"/v1/mu-macro", "/v1/mu-macro/batch"}), frozenset({"GET", "POST"})
 _stem, _number = os.urandom(8).hex(), 0
@@ -73,13 +79,18 @@ class JsonFormatter(logging.Formatter):
 
 
 # time, request id, what stands between it and the duration, seconds, client, holder of the key; texts free of what JSON
-# escapes
+# escapes, but for the client
 Entry = tuple[float, str, str, float, str | None, str | None]
 
 
 def _access_text(method: str, path: str, status: int) -> str:
     """What stands in a request's line between its id and its duration."""
     return f'", "method": "{method}", "path": "{path}", "status": {status}, "duration_ms": '
+
+
+@lru_cache(maxsize=256)
+def _shown(client: str | None) -> str:
+    return json.dumps(client)
 
 
 def _access_lines(entries: list[Entry]) -> str:
@@ -89,22 +100,85 @@ def _access_lines(entries: list[Entry]) -> str:
         if int(now) != second:
             second = int(now)
             text = time.strftime('{"time": "%Y-%m-%dT%H:%M:%S.', time.gmtime(second))
-        shown = f'"{client}"' if client is not None else "null"
         holder = f', "key": "{key}"' if key is not None else ""
         lines.append(
             f'{text}{int(1e3 * (now - second)):03d}+00:00", "level": "info", "logger": "mumacro.access", '
-            f'"message": "request", "request_id": "{identity}{between}{1e3 * seconds:.3f}, "client": {shown}'
+            f'"message": "request", "request_id": "{identity}{between}{1e3 * seconds:.3f}, "client": {_shown(client)}'
             f"{holder}}}\n"
         )
     return "".join(lines)
 
 
-class LineHandler(logging.StreamHandler[Any]):
-    """Writes records at once, and the lines of finished requests together, which saves time."""
+class _Writer:
+    """A stream whose writes never wait: a thread hands the texts on.
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
+    Where nobody reads the other end of a pipe, lines are dropped and counted; the service goes on.
+    """
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._texts: SimpleQueue[str | None] = SimpleQueue()
+        self._given = self._dropped = 0  # characters; lines
+        self._taken = 0
+        self._thread = threading.Thread(target=self._run, daemon=True, name="log")
+        self._thread.start()
+
+    def write(self, text: str) -> None:
+        """Take whole lines."""
+        if self._given - self._taken > _MOST_WAITING:
+            self._dropped += text.count("\n")
+            return
+        self._given += len(text)
+        self._texts.put(text)
+
+    def flush(self) -> None:
+        """Do nothing: texts are written as they come."""
+
+    def close(self) -> None:
+        """Wait a moment until all is written."""
+        self._texts.put(None)
+        self._thread.join(_LAST_S)
+
+    def _run(self) -> None:
+        told = 0
+        while True:
+            text = self._texts.get()
+            self._put(text or "")
+            self._taken += len(text or "")
+            if self._dropped > told and (text is None or self._texts.empty()):
+                message = f"{self._dropped - told} lines of the log were dropped: nobody read what was written"
+                told = self._dropped
+                fields = {"name": __name__, "levelname": "WARNING", "msg": message}
+                self._put(JsonFormatter().format(logging.makeLogRecord(fields)) + "\n")
+            if text is None:
+                return
+
+    def _put(self, text: str) -> None:
+        # By the file's number: an object of Python would hold its lock while it waits, also at the process's end.
+        rest = memoryview(text.encode("utf-8", "backslashreplace"))
+        with suppress(OSError):  # the reader is gone
+            while rest:
+                rest = rest[os.write(self._number, rest) :]
+
+
+class LineHandler(logging.StreamHandler[Any]):
+    """Writes records at once, and the lines of finished requests together, which saves time.
+
+    Parameters
+    ----------
+    stream : file
+        With a file number, which is what is written to.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        super().__init__(_Writer(stream.fileno()))
         self._entries: list[Entry] = []
+
+    def close(self) -> None:
+        """Write what waits, as far as somebody reads it."""
+        self.flush()
+        self.stream.close()
+        super().close()
 
     def put(self, entry: Entry) -> None:
         """Take a finished request; its line is written within a twentieth of a second, before any later record."""
@@ -151,7 +225,13 @@ class AccessLog:
         self, identity: str, method: str, path: str, status: int, seconds: float, client: str | None, key: str | None,
         *, quiet: bool = False,
     ) -> None:  # fmt: skip
+<<<<<<< HEAD
         """Write the line of one finished request; ``quiet`` requests (successful probes) are logged at ``debug``."""
+=======
+        """Write the line of one finished request; ``quiet`` for probes, which say nothing while they succeed."""
+        if client is not None:
+            client = client[:_MOST_SHOWN]
+>>>>>>> reliability
         if self._put is not None and not quiet and status == 200 and path in _KNOWN and method in _METHODS:
             self._put((time.time(), identity, self._texts[method, path, status], seconds, client, key))
             return

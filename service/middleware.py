@@ -145,8 +145,8 @@ class _Packed:
 
 def _wants_gzip(offers: str) -> bool:
     """Whether who sent these words as Accept-Encoding takes gzip."""
+    wanted = {}
     for offer in offers.lower().split(","):
-        name, _, parameters = offer.partition(";")
-        if name.strip() in ("gzip", "*"):
-            return parameters.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
-    return False
+        name, _, weight = offer.partition(";")
+        wanted[name.strip()] = weight.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000")
+    return wanted.get("gzip", wanted.get("*", False))

@@ -20,11 +20,12 @@ _DESCRIPTION = (
     "Errors are problem details (RFC 9457)."
 )
 _WHY = {
-    400: "The body is empty or cannot be read, or a header is given twice",
+    400: "The body is empty or cannot be read, or a header is wrong or given twice",
     408: "The body was not complete in time",
     401: "The service needs an API key, and none or a wrong one was sent",
     413: "The body or the batch is too large",
     415: "The body has another media type",
+    416: "The file has no such part",
     422: "Invalid, missing or unknown fields",
     503: "Not ready or overloaded; see Retry-After",
 }

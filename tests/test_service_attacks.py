@@ -27,8 +27,11 @@ def server(serving, surrogate):
 
 
 @pytest.fixture
-def watched(server):
-    """The server, asked beside the attack whether it lives; afterwards its memory is looked at."""
+def watched(server, record_property):
+    """The server, asked beside the attack whether it lives; afterwards its memory is looked at.
+
+    fuzz/load.py reads what is recorded here.
+    """
     waits, over = [], threading.Event()
 
     def ask():
@@ -47,6 +50,8 @@ def watched(server):
     asking.join()
     status = Path(f"/proc/{server.process.pid}/status").read_text()
     peak = int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024
+    record_property("livez_s", f"{max(waits):.4f}")
+    record_property("peak_mib", f"{peak:.0f}")
     assert max(waits) < LONGEST_S
     assert peak < MOST_MIB
     assert server.ask("POST", SINGLE, json.dumps(CASE), {"Content-Type": "application/json"})[0] == 200

@@ -11,6 +11,7 @@ from service.logs import JsonFormatter
 from service.middleware import HEALTH_PATHS
 from service.routes import umbridge
 from service.routes.docs import ASSETS
+from service.routes.page import ASSETS as PAGE_ASSETS
 from service.settings import Settings
 
 PATHS = {
@@ -260,3 +261,72 @@ def test_the_page_loads_nothing_from_elsewhere(client):
 def test_every_answer_forbids_guessing_its_type(client):
     for path in ("/livez", "/nowhere", "/docs", "/v1/table"):
         assert client.get(path).headers["x-content-type-options"] == "nosniff"
+
+
+def test_a_page_that_the_caller_has_is_not_sent_again(client):
+    pages = ["/", "/docs", "/v1/table.nc", *(f"/static/swagger-ui/{name}" for name in ASSETS)]
+    pages += [f"/static/page/{name}" for name in PAGE_ASSETS]
+    for path in pages:
+        first = client.get(path)
+        tag = first.headers["etag"]
+        for offered in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+            again = client.get(path, headers={"If-None-Match": offered})
+            assert (again.status_code, again.content) == (304, b""), path
+            assert again.headers["etag"] == tag
+            for name in ("cache-control", "content-security-policy"):
+                assert again.headers.get(name) == first.headers.get(name)
+        assert client.get(path, headers={"If-None-Match": '"other"'}).content == first.content
+        assert client.head(path, headers={"If-None-Match": tag}).status_code == 304
+
+
+@pytest.mark.parametrize(
+    ("given", "status"),
+    [
+        ("bytes=99999999-", 416), ("bytes=-0", 416), ("bytes=0-1,99999999-", 416), ("bytes=5-2", 400),
+        ("lines=1-2", 400), ("nonsense", 400), ("bytes=", 400), ("bytes=a-b", 400), ("bytes=\xff-", 400),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("path", ["/v1/table.nc", "/", "/static/page/main.js"])
+def test_a_range_that_the_file_has_not_is_a_problem_document(client, problem, path, given, status):
+    response = client.get(path, headers={"Range": given.encode("latin-1")})
+    problem(response, status)
+    size = client.get(path).headers["content-length"]
+    assert response.headers.get("content-range") == (f"bytes */{size}" if status == 416 else None)
+
+
+def test_a_range_is_a_part_of_the_file(client):
+    whole = client.get("/v1/table.nc")
+    for given, part in (("bytes=0-7", whole.content[:8]), ("bytes=-5", whole.content[-5:])):
+        answer = client.get("/v1/table.nc", headers={"Range": given})
+        assert (answer.status_code, answer.content) == (206, part)
+    kept = client.get("/v1/table.nc", headers={"Range": "bytes=0-7", "If-Range": '"another"'})
+    assert (kept.status_code, kept.content) == (200, whole.content)
+
+
+OFFERS = {
+    "gzip": True, "GZIP": True, "*": True, "br, gzip;q=0.5": True, "gzip;q=0.001": True, "identity;q=0, *": True,
+    "gzip;q=0": False, "gzip; q=0": False, "gzip;q=0.000": False, "*;q=0": False, "gzip;q=0, *": False,
+    "*, gzip;q=0": False, "identity": False, "": False, "xgzip": False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("offer", OFFERS)
+def test_who_does_not_take_gzip_gets_none_from_any_route(client, case, offer):
+    v0 = [1e-6 * i for i in range(1, 3001)]
+    line = (json.dumps({**case, "v0": v0}) + "\n").encode()
+    law = {**{name: case[name] for name in case if name != "v0"}, "start": 1e-4, "stop": 1.0, "points": 3000}
+    asked = {"Accept-Encoding": offer}
+    answers = [client.get(path, headers=asked) for path in ("/openapi.json", "/static/swagger-ui/swagger-ui.css")]
+    answers += [
+        client.get("/static/page/map.json", headers=asked),
+        client.get("/v1/law.csv", params=law, headers=asked),
+    ]
+    answers.append(client.post("/v1/law", json=law, headers=asked))
+    answers.append(client.post("/v1/mu-macro/batch", json={**case, "v0": v0}, headers=asked))
+    answers.append(client.post("/v1/mu-macro/batch", json=[{**case, "v0": x} for x in v0], headers=asked))
+    kind = {**asked, "Content-Type": "application/x-ndjson"}
+    answers.append(client.post("/v1/mu-macro/batch", content=line, headers=kind))
+    for answer in answers:
+        assert answer.status_code == 200, answer.text
+        assert ("content-encoding" in answer.headers) == OFFERS[offer], answer.request.url
+    assert "content-encoding" not in client.get("/v1/table.nc", headers=asked).headers

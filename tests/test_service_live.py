@@ -7,7 +7,9 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
@@ -193,3 +195,27 @@ def test_a_port_that_is_taken_is_a_failure(repository, surrogate):
         process = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False, timeout=START_S)
     assert process.returncode == 1
     assert "Traceback" not in process.stdout + process.stderr
+
+
+def test_workers_whose_parent_is_killed_end_and_give_the_port_back(serving, surrogate, case):
+    with serving(surrogate.path, "--workers", "2", MUMACRO_DRAIN_S="0.2") as server:
+        server.wait_for_tables(2)
+        children = Path(f"/proc/{server.process.pid}/task/{server.process.pid}/children")
+        if not children.exists():
+            pytest.skip("this system does not tell the children of a process")
+        workers = [int(number) for number in children.read_text().split()]
+        assert len(workers) >= 2
+        body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})  # they are at work
+        with ThreadPoolExecutor(4) as pool:
+            asked = [pool.submit(server.ask, "POST", "/v1/mu-macro/batch", body) for _ in range(8)]
+            server.process.send_signal(signal.SIGKILL)
+            deadline = time.monotonic() + START_S
+            while [number for number in workers if Path(f"/proc/{number}").exists()]:
+                assert time.monotonic() < deadline
+                time.sleep(0.05)
+            for one in asked:
+                one.exception()
+        assert server.wait() == -signal.SIGKILL
+        with socket.socket() as taken:
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            taken.bind(("127.0.0.1", server.port))

@@ -196,6 +196,22 @@ def test_what_is_no_arrow_stream_is_malformed(client, case, problem):
         problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 400)
 
 
+def test_an_arrow_name_that_is_no_text_is_refused(client, case, problem):
+    body = stream_of(pa.record_batch({**{name: [value] for name, value in case.items()}, "friction": [1.0]}))
+    body = body.replace(b"friction", b"fric\xff\xfe\x00n")
+    problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 400)
+
+
+def test_a_damaged_arrow_stream_is_answered_or_refused(client, case):
+    whole = stream_of(pa.record_batch({**{name: [value] * 3 for name, value in case.items()}, "k": [1e6, None, 1e5]}))
+    lies = (b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\0\0\0\0", b"\0\0\0\1")
+    bodies = [whole[:i] + bytes([whole[i] ^ 1 << i % 8]) + whole[i + 1 :] for i in range(0, len(whole), 3)]
+    bodies += [whole[:i] + lie + whole[i + 4 :] for i in range(0, len(whole) - 4, 16) for lie in lies]
+    bodies += [whole[:i] for i in range(0, len(whole), 40)]
+    statuses = {client.post(PATH, content=body, headers={"Content-Type": ARROW}).status_code for body in bodies}
+    assert {200, 400} <= statuses <= {200, 400, 413, 422}
+
+
 def test_an_arrow_batch_over_the_limit_is_refused(tables_dir, case, problem):
     with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3), wait=True)) as client:
         body = stream_of(pa.record_batch({name: [value] * 4 for name, value in case.items()}))
@@ -215,10 +231,7 @@ def test_arrow_is_refused_where_it_is_not_installed(tables_dir, case, problem, m
 # --- compression --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("offer", "taken"),
-    [("gzip", True), ("br, gzip;q=0.5", True), ("*", True), ("identity", False), ("gzip;q=0", False), ("br", False)],
-)
+@pytest.mark.parametrize(("offer", "taken"), [("gzip", True), ("br, gzip;q=0.5", True), ("identity", False)])
 def test_a_large_answer_is_compressed_where_that_is_wanted(client, case, offer, taken):
     body = json.dumps({**case, "v0": [0.001 * i for i in range(20_000)]})
     with client.stream("POST", PATH, content=body, headers={"Accept-Encoding": offer}) as response:

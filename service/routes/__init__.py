@@ -1,15 +1,20 @@
 """The endpoints, and the dependencies that they share."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.types import Message, Receive, Scope, Send
 
 from ..errors import FieldFault, faults_of, names_at, refusal
 
-__all__ = ["etag_matches", "no_query", "once_each", "parameters_of"]
+__all__ = ["etag_matches", "file_answer", "no_query", "once_each", "parameters_of"]
 
 
 async def no_query(request: Request) -> None:
@@ -50,3 +55,37 @@ def etag_matches(request: Request, etag: str) -> bool:
     if offered is None:
         return False
     return offered.strip() == "*" or etag in (part.strip().removeprefix("W/") for part in offered.split(","))
+
+
+class _File(FileResponse):
+    """A file, or a part of it; a range that it has not is told like every other fault."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_checked(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                if message["status"] == 416:
+                    size = self.headers["content-length"]
+                    headers = {"Content-Range": f"bytes */{size}"}
+                    raise HTTPException(416, f"the file has {size} bytes", headers=headers)
+                if message["status"] == 400:
+                    raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
+            await send(message)
+
+        await super().__call__(scope, receive, send_checked)
+
+
+def file_answer(request: Request, path: Path, headers: Mapping[str, str], **options: Any) -> Response:
+    """A file, a part of it where a range is asked for, or 304 where the caller has it.
+
+    Its ETag is that of the headers, or made from its size and its time.
+
+    Raises
+    ------
+    OSError
+        The file is gone.
+    """
+    answer = _File(path, headers=headers, stat_result=path.stat(), **options)
+    etag = answer.headers["etag"]
+    if etag_matches(request, etag):
+        return Response(status_code=304, headers={**headers, "ETag": etag})
+    return answer

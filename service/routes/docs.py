@@ -3,7 +3,10 @@
 from pathlib import Path
 
 from fastapi import APIRouter
-from starlette.responses import FileResponse, Response
+from starlette.requests import Request
+from starlette.responses import Response
+
+from . import file_answer
 
 __all__ = ["ASSETS", "OPEN_PATHS", "router"]
 
@@ -26,18 +29,18 @@ _POLICY = (
 
 @router.head("/docs")
 @router.get("/docs")
-async def docs() -> Response:
+async def docs(request: Request) -> Response:
     """Return the page."""
     headers = {"Content-Security-Policy": _POLICY, "Referrer-Policy": "no-referrer", "Cache-Control": "no-cache"}
-    return FileResponse(_FOLDER / "index.html", media_type="text/html", headers=headers)
+    return file_answer(request, _FOLDER / "index.html", headers, media_type="text/html")
 
 
 def _add_asset(name: str, media_type: str) -> None:
     vendored = name.startswith("swagger-ui")  # changes with its version only
     headers = {"Cache-Control": "public, max-age=86400" if vendored else "no-cache"}
 
-    async def asset() -> Response:
-        return FileResponse(_FOLDER / name, media_type=media_type, headers=headers)
+    async def asset(request: Request) -> Response:
+        return file_answer(request, _FOLDER / name, headers, media_type=media_type)
 
     router.add_api_route(f"/static/swagger-ui/{name}", asset, methods=["GET", "HEAD"], name=name)
 

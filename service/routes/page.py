@@ -6,7 +6,7 @@ import anyio.to_thread
 import numpy as np
 from fastapi import APIRouter
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 
 from mumacro import Surrogate
 from mumacro.input_names import UNITS_OF
@@ -16,7 +16,7 @@ from .. import __version__
 from ..formats.columns import dump
 from ..kernel import BOUNDS, POSITIVE, UNITS
 from ..tables import tables_of
-from . import etag_matches
+from . import etag_matches, file_answer
 
 __all__ = ["ASSETS", "OPEN_PATHS", "POLICY", "router"]
 
@@ -45,15 +45,15 @@ _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coar
 
 @router.head("/")
 @router.get("/")
-async def page() -> Response:
+async def page(request: Request) -> Response:
     """Return the page."""
     headers = {"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer", "Cache-Control": "no-cache"}
-    return FileResponse(_FOLDER / "index.html", media_type="text/html", headers=headers)
+    return file_answer(request, _FOLDER / "index.html", headers, media_type="text/html")
 
 
 def _add_asset(name: str, media_type: str) -> None:
-    async def asset() -> Response:
-        return FileResponse(_FOLDER / name, media_type=media_type, headers={"Cache-Control": "no-cache"})
+    async def asset(request: Request) -> Response:
+        return file_answer(request, _FOLDER / name, {"Cache-Control": "no-cache"}, media_type=media_type)
 
     router.add_api_route(f"/static/page/{name}", asset, methods=["GET", "HEAD"], name=f"page-{name}")
 

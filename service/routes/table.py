@@ -1,10 +1,10 @@
 """The table itself: ``GET /v1/table`` (metadata) and ``GET /v1/table.nc`` (the file)."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 
 from mumacro.errors import TableError
 
@@ -14,11 +14,12 @@ from ..formats.columns import dump
 from ..openapi import problems
 from ..schemas import TableAnswer, TableChoice
 from ..tables import LoadedTable, TablesDep, signature
-from . import etag_matches, once_each
+from . import file_answer, once_each
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["table"])
+_FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
 
 
 accepts("/v1/table", TableChoice.model_fields)
@@ -68,11 +69,9 @@ async def get_table(table: ChosenTable, tables: TablesDep) -> Response:
     summary="The table as a netCDF-4 file",
     response_class=Response,
     responses={
-        **problems(401, 422, 503),
-        200: {
-            "description": "The file",
-            "content": {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}},
-        },
+        **problems(400, 401, 416, 422, 503),
+        200: {"description": "The file", "content": _FILE},
+        206: {"description": "The part of it that Range asked for", "content": _FILE},
     },
     dependencies=[Depends(once_each)],
 )
@@ -81,14 +80,8 @@ async def get_table_file(table: ChosenTable, request: Request) -> Response:
     # A file that was replaced after loading is another table with the same name.
     table.check()
     path = table.surrogate.path
-    etag = f'"{table.kernel.checksum}"'
-    headers = {"ETag": etag, "Cache-Control": "no-cache"}
-    if etag_matches(request, etag):
-        return Response(status_code=304, headers=headers)
+    headers = {"ETag": f'"{table.kernel.checksum}"', "Cache-Control": "no-cache"}
     try:
-        status = path.stat()
+        return file_answer(request, path, headers, media_type="application/x-netcdf", filename=path.name)
     except OSError as error:
         raise TableError(path, "the file is gone") from error
-    return FileResponse(
-        path, headers=headers, media_type="application/x-netcdf", filename=path.name, stat_result=status
-    )

@@ -1,0 +1,339 @@
+"""The service under load: mixed traffic, overload, and many connections that only wait or are slow.
+
+    python fuzz/load.py [--only mixed_load] [--share 0.05] [--write]
+
+Callers and service share this machine, so that what is called capacity is that of both together.  Requests come at
+random moments, whether or not earlier ones are answered (an open loop), and a wait is counted from the moment at which
+a request should have been sent.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import reporting
+from measuring import markdown
+from serving import FAULT, Caller, Question, Reply, Server, open_files, questions, serving
+
+MIXED = {"single": 76, "batch": 10, "stream": 5, "inverse": 5, "page": 4}  # per cent of the requests
+HEAVY = {"single": 20, "batch": 70, "stream": 5, "inverse": 5}
+CONNECTIONS = 64
+IDLE, SLOW = 2000, 200
+MIXED_S, BESIDE_S, OVERLOAD_S, CAPACITY_S = 600.0, 60.0, 60.0, 15.0
+
+
+# --- what is sent, and what should come back ----------------------------------------------------------
+
+
+def answers(server: Server, asked: Sequence[Question]) -> dict[bytes, bytes]:
+    """What the service answers to each request when nobody else asks."""
+
+    async def ask_all() -> dict[bytes, bytes]:
+        caller = Caller(server.port)
+        found = {}
+        for question in asked:
+            reply = await caller.ask(question.text)
+            assert reply.status == 200, (question.text[:200], reply.body[:500])
+            found[question.text] = reply.body
+        caller.close()
+        return found
+
+    return asyncio.run(ask_all())
+
+
+class Seen:
+    """What callers saw."""
+
+    def __init__(self, expected: dict[bytes, bytes]) -> None:
+        self.expected = expected
+        self.waits: dict[str, list[float]] = {}  # of answered requests, by kind [s]
+        self.statuses: Counter[int] = Counter()
+        self.wrong = self.broken = self.unexplained = 0
+        self.faults: Counter[str] = Counter()
+
+    def note(self, question: Question, wait: float, reply: Reply) -> None:
+        """An answer has come."""
+        self.statuses[reply.status] += 1
+        if reply.status == 200:
+            self.waits.setdefault(question.kind, []).append(wait)
+            self.wrong += reply.body != self.expected[question.text]
+        elif reply.status != 503 or b"retry-after" not in reply.headers:
+            self.unexplained += 1
+
+    def fault(self, error: BaseException) -> None:
+        """A connection broke instead."""
+        self.broken += 1
+        self.faults[type(error).__name__] += 1
+
+    @property
+    def asked(self) -> int:
+        """Requests."""
+        return sum(self.statuses.values()) + self.broken
+
+    @property
+    def verdict(self) -> str:
+        """Whether all went well but for refusals with their reason."""
+        bad = self.wrong + self.broken + self.unexplained
+        return "held" if not bad else f"FAILED: {bad} ({dict(self.faults)}, {dict(self.statuses)})"
+
+
+async def closed_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: float, connections: int) -> float:
+    """Every caller asks again as soon as it is answered; answers per second."""
+    end = time.perf_counter() + seconds
+    done = 0
+
+    async def ask_on(first: int) -> None:
+        nonlocal done
+        caller, i = Caller(port), first
+        while (begun := time.perf_counter()) < end:
+            question = asked[i % len(asked)]
+            i += connections
+            try:
+                reply = await caller.ask(question.text)
+            except FAULT as error:
+                seen.fault(error)
+                continue
+            seen.note(question, time.perf_counter() - begun, reply)
+            done += reply.status == 200
+        caller.close()
+
+    await asyncio.gather(*(ask_on(i) for i in range(connections)))
+    return done / seconds
+
+
+async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: float, rate: float) -> None:
+    """Requests at random moments, ``rate`` a second on average; each takes a free connection, or opens one."""
+    chance = random.Random(2)  # noqa: S311
+    free: list[Caller] = []
+    tasks: set[asyncio.Task[None]] = set()
+
+    async def ask(question: Question, due: float) -> None:
+        caller = free.pop() if free else Caller(port)
+        try:
+            reply = await caller.ask(question.text)
+        except FAULT as error:
+            seen.fault(error)
+        else:
+            seen.note(question, time.perf_counter() - due, reply)
+            free.append(caller)
+
+    begun = due = time.perf_counter()
+    while (due := due + chance.expovariate(rate)) < begun + seconds:
+        wait = due - time.perf_counter()
+        if wait > 0.0:
+            await asyncio.sleep(wait)
+        task = asyncio.create_task(ask(chance.choice(asked), due))
+        tasks.add(task)
+        task.add_done_callback(tasks.discard)
+        if len(tasks) % 256 == 255:
+            await asyncio.sleep(0.0)  # answers are read also where this loop is late
+    await asyncio.gather(*tasks)
+    for caller in free:
+        caller.close()
+
+
+async def idle(port: int, count: int, lost: Counter[str]) -> None:
+    """Connections that ask once and then wait; ``lost`` counts those that are not answered at the end."""
+    callers = [Caller(port) for _ in range(count)]
+    for caller in callers:
+        await caller.ask(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+    try:
+        await asyncio.Event().wait()
+    finally:
+        for caller in callers:
+            lost["idle"] += caller._writer is None or caller._writer.is_closing()
+            caller.close()
+
+
+async def slow(port: int, count: int, cut: Counter[str]) -> None:
+    """Connections that send a byte now and then, of heads and of bodies, and begin again when they are cut."""
+    starts = (
+        b"GET /livez HTTP/1.1\r\nX-Slow: ",
+        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n\r\n",
+        b"POST /v1/mu-macro/batch HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n\r\n",
+    )
+
+    async def drip(start: bytes) -> None:
+        while True:
+            with suppress(*FAULT):
+                reader, writer = await asyncio.open_connection("127.0.0.1", port)
+                writer.write(start)
+                end = asyncio.ensure_future(reader.read())
+                while not end.done():
+                    writer.write(b" ")
+                    await asyncio.wait([end], timeout=1.0)
+                writer.close()
+                cut["slow"] += 1
+
+    await asyncio.gather(*(drip(starts[i % len(starts)]) for i in range(count)))
+
+
+# --- tables -------------------------------------------------------------------------------------------
+
+WAITS = ("p50 [ms]", "p99 [ms]", "p99.9 [ms]", "longest [ms]")
+
+
+def waits(found: Sequence[float]) -> list[str]:
+    """Percentiles in milliseconds."""
+    values = 1e3 * np.array(found if len(found) else [np.nan])
+    return [f"{x:,.1f}" for x in (*np.percentile(values, [50, 99, 99.9]), values.max())]
+
+
+def slope(samples: Sequence[tuple[float, float]]) -> float:
+    """Megabytes an hour that memory grows by, over the second half of the samples."""
+    half = np.array(samples[len(samples) // 2 :])
+    return float(np.polyfit(half[:, 0], half[:, 1], 1)[0] * 3600.0) if len(half) > 2 else float("nan")
+
+
+async def watched(server: Server, work: Any) -> list[tuple[float, float]]:
+    """Memory once a second while the work is done."""
+    samples = []
+
+    async def watch() -> None:
+        while True:
+            samples.append((time.perf_counter(), server.memory()))
+            await asyncio.sleep(1.0)
+
+    task = asyncio.create_task(watch())
+    await work
+    task.cancel()
+    return samples
+
+
+def mixed_load(share: float) -> str:
+    """Mixed traffic at four fifths of capacity, alone and beside connections that wait or are slow."""
+    started = time.perf_counter()
+    open_files(2 * (IDLE + SLOW) + 1000)
+    asked = questions(MIXED, 2000, 100)
+    beside = max(BESIDE_S * share, 3.0)
+    rows = []
+    with serving(MAX_CONNECTIONS=2 * (IDLE + SLOW), CLIENT_TIMEOUT_S=10, KEEP_ALIVE_S=600, MAX_BATCHES=128) as server:
+        expected = answers(server, asked)
+        first = Seen(expected)
+        capacity = asyncio.run(closed_loop(server.port, asked, first, max(CAPACITY_S * share, 2.0), CONNECTIONS))
+        alone = Seen(expected)
+        load = open_loop(server.port, asked, alone, MIXED_S * share, 0.8 * capacity)
+        samples = asyncio.run(watched(server, load))
+        among, counts = Seen(expected), Counter[str]()
+
+        async def with_others() -> None:
+            others = [asyncio.create_task(idle(server.port, IDLE, counts))]
+            others += [asyncio.create_task(slow(server.port, SLOW, counts))]
+            await asyncio.sleep(max(2.0, 5.0 * share))
+            await open_loop(server.port, asked, among, beside, 0.4 * capacity)
+            for task in others:
+                task.cancel()
+            await asyncio.gather(*others, return_exceptions=True)
+
+        asyncio.run(with_others())
+        peak = server.memory("VmHWM")
+        code = server.stop()
+    for name, seen in (("alone", alone), (f"beside {IDLE:,} idle and {SLOW} slow connections", among)):
+        for kind in (*MIXED, "all"):
+            chosen = [w for k, found in seen.waits.items() if kind in (k, "all") for w in found]
+            rows.append([name, kind, f"{len(chosen):,}", *waits(chosen)])
+    verdicts = {"capacity": first.verdict, "alone": alone.verdict, "beside": among.verdict}
+    bad = {name: verdict for name, verdict in verdicts.items() if verdict != "held"}
+    refused = alone.statuses[503] + among.statuses[503]
+    text = (
+        f"Capacity {capacity:,.0f} requests a second; asked {alone.asked:,} requests at 80 % of it in "
+        f"{MIXED_S * share / 60.0:.3g} min, then {among.asked:,} at 40 % of it beside the others in {beside:.0f} s. "
+        f"{alone.broken + among.broken} connections broken, {alone.wrong + among.wrong} answers with other bits, "
+        f"{refused} requests refused, exit code {code}. "
+        f"Memory grew by {slope(samples):.1f} MB an hour over the second half, to at most {peak:.0f} MB with the "
+        f"others; {counts['idle']} of {IDLE:,} idle connections were lost, slow ones were cut {counts['slow']} times."
+    )
+    if bad or code or counts["idle"]:
+        text += f" FAILED: {bad}"
+    head = ("traffic", "kind", "answers", *WAITS)
+    return f"{markdown(head, rows, 2)}\n\n{text}\n\n{reporting.took(started)}"
+
+
+def overload(share: float) -> str:
+    """Three times as much as can be answered."""
+    started = time.perf_counter()
+    open_files(20_000)
+    asked = questions(HEAVY, 400, 20_000)
+    with serving(CLIENT_TIMEOUT_S=30) as server:
+        expected = answers(server, asked)
+
+        async def rounds() -> float:
+            """Seconds until each kind of request is answered once, one after the other."""
+            begun, caller = time.perf_counter(), Caller(server.port)
+            for kind in HEAVY:
+                question = next(one for one in asked if one.kind == kind)
+                reply = await caller.ask(question.text)
+                if reply.status != 200 or reply.body != expected[question.text]:
+                    return float("inf")
+            caller.close()
+            return time.perf_counter() - begun
+
+        quiet = min(asyncio.run(rounds()) for _ in range(10))
+        first, seen = Seen(expected), Seen(expected)
+        capacity = asyncio.run(closed_loop(server.port, asked, first, max(CAPACITY_S * share, 2.0), 8))
+        recovery = float("inf")
+
+        async def too_much() -> None:
+            nonlocal recovery
+            await open_loop(server.port, asked, seen, max(OVERLOAD_S * share, 2.0), 3.0 * capacity)
+            begun = time.perf_counter()
+            while time.perf_counter() - begun < 60.0:
+                if await rounds() < 2.0 * quiet + 0.01:
+                    recovery = time.perf_counter() - begun
+                    return
+
+        asyncio.run(too_much())
+        peak, code = server.memory("VmHWM"), server.stop()
+    rows = [[kind, f"{len(found):,}", *waits(found)] for kind, found in sorted(seen.waits.items())]
+    rest = seen.statuses[503]
+    text = (
+        f"Capacity {capacity:,.0f} requests a second, seven in ten of them batches of 20,000 cases; {seen.asked:,} "
+        f"were asked at three times that in {max(OVERLOAD_S * share, 2.0):.0f} s. {seen.statuses[200]:,} were "
+        f"answered, {seen.wrong} of them with other bits; {rest:,} were refused with 503 and Retry-After, "
+        f"{seen.unexplained} in another way; {seen.broken} connections broke. {recovery:.2f} s after the last answer "
+        "every kind of request was answered as fast as before (twice the time at most). Memory at most "
+        f"{peak:.0f} MB, exit code {code}."
+    )
+    if seen.verdict != "held" or first.wrong or not rest or recovery > 5.0 or code:
+        text += f" FAILED: {seen.verdict}"
+    return f"{markdown(('kind', 'answers', *WAITS), rows)}\n\n{text}\n\n{reporting.took(started)}"
+
+
+def attacks(share: float) -> str:
+    """The longest wait for ``/livez`` beside each attack of tests/test_service_attacks.py, which measures it."""
+    started = time.perf_counter()
+    path = reporting.ROOT / "tests" / "test_service_attacks.py"
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        words = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-m", "", str(path), f"--junitxml={report}"]
+        if share < 1.0:
+            words += ["-k", "head_has_a_limit or blank_lines"]
+        subprocess.run(words, cwd=reporting.ROOT, check=False, capture_output=True)
+        rows = []
+        for found in ElementTree.parse(report).iter("testcase"):  # noqa: S314  (written a moment ago by pytest)
+            measured = {one.get("name"): one.get("value") for one in found.iter("property")}
+            failed = found.find("failure") is not None or found.find("error") is not None
+            if failed or "livez_s" in measured:
+                name = str(found.get("name")).removeprefix("test_").replace("_", " ")
+                wait, memory = float(measured.get("livez_s") or "nan"), measured.get("peak_mib", "")
+                rows.append([name, "FAILED" if failed else "held", f"{1e3 * wait:.0f}", str(memory)])
+    head = ("attack", "it", "longest wait for /livez [ms]", "memory so far [MiB]")
+    return f"{markdown(head, rows, 2)}\n\n{reporting.took(started)}"
+
+
+SECTIONS = {"mixed_load": mixed_load, "overload": overload, "attacks": attacks}
+
+if __name__ == "__main__":
+    reporting.report(__doc__ or "", SECTIONS)

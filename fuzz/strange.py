@@ -1,0 +1,485 @@
+"""Strange requests: valid ones with something changed, over every endpoint and every format.
+
+    python fuzz/strange.py [--only strange_requests] [--share 0.001] [--write]
+
+Most go straight into the application, in processes of their own; one in twenty goes over a socket to a running service.
+The seed of a share of the work is its number, so that what is found can be had again:
+``python fuzz/strange.py again NUMBER`` does one share and says which requests were bad.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import random
+import resource
+import struct
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+import orjson
+import reporting
+from measuring import markdown, progress
+from serving import CASE, FAULT, Caller, case, serving
+
+TABLE = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
+TOTAL, PART, LIVE = 1_000_000, 10_000, 20  # requests, in a share of work, one in so many over a socket
+HANG_S = 1.0
+FINE = frozenset({200, 206, 304, 400, 401, 404, 405, 408, 413, 415, 416, 422})
+JSON, LINES, CSV = "application/json", "application/x-ndjson", "text/csv"
+ARROW = "application/vnd.apache.arrow.stream"
+BATCH = "/v1/mu-macro/batch"
+
+
+class Request(NamedTuple):
+    """One request."""
+
+    method: str
+    path: str
+    query: bytes
+    headers: list[tuple[bytes, bytes]]
+    body: bytes
+
+
+# --- valid requests -----------------------------------------------------------------------------------
+
+INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", "regime_certain", "border")
+
+
+def document(chance: random.Random) -> tuple[str, Any]:
+    """A path that takes JSON, and a good body for it."""
+    one: dict[str, Any] = case(chance)
+    if chance.random() < 0.3:
+        one["include"] = chance.sample(INCLUDED, chance.randrange(4))
+        if "std" in one["include"]:
+            one["std"] = {"mu0": 0.01, "v0": 1e-4}
+    if chance.random() < 0.1:
+        one["f"] = one.pop("omega")
+    if chance.random() < 0.1:
+        one["k"] = chance.choice([None, "rigid"])
+    if chance.random() < 0.1:
+        one["tolerance"] = 1e-3
+    what = chance.randrange(7)
+    if what == 0:
+        return "/v1/mu-macro", one
+    if what == 1:
+        n = chance.choice([0, 1, 2, 5, 300])
+        return BATCH, {**one, "v0": [10.0 ** chance.uniform(-5, 1) for _ in range(n)]}
+    if what == 2:
+        return BATCH, [case(chance) for _ in range(chance.choice([0, 1, 2, 5, 60]))]
+    del one["v0"]
+    if what == 3:
+        target: Any = chance.choice([0.1, 0.5, [0.01, 0.2]])
+        return "/v1/solve-for", {**one, "unknown": "v0", "target": target}
+    if what == 4:
+        law = {**one, "start": 1e-4, "stop": 1.0, "points": chance.choice([2, 5, 50])}
+        if chance.random() < 0.3:
+            law["family"] = {"y0": [1e-7, 1e-6]}
+            law.pop("y0", None)
+        return "/v1/law", law
+    name = chance.choice(["mu_macro", "mu_macro_log10"])
+    six = list(CASE.values())
+    if what == 5:
+        return "/Evaluate", {"name": name, "input": [six], "config": {}}
+    path = chance.choice(["/Gradient", "/ApplyJacobian", "/ApplyHessian", "/InputSizes", "/OutputSizes", "/ModelInfo"])
+    return path, {"name": name, "outWrt": 0, "inWrt": 0, "input": [six], "sens": [1.0], "vec": six, "config": {}}
+
+
+def arrow(chance: random.Random) -> bytes:
+    """A good Arrow stream."""
+    import numpy as np
+    import pyarrow as pa
+
+    n = chance.choice([0, 1, 3, 50])
+    kinds = [pa.float64()] * 8 + [pa.float32(), pa.int64(), pa.uint8(), pa.float16()]
+    made = {}
+    for name in CASE:
+        values = 10.0 ** np.random.default_rng(chance.randrange(1 << 30)).uniform(-1, 1, n)
+        made[name] = pa.array(values, mask=values > 8.0).cast(chance.choice(kinds), safe=False)
+    batch = pa.record_batch(made)
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, batch.schema) as writer:
+        for _ in range(chance.choice([1, 1, 2])):
+            writer.write_batch(batch)
+    return bytes(sink.getvalue().to_pybytes())
+
+
+# --- what is changed ----------------------------------------------------------------------------------
+
+#: texts that stand where a value stood
+NUMBERS = (
+    "0", "-0", "-1", "1e308", "1e309", "-1e400", "5e-324", "1e-400", "0.1" + "0" * 400, "9" * 400, "1" + "0" * 5000,
+    "NaN", "Infinity", "-Infinity", "nan", "0x10", "1_000", "01", "+1", ".5", "1.", "1e", "1e+", "--1", "1d5", "1,5",
+)  # fmt: skip
+VALUES = (
+    "null", "true", "false", '""', '"rigid"', '"0.1"', '"NaN"', "[]", "{}", "[[]]", "[null]", '{"":1}', '"\\u0000"',
+    '"\\ud800"', '"\\ud83d\\ude00"', "[1,[2,[3]]]", "[" * 300 + "]" * 300, '{"a":' * 200 + "1" + "}" * 200,
+    '"' + "x" * 3000 + '"', "[" + "1," * 2000 + "1]", "/*1*/", "'1'", "undefined", "", ",", "\ufeff1", "\u2028",
+)  # fmt: skip
+NAMES = (
+    *CASE, "f", "include", "std", "tolerance", "target", "unknown", "points", "family", "name", "input", "", "\u00e9",
+    "__proto__", "mu0 ", "MU0", "constructor", "x" * 2000,
+)  # fmt: skip
+
+
+def text_of(value: Any, chance: random.Random, rate: float) -> str:
+    """A value as JSON, with changes at about this rate a node."""
+    if chance.random() < rate:
+        return chance.choice(chance.choice([NUMBERS, VALUES]))
+    space = " \t\r\n"[: chance.randrange(5)] if chance.random() < 0.02 else ""
+    if isinstance(value, dict):
+        members = []
+        for name, inner in value.items():
+            if chance.random() < rate / 3.0:
+                continue
+            called = chance.choice(NAMES) if chance.random() < rate / 2.0 else name
+            members.append(f"{space}{json.dumps(called)}{space}:{text_of(inner, chance, rate)}")
+            if chance.random() < rate / 3.0:
+                members.append(members[-1])
+        return "{" + ",".join(members) + space + "}"
+    if isinstance(value, list):
+        return "[" + ",".join(text_of(inner, chance, rate / (1 + len(value) / 8)) for inner in value) + space + "]"
+    return json.dumps(value)
+
+
+def spoil(text: bytes, chance: random.Random) -> bytes:
+    """Some bytes flipped, taken away, put in, doubled, or overwritten by a number that lies."""
+    changed = bytearray(text)
+    for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
+        if not changed:
+            break
+        i, j = sorted((chance.randrange(len(changed)), chance.randrange(len(changed))))
+        what = chance.randrange(7)
+        if what <= 1:
+            changed[i] ^= 1 << chance.randrange(8)
+        elif what == 2:
+            changed[i] = chance.randrange(256)
+        elif what == 3:
+            del changed[i : i + chance.choice([1, 2, 10, j - i])]
+        elif what == 4:
+            changed[i:i] = chance.choice([b"\0", b"\xff", b'"', b"{", b"[", b",", b"\n", b"\r\n", b"\\", b"1e999"])
+        elif what == 5:
+            i -= i % 4
+            lie = chance.choice([-1, 0, 1, 1 << 24, (1 << 31) - 1, -(1 << 31), chance.randrange(1 << 31)])
+            changed[i : i + 4] = struct.pack("<i", lie)
+        else:
+            changed[j:j] = changed[i : min(j, i + 2000)]
+    return bytes(changed)
+
+
+def json_request(chance: random.Random) -> Request:
+    path, value = document(chance)
+    text = text_of(value, chance, chance.choice([0.0, 0.05, 0.2])).encode("utf-8", "surrogatepass")
+    return posted(path, JSON, spoil(text, chance) if chance.random() < 0.3 else text)
+
+
+def lines_request(chance: random.Random) -> Request:
+    lines = []
+    for _ in range(chance.choice([0, 1, 2, 5, 20])):
+        one: dict[str, Any] = case(chance)
+        if chance.random() < 0.2:
+            one["v0"] = [0.1, 0.2]
+        lines.append(text_of(one, chance, chance.choice([0.0, 0.05])).encode("utf-8", "surrogatepass"))
+    text = chance.choice([b"\n", b"\n", b"\r\n", b"\n\n", b"\r"]).join(lines) + chance.choice([b"", b"\n"])
+    return posted(BATCH, LINES, spoil(text, chance) if chance.random() < 0.3 else text)
+
+
+def csv_request(chance: random.Random) -> Request:
+    names = list(CASE)
+    chance.shuffle(names)
+    if chance.random() < 0.2:
+        names[chance.randrange(6)] = chance.choice(NAMES)
+    rows = [",".join(f'"{name}"' if chance.random() < 0.1 else name for name in names)]
+    for _ in range(chance.choice([0, 1, 3, 20])):
+        row = [repr(value) for value in case(chance).values()]
+        if chance.random() < 0.2:
+            row[chance.randrange(6)] = chance.choice([*NUMBERS, "", '"', "rigid", '"0.1"', ";", "=1+1"])
+        rows.append(",".join(row))
+    text = chance.choice(["\n", "\r\n"]).join(rows).encode("utf-8", "surrogatepass") + chance.choice([b"", b"\n"])
+    return posted(BATCH, CSV, spoil(text, chance) if chance.random() < 0.3 else text)
+
+
+def arrow_request(chance: random.Random) -> Request:
+    text = arrow(chance)
+    if chance.random() < 0.8:
+        text = spoil(text, chance)
+    elif chance.random() < 0.5:
+        text = text[: chance.randrange(len(text))]
+    return posted(BATCH, ARROW, text)
+
+
+GETS = ("/v1/mu-macro", "/v1/mu-macro.txt", "/v1/law.csv", "/v1/table", "/v1/table.nc")
+
+
+def query_request(chance: random.Random) -> Request:
+    path = chance.choice(GETS)
+    pairs = [(name, repr(value)) for name, value in case(chance).items()]
+    if path == "/v1/law.csv":
+        pairs = [*pairs[:5], ("start", "1e-4"), ("stop", "1"), ("points", chance.choice(["2", "20"]))]
+    if path.startswith("/v1/table"):
+        pairs = [chance.choice([("id", "mumacro-1e-4"), ("tolerance", "1e-3"), ("id", "../x")])][: chance.randrange(2)]
+    if chance.random() < 0.3:
+        pairs.append(("include", ",".join(chance.sample(INCLUDED, chance.randrange(3)))))
+    for _ in range(chance.choice([0, 0, 1, 2])):
+        if pairs:
+            i = chance.randrange(len(pairs))
+            changed = chance.choice(NUMBERS), chance.choice(VALUES)
+            pairs[i] = (chance.choice([pairs[i][0], chance.choice(NAMES)]), chance.choice(changed)[:2000])
+        if chance.random() < 0.3 and pairs:
+            pairs.append(chance.choice(pairs))
+    text = "&".join(f"{quote(name, errors='replace')}={quote(value, errors='replace')}" for name, value in pairs)
+    raw = text.encode("ascii")
+    if chance.random() < 0.1:
+        raw = bytes(byte for byte in spoil(raw, chance) if 32 < byte < 127 and byte != 35)
+    return Request(chance.choice(["GET", "GET", "GET", "HEAD"]), path, raw, [(b"host", b"x")], b"")
+
+
+FIELDS = (
+    (b"accept", (b"text/plain", b"text/csv", b"*/*", b"application/json;q=0", b"\xff")),
+    (b"accept-encoding", (b"gzip", b"gzip;q=0", b"*", b"br;q=nan", b",,,")),
+    (b"range", (b"bytes=0-10", b"bytes=-5", b"bytes=9-1", b"bytes=0-0,5-9", b"bytes=99999999999999999999-", b"x")),
+    (b"if-none-match", (b"*", b'"x"', b'W/"x", "y"', b"\xff", b"," * 1000)),
+    (b"if-range", (b'"x"', b"Sun, 22 Nov 2026 10:00:00 GMT", b"yesterday")),
+    (b"x-request-id", (b"abc", b"\xff", b"a" * 500, b"a b")),
+    (b"x-forwarded-for", (b"1.2.3.4", b'a"b', b"\xff", b",", b"::1")),
+    (b"content-type", (b"application/json", b"text/csv", b"\xff", b"application/json; charset=utf-16", b"", b";")),
+    (b"content-encoding", (b"gzip", b"identity", b"")),
+    (b"authorization", (b"Bearer x", b"Basic =", b"\xff")),
+    (b"origin", (b"https://a.example", b"null", b"\xff")),
+    (b"expect", (b"x",)),
+)
+PATHS = (
+    *GETS, "/", "/docs", "/livez", "/readyz", "/healthz", "/metrics", "/openapi.json", "/Info", "/nowhere", "/v1/",
+    "//", "/static/page/main.js", "/static/page/map.json", "/static/page/../x", "/v1/mu-macro/batch/csv", "/%00", "/\u00e9",
+)  # fmt: skip
+
+
+def head_request(chance: random.Random) -> Request:
+    headers = [(b"host", b"x")]
+    for name, values in chance.sample(FIELDS, chance.randrange(5)):
+        headers.append((name, chance.choice(values)))
+        if chance.random() < 0.1:
+            headers.append(headers[-1])
+    method = chance.choice(["GET", "GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH"])
+    return Request(method, chance.choice(PATHS), chance.choice([b"", b"", b"mu0=1", b"?", b"&&&", b"%"]), headers, b"")
+
+
+def posted(path: str, kind: str, body: bytes) -> Request:
+    return Request("POST", path, b"", [(b"host", b"x"), (b"content-type", kind.encode())], body)
+
+
+KINDS: dict[str, tuple[int, Callable[[random.Random], Request]]] = {
+    "JSON to seven endpoints and four more of UM-Bridge": (35, json_request),
+    "lines": (15, lines_request),
+    "CSV": (10, csv_request),
+    "Arrow": (15, arrow_request),
+    "queries": (15, query_request),
+    "methods, paths and headers": (10, head_request),
+}
+
+
+def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
+    """Requests of one share of the work."""
+    chance = random.Random(seed)  # noqa: S311
+    names, weights = list(KINDS), [weight for weight, _ in KINDS.values()]
+    for _ in range(count):
+        name = chance.choices(names, weights)[0]
+        yield name, KINDS[name][1](chance)
+
+
+# --- asking -------------------------------------------------------------------------------------------
+
+
+def fault_of(request: Request, status: int, kind: bytes, body: bytes) -> str:
+    """What is wrong with an answer; nothing: empty."""
+    if status == 500 and b"InvalidOutput" in body and request.path in ("/Evaluate", "/Gradient", "/ApplyJacobian"):
+        return ""  # UM-Bridge's own status for a result that is not finite
+    if status not in FINE:
+        return f"status {status}"
+    if request.method != "HEAD" and kind.split(b";")[0] in (b"application/json", b"application/problem+json"):
+        try:
+            orjson.loads(body)
+        except ValueError:
+            return "the answer is not JSON"
+    return ""
+
+
+async def ask_app(app: Any, request: Request) -> tuple[int, bytes, bytes]:
+    """Status, media type and body of what the application answers."""
+    scope = {
+        "type": "http", "asgi": {"version": "3.0", "spec_version": "2.3"}, "http_version": "1.1", "scheme": "http",
+        "method": request.method, "path": request.path, "raw_path": request.path.encode(), "root_path": "",
+        "query_string": request.query, "client": ("127.0.0.1", 1), "server": ("127.0.0.1", 80), "state": {},
+        "headers": [*request.headers, (b"content-length", b"%d" % len(request.body))],
+    }  # fmt: skip
+    pieces: list[bytes] = []
+    start: dict[str, Any] = {}
+    given = False
+
+    async def receive() -> dict[str, Any]:
+        nonlocal given
+        if given:
+            await asyncio.sleep(3600.0)  # the caller stays
+        given = True
+        return {"type": "http.request", "body": request.body, "more_body": False}
+
+    async def send(message: dict[str, Any]) -> None:
+        if message["type"] == "http.response.start":
+            start.update(message)
+        else:
+            pieces.append(message.get("body", b""))
+
+    await app(scope, receive, send)
+    kind = next((value for name, value in start["headers"] if name.lower() == b"content-type"), b"")
+    return start["status"], kind, b"".join(pieces)
+
+
+class Found:
+    """What became of many requests."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.statuses: Counter[int] = Counter()
+        self.slowest = 0.0  # seconds of a processor
+        self.memory = 0.0  # megabytes more than after the first tenth
+        self.bad: list[tuple[str, str]] = []
+
+    def note(self, name: str, request: Request, status: int, fault: str, seconds: float) -> None:
+        """One answer."""
+        self.counts[name] += 1
+        self.statuses[status] += 1
+        self.slowest = max(self.slowest, seconds)
+        if seconds > HANG_S:
+            fault = fault or f"took {seconds:.1f} s"
+        if fault:
+            self.bad.append((fault, repr(request)[:4000]))
+
+
+def resident() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+async def ask_part(seed: int, count: int) -> Found:
+    """One share of the work, into an application in this process."""
+    from service.app import create_app
+    from service.settings import Settings
+
+    app = create_app(Settings(tables=(TABLE,)), wait=True)
+    found, before = Found(), 0.0
+    async with app.router.lifespan_context(app):
+        for i, (name, request) in enumerate(work(seed, count)):
+            if i == count // 10:
+                before = resident()
+            started = time.process_time()
+            try:
+                status, kind, body = await asyncio.wait_for(ask_app(app, request), 600.0)
+                fault = fault_of(request, status, kind, body)
+            except Exception as error:  # whatever it is, it is a finding
+                status, fault = 0, f"{type(error).__name__}: {error}"
+            found.note(name, request, status, fault, time.process_time() - started)
+    found.memory = resident() - before
+    return found
+
+
+def part(seed: int, count: int) -> None:
+    """The same as a process of its own, which prints what it found."""
+    found = asyncio.run(ask_part(seed, count))
+    print(json.dumps([found.counts, found.statuses, found.slowest, found.memory, found.bad]))
+
+
+def in_other_process(seed: int, count: int, found: Found) -> None:
+    """Have one share of the work done, and add what was found."""
+    command = [sys.executable, __file__, "part", str(seed), str(count)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=36_000, check=False)
+    if done.returncode:
+        found.bad.append((f"exit code {done.returncode}", f"seed {seed}: {done.stderr[-2000:]}"))
+        return
+    counts, statuses, slowest, memory, bad = json.loads(done.stdout.splitlines()[-1])
+    found.counts.update(counts)
+    found.statuses.update({int(status): count for status, count in statuses.items()})
+    found.slowest, found.memory = max(found.slowest, slowest), max(found.memory, memory)
+    found.bad += [(fault, f"seed {seed}: {text}") for fault, text in bad]
+
+
+def wire(request: Request) -> bytes:
+    """The request as bytes."""
+    target = quote(request.path, safe="/%.") + ("?" + request.query.decode("latin-1") if request.query else "")
+    lines = [f"{request.method} {target} HTTP/1.1".encode("latin-1", "replace")]
+    lines += [name + b": " + value for name, value in request.headers]
+    return b"\r\n".join([*lines, b"content-length: %d" % len(request.body), b"", b""]) + request.body
+
+
+async def ask_live(port: int, seed: int, count: int, found: Found) -> None:
+    """One share of the work over a socket."""
+    caller = Caller(port)
+    for name, request in work(seed, count):
+        if request.method == "HEAD":
+            continue  # has no body, whatever its head says
+        try:
+            reply = await asyncio.wait_for(caller.ask(wire(request)), 60.0)
+            fault = "" if reply.headers.get(b"content-encoding") else fault_of(
+                request, reply.status, reply.headers.get(b"content-type", b""), reply.body
+            )  # fmt: skip
+            status = reply.status
+        except (*FAULT, TimeoutError) as error:
+            status, fault = 0, f"{type(error).__name__}: {error}"
+        found.note(name, request, status, fault, 0.0)
+    caller.close()
+
+
+def strange_requests(share: float) -> str:
+    """All kinds, in the application and over a socket."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    started = time.perf_counter()
+    total = max(200, round(TOTAL * share))
+    straight, size = total - total // LIVE, min(PART, total)
+    found, live = Found(), Found()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        starts = range(0, straight, size)
+        list(pool.map(lambda i: in_other_process(i // size + 1, min(size, straight - i), found), starts))
+    with serving("--port", "0", "--tables", str(TABLE)) as server:
+        while sum(live.counts.values()) < total // LIVE:
+            seed = 10_000_000 + sum(live.counts.values())
+            asyncio.run(ask_live(server.port, seed, min(1000, total // LIVE), live))
+            if sum(live.counts.values()) <= 1000:
+                before = server.memory()
+        grown = server.memory() - before
+        assert server.ask("GET", "/readyz")[0] == 200
+        errors = [line for line in server.log.read_text().splitlines() if '"logger": "mumacro.error"' in line]
+        code = server.stop()
+    for fault, text in (found.bad + live.bad)[:50]:
+        progress(f"{fault}: {text}")
+    rows = [[name, f"{found.counts[name]:,}", f"{live.counts[name]:,}"] for name in KINDS]
+    rows.append(["all", f"{sum(found.counts.values()):,}", f"{sum(live.counts.values()):,}"])
+    statuses = found.statuses + live.statuses
+    told = ", ".join(f"{status}: {count:,}" for status, count in sorted(statuses.items()))
+    bad = Counter(fault for fault, _ in found.bad + live.bad)
+    text = (
+        f"Statuses: {told}. Bad answers, crashes and answers that took more than {HANG_S:.0f} s: {sum(bad.values())}. "
+        f"Slowest {found.slowest:.2f} s of a processor. A process of {size:,} requests took at most "
+        f"{found.memory:.0f} MB more than after its first tenth, the running service {grown:.0f} MB more than after "
+        f"its first thousand; {len(errors)} unexpected errors in its log, exit code {code}."
+    )
+    if bad or errors or code:
+        text += f" FAILED: {dict(bad)}"
+    head = ("what is changed", "straight into the application", "over a socket")
+    return f"{markdown(head, rows)}\n\n{text}\n\n{reporting.took(started)}"
+
+
+SECTIONS = {"strange_requests": strange_requests}
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["part"]:
+        part(int(sys.argv[2]), int(sys.argv[3]))
+    elif sys.argv[1:2] == ["again"]:
+        for fault, text in asyncio.run(ask_part(int(sys.argv[2]), PART)).bad:
+            print(f"{fault}: {text}")
+    else:
+        reporting.report(__doc__ or "", SECTIONS)
