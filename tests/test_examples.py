@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import urllib.request
+from xml.sax.saxutils import escape
 
 import numpy as np
 import pytest
@@ -94,6 +95,69 @@ def test_the_spreadsheets_addresses(repository, live_server, surrogate):
             assert float(row[1]) == pytest.approx(expected, rel=1e-14)
     for column in re.findall(r'\{"([^"]+)", type number\}', text):
         assert column in ("v0 [m/s]", "mu_macro [-]")
+
+
+def test_libreoffice_calc(repository, live_server, surrogate, tmp_path):
+    """The formulas and the linked table of spreadsheet.md, typed into a sheet, and what its cells then show."""
+    need("soffice")
+    text = (repository / "examples" / "spreadsheet.md").read_text("utf-8")
+    text = text.replace("http://127.0.0.1:8000", live_server.url)
+    formulas = re.findall(r"^ {4}(=.*WEBSERVICE.*)$", text, re.MULTILINE)
+    (address,) = re.findall(r"^ {4}(http://\S+along=Fz\S+)$", text, re.MULTILINE)
+    assert len(formulas) == 2
+    cells = {"A1": "2e-6", "B1": formulas[0], "C1": formulas[1]}
+    cells |= {f"{x}2": cells[f"{x}1"].replace("A1", "A2") for x in "BC"} | {"A2": "2e-5"}
+    cells |= {"A3": "-1", "B3": formulas[0].replace("A1", "A3")}
+    found = in_calc(cells, address, 5, tmp_path)
+    for row, y0 in zip(found[:2], (2e-6, 2e-5), strict=True):
+        answer = surrogate.evaluate(**{**CASE, "y0": y0})
+        assert float(row[1]) == pytest.approx(answer.mu_macro, rel=1e-14)
+        assert row[2] == answer.regime
+    assert found[2][:2] == ["-1", "#VALUE!"]
+    header, *law = found[5:]
+    assert header[:2] == ["Fz [N]", "mu_macro [-]"]
+    assert len(law) == 50
+    expected = surrogate.evaluate(**{**CASE, "Fz": np.array([float(row[0]) for row in law])}).mu_macro
+    assert [float(row[1]) for row in law] == pytest.approx(expected, rel=1e-14)
+
+
+def in_calc(cells, link, below, folder):
+    """What LibreOffice Calc shows, as rows of text, after cells were typed and a table was linked below some rows."""
+    profile, out = folder / "profile", folder / "shown.csv"
+
+    def quoted(text):
+        return '"' + text.replace('"', '""') + '"'
+
+    typed = "\n".join(f"s.getCellRangeByName({quoted(at)}).FormulaLocal = {quoted(text)}" for at, text in cells.items())
+    macro = f"""Sub Main()
+        Dim hidden(0) As New com.sun.star.beans.PropertyValue
+        hidden(0).Name = "Hidden" : hidden(0).Value = True
+        doc = StarDesktop.loadComponentFromURL("private:factory/scalc", "_blank", 0, hidden())
+        s = doc.Sheets.getByIndex(0)
+        {typed}
+        Dim at As New com.sun.star.table.CellAddress
+        at.Row = {below}
+        csv = "Text - txt - csv (StarCalc)"
+        doc.AreaLinks.insertAtPosition(at, {quoted(link)}, "CSV_all", csv, "44,34,UTF-8,1,,1033")
+        Dim how(1) As New com.sun.star.beans.PropertyValue
+        how(0).Name = "FilterName" : how(0).Value = csv
+        how(1).Name = "FilterOptions" : how(1).Value = "44,34,UTF-8,1,,1033,false,false"
+        doc.storeToURL({quoted(out.as_uri())}, how())
+        doc.close(True)
+        StarDesktop.terminate()
+        End Sub"""
+    module = (
+        '<?xml version="1.0" encoding="UTF-8"?><s:module xmlns:s="http://openoffice.org/2000/script" s:name="Module1" '
+        f's:language="StarBasic">{escape(macro)}</s:module>'
+    )
+    office = ["soffice", f"-env:UserInstallation={profile.as_uri()}", "--headless", "--norestore"]
+    subprocess.run([*office, "--terminate_after_init"], capture_output=True, timeout=300, check=True)  # its presets
+    (profile / "user" / "basic" / "Standard" / "Module1.xba").write_text(module, "utf-8")
+    start = [*office, "macro:///Standard.Module1.Main()"]
+    done = subprocess.run(start, capture_output=True, text=True, timeout=300, check=False)
+    assert out.exists(), done.stdout + done.stderr
+    with out.open(newline="", encoding="utf-8") as stream:
+        return list(csv.reader(stream))
 
 
 def test_octave(repository, live_server, surrogate):
