@@ -225,13 +225,9 @@ class AccessLog:
         self, identity: str, method: str, path: str, status: int, seconds: float, client: str | None, key: str | None,
         *, quiet: bool = False,
     ) -> None:  # fmt: skip
-<<<<<<< HEAD
         """Write the line of one finished request; ``quiet`` requests (successful probes) are logged at ``debug``."""
-=======
-        """Write the line of one finished request; ``quiet`` for probes, which say nothing while they succeed."""
         if client is not None:
             client = client[:_MOST_SHOWN]
->>>>>>> reliability
         if self._put is not None and not quiet and status == 200 and path in _KNOWN and method in _METHODS:
             self._put((time.time(), identity, self._texts[method, path, status], seconds, client, key))
             return
