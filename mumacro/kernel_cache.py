@@ -138,7 +138,7 @@ class _Stored:
         if compiled.lifted or compiled.library.has_dynamic_globals:  # such code is of this process alone
             return
         path, what = self._place(signature, compiled.codegen)
-        content = dumps(_form.reduce(compiled))
+        content = dumps(_form.reduce(compiled))  # type: ignore[no-untyped-call]
         try:
             write_whole(path, hashlib.sha256(what + content).digest() + content)
         except OSError as error:

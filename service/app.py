@@ -33,7 +33,7 @@ from . import __version__, numbers
 from .connection import Connection
 from .errors import answer_problem, invalid_request
 from .formats.columns import numbers_ready
-from .guard import Guard, Work, path_of
+from .guard import Guard, Keys, Work, path_of
 from .logs import AccessLog
 from .metrics import Metrics
 from .middleware import HEALTH_PATHS, Compression, RequestRecord
@@ -142,7 +142,7 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
     if settings is None:
         settings = load_settings()
     metrics, access_log, tables, work = Metrics(), AccessLog(), Tables(settings.tables), Work(settings)
-    keys, open_paths = settings.keys(), _OPEN_PATHS | _guide_paths(settings.guide)
+    keys, open_paths = Keys(settings.keys()), _OPEN_PATHS | _guide_paths(settings.guide)
     cors = [
         Middleware(
             CORSMiddleware, allow_origins=list(settings.cors_origins), allow_methods=["GET", "HEAD", "POST"],
@@ -162,9 +162,9 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
         telemetry={"metrics": False, "logs": False, "tracing": settings.tracing},
         middleware=[
             *cors,
+            Middleware(SingleCase, tables=tables, settings=settings, metrics=metrics, log=access_log, keys=keys),
             Middleware(RequestRecord, metrics=metrics, log=access_log, tables=tables),
             Middleware(Guard, keys=keys, open_paths=open_paths, max_bytes=settings.max_body_bytes),
-            Middleware(SingleCase, tables=tables, settings=settings, metrics=metrics),
             Middleware(Compression),
         ],
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .hints import TOO_FREQUENT
 from .kernel import BOUNDS, FIELDS, RAD_PER_CYCLE, REGIME_NAMES, SOURCES, Array
 from .quantities import QUANTITIES, Cases, compute, nested, parts_of
-from .schemas import RequestFields
+from .schemas import InputStd
 from .tables import LoadedTable, signature
 
 __all__ = [
@@ -94,16 +94,16 @@ def default_answer(table: LoadedTable, inputs: tuple[float, ...]) -> tuple[dict[
     }, source
 
 
-def answer_case(table: LoadedTable, case: RequestFields) -> tuple[dict[str, Any], int]:
-    """The whole answer to one checked case, as plain Python values, and the code of its source."""
-    inputs = case.inputs()
+def answer_case(
+    table: LoadedTable, inputs: tuple[float, ...], include: Sequence[str] = (), std: InputStd | None = None
+) -> tuple[dict[str, Any], int]:
+    """The whole answer to six legal inputs, as plain Python values, and the code of its source."""
     values, source = default_answer(table, inputs)
-    include = case.names()
     if include:
         columns = [np.array([value]) for value in inputs]
         numbers = np.array([values["mu_macro"]]), np.array([values["error_bound"]]), np.array([source], dtype=np.int8)
-        std = case.std.of_inputs() if case.std is not None else {}
-        found = _quantities(table, columns, *numbers, include, std)
+        deviations = std.of_inputs() if std is not None else {}
+        found = _quantities(table, columns, *numbers, include, deviations)
         kinds = {part.path: part.kind for part in parts_of(include)}
         values.update(nested({path: kinds[path](column[0]) for path, column in found.items()}))
     values.update(signature(table))

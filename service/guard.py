@@ -29,7 +29,7 @@ from .errors import (
 )
 from .settings import Settings
 
-__all__ = ["BATCH_PATH", "CASE_PATH", "CLOSE", "SMALL_BODY", "Guard", "Work", "check_media_type", "path_of"]
+__all__ = ["BATCH_PATH", "CASE_PATH", "CLOSE", "SMALL_BODY", "Guard", "Keys", "Work", "check_media_type", "path_of"]
 
 T = TypeVar("T")
 
@@ -49,23 +49,52 @@ def path_of(scope: Scope) -> str:
     return path.removeprefix(root) if root else path
 
 
+class Keys:
+    """API keys and the names of their holders; with none, the service is open to all.
+
+    Parameters
+    ----------
+    keys : mapping
+        API key -> name of its holder.
+    """
+
+    def __init__(self, keys: Mapping[str, str]) -> None:
+        self._keys = [(key.encode("ascii"), name) for key, name in keys.items()]
+
+    def __bool__(self) -> bool:
+        return bool(self._keys)
+
+    def holder(self, headers: Mapping[bytes, bytes]) -> str | None:
+        """Whose key a request carries; None: no known one."""
+        if not self._keys:
+            return None
+        offered = headers.get(b"x-api-key")
+        if offered is None:
+            scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
+            offered = credentials.strip() if scheme.lower() == b"bearer" else b""
+        found = None
+        for key, name in self._keys:  # all of them: how long it takes tells nothing
+            if secrets.compare_digest(offered, key):
+                found = name
+        return found
+
+
 class Guard:
     """Middleware: refuses what is not a request for this service before its body is read.
 
     Parameters
     ----------
-    keys : mapping
-        API key -> name of its holder; empty: open to all.
+    keys : Keys
     open_paths : frozenset of str
         Need no key.
     max_bytes : int
         Of a body; single questions may have up to 64 KiB of it.
     """
 
-    def __init__(self, app: ASGIApp, keys: Mapping[str, str], open_paths: frozenset[str], max_bytes: int) -> None:
+    def __init__(self, app: ASGIApp, keys: Keys, open_paths: frozenset[str], max_bytes: int) -> None:
         self.app = app
         self._max_bytes = min(SMALL_BODY, max_bytes)
-        self._keys = [(key.encode("ascii"), name) for key, name in keys.items()]
+        self._keys = keys
         self._open_paths = open_paths
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -95,19 +124,12 @@ class Guard:
         await self.app(scope, receive, send)
 
     def _admit(self, scope: Scope, headers: Mapping[bytes, bytes]) -> None:
-        offered = headers.get(b"x-api-key")
-        if offered is None:
-            scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
-            offered = credentials.strip() if scheme.lower() == b"bearer" else b""
-        found = None
-        for key, name in self._keys:  # all of them: how long it takes tells nothing
-            if secrets.compare_digest(offered, key):
-                found = name
-        if found is None:
+        holder = self._keys.holder(headers)
+        if holder is None:
             raise UnauthorizedError(
                 "send the API key as X-API-Key or as Authorization: Bearer", headers={"WWW-Authenticate": "Bearer"}
             )
-        scope.setdefault("state", {})["key_name"] = found
+        scope.setdefault("state", {})["key_name"] = holder
 
 
 def _refuse_repeated(scope: Scope) -> None:

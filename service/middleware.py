@@ -1,6 +1,6 @@
 """Pure ASGI middleware: the record of a request, and compression.
 
-Outermost first: CORS (if set), RequestRecord, Guard, SingleCase, Compression, then the router.  What is added with
+Outermost first: CORS (if set), SingleCase, RequestRecord, Guard, Compression, then the router.  What is added with
 ``app.add_middleware`` stands before all of them.
 """
 
@@ -18,12 +18,12 @@ from .logs import AccessLog, accept_request_id, request_id
 from .metrics import Metrics
 from .tables import Tables
 
-__all__ = ["COMPRESS_FROM", "HEALTH_PATHS", "Compression", "RequestRecord"]
+__all__ = ["COMPRESS_FROM", "HEALTH_PATHS", "NOSNIFF", "Compression", "RequestRecord"]
 
 #: bytes of an answer that is worth packing
 COMPRESS_FROM = 16 * 1024
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
-_NOSNIFF = (b"x-content-type-options", b"nosniff")
+NOSNIFF = (b"x-content-type-options", b"nosniff")
 _CLOSE = (b"connection", b"close")
 
 _errors = logging.getLogger("mumacro.error")
@@ -62,7 +62,7 @@ class RequestRecord:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                headers = [*message["headers"], (b"x-request-id", identity.encode("ascii")), _NOSNIFF]
+                headers = [*message["headers"], (b"x-request-id", identity.encode("ascii")), NOSNIFF]
                 if close and _CLOSE not in headers:
                     headers.append(_CLOSE)
                 message["headers"] = headers

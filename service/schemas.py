@@ -22,8 +22,8 @@ from .kernel import FIELDS, MOST_HZ, RAD_PER_CYCLE
 from .quantities import QUANTITIES, Part
 
 __all__ = [
-    "INCLUDES", "Answered", "BatchColumns", "BatchFault", "BatchQuery", "Case", "CaseAnswer", "CaseQuery",
-    "CaseRequest", "ColumnsAnswer", "Health", "InputStd", "NotNegative", "Options", "Positive", "Problem",
+    "INCLUDES", "MAX_INCLUDE", "Answered", "BatchColumns", "BatchFault", "BatchQuery", "Case", "CaseAnswer",
+    "CaseQuery", "CaseRequest", "ColumnsAnswer", "Health", "InputStd", "NotNegative", "Options", "Positive", "Problem",
     "RequestFields", "Result", "RowsAnswer", "Stiffness", "TableAnswer", "TableChoice", "TableLabel", "canonical",
     "examples", "relation", "split_names", "std_fault",
 ]  # fmt: skip

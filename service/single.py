@@ -1,20 +1,29 @@
-"""The short way: one good case is answered ahead of the router, inside the middleware stack.
+"""The short way: one plain case is answered at the front of this application's middleware.
 
-Whatever is not plainly good - a fault, a condition, an odd header - goes on to the router, whose routes read the same
-request with the same model and find the words for it.  So there is one definition of what is right, in schemas.py, and
-every refusal is written in one place.
+A plain case is six numbers, and perhaps names of quantities and a tolerance.  msgspec reads it.  Whatever is not plain
+(a fault, a word, a name given twice, a condition, an unusual header) goes on to the record, the guard and the router,
+whose routes read the same request with the models of schemas.py and find the words for it.  So every refusal is written
+once.
 """
 
+import math
+import time
+from typing import Annotated, Any, Literal
+
+import msgspec
 import orjson
-from pydantic import ValidationError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import API_VERSION
 from .errors import InvalidFieldsError
 from .evaluation import answer_case, case_etag, default_answer
-from .guard import CASE_PATH, path_of
+from .guard import CASE_PATH, Keys, path_of
+from .kernel import MOST_HZ, RAD_PER_CYCLE
+from .logs import AccessLog, accept_request_id
 from .metrics import Metrics
-from .schemas import RequestFields
+from .middleware import NOSNIFF
+from .quantities import QUANTITIES
+from .schemas import MAX_INCLUDE, canonical
 from .settings import Settings, cache_fields
 from .tables import LoadedTable, Tables
 
@@ -23,58 +32,124 @@ __all__ = ["SingleCase"]
 _MANY = 4  # digits of a Content-Length that no single case has
 _JSON = frozenset({b"application/json", b"application/json; charset=utf-8", b"application/json;charset=utf-8"})
 _PLAIN_QUERY = b"0123456789.eE+-=&" + "".join(sorted(set("mu0Fzky0omegafv0tolerance"))).encode()
-_validate = RequestFields.__pydantic_validator__.validate_json
 _TYPE = (b"content-type", b"application/json")
+
+_Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+_NotNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+_Quick: Any = Literal[tuple(name for name in QUANTITIES if name != "std")]  # std takes its time: in a thread
+
+
+class _Plain(msgspec.Struct, forbid_unknown_fields=True, gc=False):
+    """A case as it mostly comes; anything else is not refused but read again."""
+
+    mu0: _Positive
+    Fz: _Positive
+    k: _Positive | None
+    y0: _NotNegative
+    v0: _NotNegative
+    omega: _NotNegative | None = None
+    f: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_HZ)] | None = None
+    include: Annotated[list[_Quick], msgspec.Meta(max_length=MAX_INCLUDE)] | None = None
+    tolerance: _Positive | None = None
+
+
+_decode = msgspec.json.Decoder(_Plain).decode
+
+
+def _read(text: bytes) -> _Plain | None:
+    try:
+        case = _decode(text)
+    except (msgspec.MsgspecError, ValueError, RecursionError):
+        return None
+    # No string of a plain case holds a colon: more of them than members means a name given twice.
+    members = 6 + (case.include is not None) + (case.tolerance is not None)
+    return case if text.count(b":") == members and (case.omega is None) != (case.f is None) else None
+
+
+def _inputs(case: _Plain) -> tuple[float, float, float, float, float, float]:
+    """The six inputs in the order of FIELDS; k = inf is rigid contact."""
+    omega = case.omega if case.omega is not None else RAD_PER_CYCLE * (case.f or 0.0)
+    return case.mu0, case.Fz, math.inf if case.k is None else case.k, case.y0, omega, case.v0
 
 
 class SingleCase:
-    """Middleware: ``POST`` and ``GET /v1/mu-macro`` for one good case."""
+    """Middleware: ``POST`` and ``GET /v1/mu-macro`` for one plain case."""
 
-    def __init__(self, app: ASGIApp, tables: Tables, settings: Settings, metrics: Metrics) -> None:
+    def __init__(
+        self, app: ASGIApp, tables: Tables, settings: Settings, metrics: Metrics, log: AccessLog, keys: Keys
+    ) -> None:
         self.app = app
         self.answered = 0  # how many went this way
-        self._tables = tables
-        self._metrics = metrics
+        self._tables, self._metrics, self._log, self._keys = tables, metrics, log, keys
         self._kept = [(name.encode("ascii"), value.encode("ascii")) for name, value in cache_fields(settings).items()]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, or hand the request on with nothing taken from it."""
-        if scope["type"] != "http" or path_of(scope) != CASE_PATH or self._tables.fault is not None:
+        started = time.perf_counter()
+        if scope["type"] != "http" or path_of(scope) != CASE_PATH:
             await self.app(scope, receive, send)
             return
-        headers = dict(scope["headers"])
+        method = scope["method"]
+        headers: dict[bytes, bytes] = dict(scope["headers"])
         reply = None
-        if scope["method"] == "GET":
-            if b"if-none-match" not in headers and b"text/" not in headers.get(b"accept", b""):
+        if self._is_plain(scope, headers):
+            if method == "GET":
                 reply = self._get(scope["query_string"])
-        elif scope["method"] == "POST" and _is_short(scope, headers):
-            message = await receive()
-            receive = _again(message, receive)
-            if message["type"] == "http.request" and not message.get("more_body"):
-                reply = self._post(message.get("body", b""))
+            else:
+                message = await receive()
+                receive = _again(message, receive)
+                if message["type"] == "http.request" and not message.get("more_body"):
+                    reply = self._post(message.get("body", b""))
         if reply is None:
             await self.app(scope, receive, send)
             return
         self.answered += 1
         content, fields = reply
-        fields = [(b"content-length", b"%d" % len(content)), _TYPE, *fields]
+        identity = accept_request_id(headers.get(b"x-request-id"))
+        fields = [
+            (b"content-length", b"%d" % len(content)), _TYPE, *fields,
+            (b"x-request-id", identity.encode("ascii")), NOSNIFF,
+        ]  # fmt: skip
         await send({"type": "http.response.start", "status": 200, "headers": fields})
         await send({"type": "http.response.body", "body": content})
+        seconds = time.perf_counter() - started
+        self._metrics.count(CASE_PATH, method, 200, seconds)
+        client = scope.get("client")
+        self._log.write(
+            identity, method, CASE_PATH, 200, seconds, client[0] if client else None, self._keys.holder(headers)
+        )
+
+    def _is_plain(self, scope: Scope, headers: dict[bytes, bytes]) -> bool:
+        """Whether the head of a request promises one plain case that may be answered."""
+        if (
+            len(headers) != len(scope["headers"])
+            or b"upgrade" in headers
+            or self._tables.fault is not None
+            or self._tables.draining
+            or (self._keys and self._keys.holder(headers) is None)
+        ):
+            return False
+        if scope["method"] == "GET":
+            return b"if-none-match" not in headers and b"text/" not in headers.get(b"accept", b"")
+        return (
+            scope["method"] == "POST"
+            and 0 < len(headers.get(b"content-length", b"")) < _MANY
+            and headers.get(b"content-type", b"application/json") in _JSON
+            and not scope["query_string"]
+            and b"content-encoding" not in headers
+        )
 
     def _post(self, body: bytes) -> tuple[bytes, list[tuple[bytes, bytes]]] | None:
-        try:
-            case = _validate(body)
-        except ValidationError:
+        case = _read(body)
+        table = None if case is None else self._table(case)
+        if case is None or table is None:
             return None
-        table = self._table(case)
-        if table is None or case.fault() is not None:
-            return None
-        if case.include:
-            if not self._tables.warm or "std" in case.include:
-                return None  # in a thread: what is not loaded yet, or takes its time
-            values, source = answer_case(table, case)
+        if not case.include:
+            values, source = default_answer(table, _inputs(case))
+        elif self._tables.warm:
+            values, source = answer_case(table, _inputs(case), canonical(case.include))
         else:
-            values, source = default_answer(table, case.inputs())
+            return None  # in a thread: what is not loaded yet takes its time
         return self._written(table, values, source), []
 
     def _get(self, query: bytes) -> tuple[bytes, list[tuple[bytes, bytes]]] | None:
@@ -82,22 +157,16 @@ class SingleCase:
         # in its own way has a character or a word that is not let through here, or is no JSON after this.
         if query.translate(None, _PLAIN_QUERY):
             return None
-        try:
-            case = _validate(b'{"' + query.replace(b"=", b'":').replace(b"&", b',"') + b"}")
-        except ValidationError:
+        case = _read(b'{"' + query.replace(b"=", b'":').replace(b"&", b',"') + b"}")
+        table = None if case is None else self._table(case)
+        if case is None or table is None or case.k is None:  # a query has no null
             return None
-        # fewer fields than names: one is given twice
-        if len(case.model_fields_set) != query.count(b"&") + 1 or case.k is None or case.fault() is not None:
-            return None
-        table = self._table(case)
-        if table is None:
-            return None
-        inputs = case.inputs()
+        inputs = _inputs(case)
         values, source = default_answer(table, inputs)
         etag = case_etag(table, inputs, (), None)
         return self._written(table, values, source), [(b"etag", etag.encode("ascii")), *self._kept]
 
-    def _table(self, case: RequestFields) -> LoadedTable | None:
+    def _table(self, case: _Plain) -> LoadedTable | None:
         if case.tolerance is None:
             return self._tables.loaded[0]
         try:
@@ -110,16 +179,6 @@ class SingleCase:
         values["api_version"] = API_VERSION
         self._metrics.cells[table.cell + source] += 1.0
         return orjson.dumps(values)
-
-
-def _is_short(scope: Scope, headers: dict[bytes, bytes]) -> bool:
-    """Whether the head of a request promises one case, plainly put."""
-    return (
-        0 < len(headers.get(b"content-length", b"")) < _MANY
-        and headers.get(b"content-type", b"application/json") in _JSON
-        and not scope["query_string"]
-        and b"content-encoding" not in headers
-    )
 
 
 def _again(message: Message, receive: Receive) -> Receive:

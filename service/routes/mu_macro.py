@@ -41,7 +41,9 @@ async def _answered(request: Request, table: LoadedTable, case: RequestFields) -
     # Code that is not loaded yet, or takes long, runs in a thread.
     costly = case.include and (not request.app.state.tables.warm or cost_of(case.names()) > 100)
     work = request.app.state.work
-    values, source = await work.run(lambda: answer_case(table, case), float("inf") if costly else 0.0)
+    values, source = await work.run(
+        lambda: answer_case(table, case.inputs(), case.names(), case.std), float("inf") if costly else 0.0
+    )
     metrics: Metrics = request.app.state.metrics
     metrics.cells[table.cell + source] += 1.0
     answer: dict[str, Any] = values
