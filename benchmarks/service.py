@@ -25,7 +25,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,14 +140,13 @@ def running(name: str, command: Sequence[str], port: int, path: str) -> Iterator
         try:
             deadline = time.monotonic() + 120
             while True:
-                try:
-                    server.ask("GET", path)
-                    break
-                except OSError:
-                    if process.poll() is not None or time.monotonic() > deadline:
-                        log.seek(0)
-                        raise RuntimeError(f"{name} did not start: {log.read()[-2000:].decode()}") from None
-                    time.sleep(0.01)
+                with suppress(OSError):
+                    if server.ask("GET", path)[0] < 500:  # one that listens is not ready yet
+                        break
+                if process.poll() is not None or time.monotonic() > deadline:
+                    log.seek(0)
+                    raise RuntimeError(f"{name} did not start: {log.read()[-2000:].decode()}")
+                time.sleep(0.01)
             yield server
         finally:
             if process.poll() is None:
