@@ -158,9 +158,15 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
 
 def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:
     """l0 = mu0 Fz / k [m], eq. (5), whatever overflows on the way; 0 for rigid contact."""
+    mu0, Fz, k = np.broadcast_arrays(mu0, Fz, k)
     with np.errstate(all="ignore"):
-        (a, i), (b, j), (c, n) = (np.frexp(x) for x in (mu0, Fz, k))
-        out: Array = np.ldexp(a * (b / c), i + j - n)
+        quotient = Fz / k
+        out = np.asarray(mu0 * quotient)
+        low, high = np.minimum(quotient, out), np.maximum(quotient, out)
+        odd = ~((low > 1e-290) & (high < 1e290))  # there a partial result may have lost digits
+        if odd.any():
+            (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
+            out[odd] = np.ldexp(a * (b / c), i + j - n)
     return out
 
 

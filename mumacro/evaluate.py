@@ -199,12 +199,13 @@ def others(
 ) -> None:  # fmt: skip
     """Finish what the passes marked: closed forms, the corner, limits; NaN and -1 for illegal points."""
     for i in range(v.size):
-        if source[i] == FAST:
-            value[i], error, _ = _fast(quantity, v[i], y[i])
-        elif source[i] in (CORNER, OTHER):
-            value[i], error, source[i] = answer(quantity, v[i], y[i], coef, blocks, border, pieces)
-        else:
+        code = np.int64(source[i])
+        if code < FAST and code != CORNER:
             continue
+        if code == FAST:
+            value[i], error, _ = _fast(quantity, v[i], y[i])
+        else:
+            value[i], error, source[i] = answer(quantity, v[i], y[i], coef, blocks, border, pieces)
         if bound.size > 0:
             bound[i] = error
 
