@@ -338,7 +338,7 @@ def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> Non
     expected = table.evaluate(**PLAIN).mu_macro
     assert table.evaluate({**PLAIN, "note": "passed by"}).mu_macro == expected
     assert table.evaluate(rest, v0=PLAIN["v0"]).mu_macro == expected
-    with pytest.raises(InputError, match=r"^v0 must be said once"):
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(PLAIN, v0=1.0)
     with pytest.raises(InputError, match=r"^speed must be one of mu0, "):
         table.evaluate(**PLAIN, speed=1.0)

@@ -126,14 +126,14 @@ def test_units_in_brackets_are_converted_exactly(table):
 @pytest.mark.parametrize(
     ("names", "parts"),
     [
-        (["mu0", "Fz", "K", "y0", "omega", "v0"], ["no column k", "'K' looks like it", "rename it to k [N/m]"]),
-        (["mu0", "Fz", "stiffness", "y0", "omega", "v0"], ["'stiffness' looks like it"]),
-        (["mu0", "Fz", "K [N/mm]", "y0", "omega", "v0"], ["'K [N/mm]' looks like it"]),
+        (["mu0", "Fz", "K", "y0", "omega", "v0"], ["no column k", "'K' is similar", "rename that column to k [N/m]"]),
+        (["mu0", "Fz", "stiffness", "y0", "omega", "v0"], ["'stiffness' is similar"]),
+        (["mu0", "Fz", "K [N/mm]", "y0", "omega", "v0"], ["'K [N/mm]' is similar"]),
         (["mu0", "Fz", "k [psi]", "y0", "omega", "v0"], ["unit that k cannot have", "N/mm"]),
         (["mu0", "Fz", "k", "y0", "omega [Hz]", "v0"], ["a frequency is f [Hz]"]),
         (["mu0", "Fz", "y0", "omega", "v0"], ["no column k [N/m]", "--rigid"]),
         (["mu0", "Fz", "k", "y0", "v0"], ["omega [rad/s] or f [Hz]"]),
-        (["mu0", "Fz", "k", "y0", "frequency", "v0"], ["'frequency' looks like it", "rename it to f [Hz]"]),
+        (["mu0", "Fz", "k", "y0", "frequency", "v0"], ["'frequency' is similar", "rename that column to f [Hz]"]),
         (["mu0", "Fz", "k", "y0", "omega", "f", "v0"], ["both f [Hz] and omega"]),
         (["mu0", "Fz", "k", "k [N/mm]", "y0", "omega", "v0"], ["k is there twice"]),
         (["mu0", "mu0", "Fz", "k", "y0", "omega", "v0"], ["'mu0' is there twice"]),

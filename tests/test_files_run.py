@@ -479,7 +479,7 @@ def test_a_disk_that_is_full_is_told_in_a_line_and_the_run_goes_on_later(tmp_pat
     ("content", "parts"),
     [
         ("", ["is empty"]), ("a;b;c\n1;2;3\n", ["separated by commas"]), ("a,b\n1,2\n", ["no column mu0 [-]"]),
-        ("mu0,Fz,y0,omega,v0\n", ["no column k", "--rigid"]), ("mu0,Fz,K,y0,omega,v0\n", ["'K' looks like it"]),
+        ("mu0,Fz,y0,omega,v0\n", ["no column k", "--rigid"]), ("mu0,Fz,K,y0,omega,v0\n", ["'K' is similar"]),
         ("mu0,Fz,k,y0,omega,v0,v0 [m/s]\n", ["v0 is there twice"]), (f"{HEADER},source\n", ["would be written twice"]),
         ('"mu0,Fz\n', ["line 1 is no header"]),
     ],
@@ -527,7 +527,7 @@ def test_a_file_without_rows_gives_a_file_without_rows(tmp_path, table, kind):
 
 def test_misnamed_keys_of_ndjson_are_refused(tmp_path, capsys):
     (tmp_path / "cases.ndjson").write_text(json.dumps({"K" if n == "k" else n: v for n, v in CASE.items()}))
-    assert "'K' looks like it" in ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
+    assert "'K' is similar" in ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path, repository):

@@ -138,7 +138,7 @@ def test_policies_hold_for_labels_too(table: Surrogate) -> None:
         table.evaluate(frame, illegal="raise")
     with pytest.raises(InputError, match=r"^Fz must be given"):
         table.evaluate(frame.drop(columns="Fz"))
-    with pytest.raises(InputError, match=r"^v0 must be said once"):
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(frame, v0=1.0)
     with pytest.raises(InputError, match=r"^k must be given"):
         table.evaluate(frame.drop(columns="k"))

@@ -210,7 +210,7 @@ def solve_for(
     Returns
     -------
     Solution
-        All roots of every target, ascending, each with the interval that the error bound leaves; and what is in reach.
+        All roots of every target, ascending, each with its interval from the error bound; and the reachable range.
 
     Raises
     ------
