@@ -167,7 +167,9 @@ def test_a_full_disk_in_a_sweep_is_told_and_what_is_finished_is_kept(tmp_path: P
             sweep.solve("full", v[:20], y[:20])
             kept = faults.left(disk)
             many = np.geomspace(0.1, 10.0, 600)  # 29 kB of results
-            with pytest.raises(CheckpointError, match=r"work\.checkpoint: finished work cannot be stored: No space left"):
+            with pytest.raises(
+                CheckpointError, match=r"work\.checkpoint: finished work cannot be stored: No space left"
+            ):
                 sweep.solve("full", many, many)
             assert faults.left(disk) == kept
     except faults.NotTriedError as error:
