@@ -138,7 +138,7 @@ def test_the_columns_of_a_law_are_all_described() -> None:
     assert [name for name in (*APPROXIMATIONS, *BORDERS) if f"`{name}`" not in page] == []
 
 
-def test_every_formula_says_how_far_it_is_off() -> None:
+def test_every_formula_states_its_largest_deviation() -> None:
     for name in closed_forms.__all__:
         item = getattr(closed_forms, name)
         if callable(item) and name != "agm":
@@ -147,6 +147,6 @@ def test_every_formula_says_how_far_it_is_off() -> None:
             assert any(word in text for word in words), name
 
 
-def test_nothing_is_said_to_be_missing_from_the_paper() -> None:
+def test_no_page_calls_a_part_of_the_paper_missing() -> None:
     for page in PAGES:
         assert "not at hand" not in page.read_text("utf-8").lower()

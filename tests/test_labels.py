@@ -261,7 +261,7 @@ def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
         xr.testing.assert_identical(found.compute(), whole)
 
 
-def test_an_illegal_value_of_a_chunk_is_told_when_it_is_computed(table: Surrogate) -> None:
+def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surrogate) -> None:
     da = pytest.importorskip("dask.array")
     v0 = da.from_array(np.array([0.01, -1.0, 0.02]), chunks=2)
     found = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")

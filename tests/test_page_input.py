@@ -105,7 +105,7 @@ def test_a_typed_value_applies_on_commit(open_page, surrogate, case):
     assert page.complaints() == []
 
 
-def test_a_bad_value_greys_the_result_and_says_why(open_page, surrogate, case):
+def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate, case):
     from selenium.webdriver import Keys
 
     page = open_page()
@@ -209,7 +209,7 @@ def answered_by(open_page):
     open_page.shown = None
 
 
-def test_a_busy_a_refusing_and_a_slow_service_are_told_apart(open_page, answered_by):
+def test_a_busy_a_refusing_and_a_slow_service_have_their_own_messages(open_page, answered_by):
     page = open_page()
     said = "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { 'Retry-After': '1' } })"
     answered_by(page, f"async () => {said % 503}")
@@ -274,7 +274,7 @@ def test_a_link_reproduces_the_state(open_page):
         ("std_mu0=1&start=z", "start = z (“z” is not a number); std_mu0 = 1 (unknown)"),
     ],
 )
-def test_a_link_with_bad_values_says_so(open_page, address, said):
+def test_a_link_with_bad_values_is_reported(open_page, address, said):
     page = open_page("#" + quote(address, safe="=&"))
     assert said in page.text("#notice-text")
     assert page.find("#notice").is_displayed()
