@@ -55,7 +55,7 @@ STOP_S = 20.0
 
 
 class FailedError(Exception):
-    """What to tell the person who ran this; the message stands alone."""
+    """A failure with a complete message for the user."""
 
 
 # --- environment --------------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ def ensure(set_name: str) -> None:
 
 
 def announce_kernels() -> None:
-    """Say what a first start waits for."""
+    """Print the reason for a slow first start."""
     print(f"Starting; kernels that {KERNELS} does not hold yet are compiled first (a minute, once)", flush=True)
 
 
@@ -194,7 +194,7 @@ def demo() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
-    # The demo shows the defaults, not whatever the caller's shell happens to set.
+    # The demo shows the defaults, not the settings of the caller's shell.
     env = {name: value for name, value in environment().items() if not name.startswith("MUMACRO_")}
     env |= {"MUMACRO_HOST": "127.0.0.1", "MUMACRO_PORT": str(port)}
     announce_kernels()
@@ -311,9 +311,9 @@ def check() -> list[str]:
 
 
 def test(arguments: list[str]) -> int:
-    """Run the checks, then pytest, which has the last word when all is well.
+    """Run the checks, then pytest.
 
-    Without ``--quick`` the slow tests run too: an empty ``-m`` takes back what pyproject.toml leaves out.  Every
+    Without ``--quick`` the slow tests run too: an empty ``-m`` replaces the ``-m`` of pyproject.toml.  Every
     processor runs a file at a time; ``-n 0`` among ARGS keeps them in one process.
     """
     failed = check()
@@ -348,7 +348,7 @@ def lock(arguments: list[str]) -> int:
     """Write requirements/dev.txt, then the other two as parts of it.
 
     ``--universal`` keeps one file right for every platform and every Python from 3.11 on.  No index is
-    named in the result: where packages come from is the installing machine's business.
+    named in the result: the installing machine chooses it.
     """
     with tempfile.TemporaryDirectory() as folder:
         venv = Path(folder) / "venv"

@@ -26,7 +26,7 @@ __all__ = ["ABS_TO_REL", "MAX_TOLERANCE", "MIN_TOLERANCE", "BuildError", "build_
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 ABS_TO_REL = 10.0  # the table's largest relative error may be this many times its tolerance
-SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound that answers carry
+SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of answers
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
@@ -41,7 +41,7 @@ class BuildError(RuntimeError):
 
 
 def stages() -> int:
-    """How many times ``progress`` is told that a stage is done, at the least."""
+    """The least number of calls of ``progress``, one for each finished stage."""
     return 1 + len(CHARTS) + 3
 
 

@@ -1,4 +1,4 @@
-"""Where the nodes lie, and how a block refines until its interpolant holds the tolerance."""
+"""Nodes of a block, and their refinement until the interpolant meets the tolerance."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative
 
 
 def _position(axis: Axis, x: Array) -> Array:
-    """Where evaluation's ``x`` lies on the axis of nodes, [-1, 1]."""
+    """Position of evaluation's ``x`` on the axis of nodes, [-1, 1]."""
     return (2.0 * axis.to_file(x) - axis.low - axis.high) / (axis.high - axis.low)
 
 

@@ -1,6 +1,6 @@
 """The plain grid of a table in the formats of other tools: CSV, MAT, Modelica's text tables, Parquet.
 
-What is exported is what stands at the root of the file: ``mu_ratio``, ``stick_fraction`` and ``error_estimate`` over
+The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and ``error_estimate`` over
 (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all dimensionless.  It is a grid for tools that have
 an interpolation of their own; its nodes are solved, what lies between them is that tool's guess.  The tolerance of
 the table is kept by :class:`mumacro.Surrogate` alone.

@@ -1,4 +1,4 @@
-"""The figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, drawn anew from the solver and a table.
+"""The figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, drawn from this project's solver and a table.
 
 Axes are the paper's: v~ over y~ in Fig. 4 to 7, mu~ over v~ in Fig. 8, the normalised rise over v~/v~crit in Fig. 9,
 mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11.  Lines come from the table, dots from fresh solves, crosses and

@@ -1,6 +1,6 @@
-"""Numbers no longer than the tolerance of their table: bits that say nothing are zero, and zlib does the rest.
+"""Rounding of node values to the tolerance of their table: bits below it are zero, which zlib compresses.
 
-Rounding comes before the errors are verified, so that they are the errors of what stands in the file.
+Values are rounded before the errors are measured, so these are the errors of the numbers in the file.
 """
 
 from __future__ import annotations

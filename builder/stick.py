@@ -123,7 +123,7 @@ def stick_end(v: float, y: float, eta: float, x0: float, chart: int, s0: float) 
         return -1.0, 0.0
     fa = stick_excess(v, y, eta, x0, chart, s0, s0 + lo - math.pi, lo)
     fb = stick_excess(v, y, eta, x0, chart, s0, s0 + hi - math.pi, hi)
-    if hi > 2.0:  # long stick: solve for sigma1 itself, which keeps its digits when it is small
+    if hi > 2.0:  # long stick: solve for sigma1, which keeps its digits when it is small
         s1 = _chandrupatla(v, y, eta, x0, chart, s0, s0 + lo - math.pi, s0 + hi - math.pi, fa, fb, hi > 2.0)
         return math.pi - s0 + s1, s1
     d = _chandrupatla(v, y, eta, x0, chart, s0, lo, hi, fa, fb, hi > 2.0)

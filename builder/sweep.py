@@ -36,7 +36,7 @@ class SolveError(ArithmeticError):
 
 
 class CheckpointError(MumacroError):
-    """Finished work cannot be kept."""
+    """Finished work cannot be stored."""
 
 
 @solver_kernel
@@ -102,7 +102,7 @@ class Sweep:
     workers : int
         Threads on this machine (the solver releases the interpreter lock).
     checkpoint : Path, optional
-        Folder that keeps finished sweeps; a later build with the same nodes reads them instead of solving again.
+        Folder for finished sweeps; a later build with the same nodes reads them instead of solving again.
     """
 
     def __init__(self, workers: int = 1, checkpoint: Path | None = None) -> None:
@@ -179,6 +179,6 @@ class Sweep:
             write_whole(file, content.getvalue())
         except OSError as error:
             raise CheckpointError(
-                f"{file.parent}: finished work cannot be kept: {error.strerror or error}; give the same command again "
-                "when that is mended, and it goes on from there"
+                f"{file.parent}: finished work cannot be stored: {error.strerror or error}; repair that and give "
+                "the same command again: it resumes"
             ) from error

@@ -1,4 +1,4 @@
-"""What friction does a contact show that is dragged and shaken sideways?  Surrogate of the full stick-slip model."""
+"""Friction of a contact that oscillates across its sliding direction: a surrogate of the full stick-slip model."""
 
 import sys as _sys
 

@@ -39,11 +39,11 @@ What friction will I feel if I shake this contact sideways?
   mumacro eval cases.parquet -o out.parquet                  files of cases: csv, ndjson, parquet
   mumacro law 'mu0=0.3 ...' --along v0 --from 1e-4 --to 1    mu_macro along one input
   mumacro solve-for y0 'mu0=0.3 ...' --target 0.15           which input gives a wanted mu_macro
-  mumacro table                                              the table in use and what it promises
+  mumacro table                                              the table in use and its errors
   mumacro export --format csv                                the table for other tools
   mumacro serve                                              the same over HTTP
 
-Each has help of its own: mumacro eval --help.
+Each command has its own help: mumacro eval --help.
 
 """
 
@@ -130,7 +130,7 @@ def _part(name: str) -> Any:
     if (package / name).is_dir():
         return importlib.import_module(f"mumacro.{name}.__main__")
     if not (package.parent / name / "__main__.py").is_file():
-        raise ImpossibleError(f"this installation holds no {name}: pip install 'mumacro[{name}]'")
+        raise ImpossibleError(f"this installation has no {name}: pip install 'mumacro[{name}]'")
     if str(package.parent) not in sys.path:
         sys.path.insert(0, str(package.parent))
     return importlib.import_module(f"{name}.__main__")
@@ -166,7 +166,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do what the words say; return the exit code."""
+    """Run the command; return the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     run = COMMANDS.get(words[0]) if words else None
     title = f"mumacro {words[0]}" if run else "mumacro"

@@ -1,4 +1,4 @@
-"""What the surrogate says about one case or many."""
+"""The answer of the surrogate to one case or many."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Answer:
 
     @property
     def regime_certain(self) -> Any:
-        """Whether the regime holds whatever v~crit is within its bound: bool or ndarray of bool; as v_tilde."""
+        """Whether the regime is the same for every v~crit within its bound: bool or ndarray of bool; as v_tilde."""
         if self._certain is None:
             raise AttributeError("regime_certain needs the groups: evaluate(..., groups=True)")
         return self._certain(self.v_tilde, self.y_tilde)

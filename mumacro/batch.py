@@ -1,7 +1,7 @@
 """Arrays: cut into slices, one after another or on several threads.
 
-Kernels release the interpreter's lock, so that plain threads share the work out.  They live as long as one call:
-nothing is left over that a forked child could miss, and no call waits for another.
+Kernels release the interpreter's lock, so several threads can work at once.  They end with the call, so that a
+forked process works and no call waits for another.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def cases(
         if odd:
             given: Any = (*six, *data, v, y, *answers)
             dimensional.other_cases(*given)
-        with np.errstate(all="ignore"):  # whatever the caller has made of underflow or of NaN
+        with np.errstate(all="ignore"):  # the caller may have set numpy to raise at underflow or NaN
             np.multiply(mu[part], six[0], out=macro[part])
             bound[part] *= six[0]
 

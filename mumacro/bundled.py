@@ -1,4 +1,4 @@
-"""Where the tables lie that come with the library: inside the package when installed, in ``tables/`` in a checkout."""
+"""The bundled tables: inside the package when installed, in ``tables/`` of a checkout."""
 
 from __future__ import annotations
 

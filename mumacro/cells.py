@@ -1,6 +1,6 @@
-"""From Chebyshev nodes, as they stand in the file, to the cells that evaluation reads; and the value of one cell.
+"""From the Chebyshev nodes of the file to the cells of the evaluation; and the value of one cell.
 
-The file holds the values at tensor-product Chebyshev points of the first kind: none lies on an edge, where a solve
+The file holds the values at tensor-product Chebyshev points of the first kind: no node is on an edge, where a solve
 would be ill conditioned, and the interpolant is the near-best polynomial on the closed rectangle.  Every block is cut
 into cells; each cell holds a polynomial of degree 7 in both local coordinates u, w in [-1, 1] as power-basis
 coefficients.
@@ -74,7 +74,7 @@ def interpolation_matrix(n: int, t: Array) -> Array:
 def _count(axis: Axis, cells: int) -> tuple[float, float]:
     """(offset, step) with which step * coordinate + offset counts cells from 0; its whole part is the cell.
 
-    The far end counts a hair less than ``cells``, so that it belongs to the last cell.
+    The far end is slightly below ``cells``, so that it belongs to the last cell.
     """
     start, stop = axis.span
     step = cells / (stop - start) * (1.0 - 2.0**-51)

@@ -1,10 +1,12 @@
-"""The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of each.  Nothing else knows a block.
+"""The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of each.
+
+No other module has properties of single blocks.
 
 A chart maps (v~, y~) to two coordinates (a, b) in which what the block tabulates is a smooth function q(a, b).  Three
 quantities are tabulated; each is value = base + factor q.
 
 Continuous sliding needs no fitted border: its orbit is analytic in (v~^2, y~^2), beyond the border too.  Stick-slip
-lives between the static limit and the border, both of them square-root edges; with v~ = v~crit sin^2(pi s / 2) it is
+is between the static limit and the border, both of them square-root edges; with v~ = v~crit sin^2(pi s / 2) it is
 analytic in s on [0, 1].  Around y~ = 1, v~ = 0 only polar coordinates of the normal form
 mu~^3 + 2 (y~ - 1) mu~ = pi v~ are analytic.
 
@@ -28,8 +30,8 @@ stick_slip_tail           y~ > 2^17                1 / y~, s                 (mu
 
 outer = 1 / AGM(1, sqrt(1 + y~^2/v~^2)) = (2/pi) K(i y~/v~), eq. (35).
 
-Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; the drive puts in v~ mu~.  The
-stick fraction f is the share of the period during which the contact sticks:
+Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the drive is v~ mu~.
+The stick fraction f is the share of the period during which the contact sticks:
 
 =============================  ================================  =========================
 blocks                         q of the power                    q of the stick fraction
@@ -297,7 +299,7 @@ def place(v: float, y: float, crit: float, ln_y: float) -> tuple[Any, float, flo
 
 @part(inline=True)
 def is_common(v: float, y: float) -> bool:
-    """Whether :func:`place` knows the point: legal, above zero, neither extreme nor beyond Y_TAIL."""
+    """Whether :func:`place` handles the point: legal, above zero, neither extreme nor beyond Y_TAIL."""
     return (v > _SPEED_TINY) & (v < _HUGE) & (y > _TINY) & (y <= Y_TAIL)
 
 

@@ -55,7 +55,7 @@ class ImpossibleError(Exception):
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """A fault, told in one line."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
@@ -229,7 +229,7 @@ def solve(chosen: Namespace) -> str:
     case = read_case(chosen.words, chosen.unknown)
     inner, scale = ("omega", RAD_PER_CYCLE) if chosen.unknown == "f" else (chosen.unknown, 1.0)
     if chosen.ratio and inner == "mu0":
-        raise UsageError("--ratio cannot be had with mu0 as the unknown: it fixes mu_macro / mu0, say --target alone")
+        raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * float(case["mu0"] or 0.0) if chosen.ratio else chosen.target
     within = None if chosen.between is None else (scale * chosen.between[0], scale * chosen.between[1])
     surrogate = open_table(chosen.table)
@@ -259,7 +259,7 @@ def solve(chosen: Namespace) -> str:
 
 
 def table(chosen: Namespace) -> str:
-    """``mumacro table``: what the table in use is and what it promises."""
+    """``mumacro table``: the table in use, its tolerance and its errors."""
     surrogate = open_table(chosen.table)
     found = {
         "id": surrogate.id,

@@ -95,7 +95,7 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
     Raises
     ------
     InputError
-        Something is missing, said twice, or no real number.
+        An input is missing, given twice, or not a real number.
     """
     converted: dict[str, Array] = {}
     if (given.get("omega") is None) == (given.get("f") is None):
@@ -120,7 +120,7 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def real(name: str, value: Any) -> Array:
-    """``value`` as float64; complex numbers, times, text and None are refused, whatever numpy would make of them.
+    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy would convert them.
 
     What is masked is unknown: NaN.
     """
@@ -157,7 +157,7 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
 
 
 def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:
-    """l0 = mu0 Fz / k [m], eq. (5), whatever overflows on the way; 0 for rigid contact."""
+    """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact."""
     mu0, Fz, k = np.broadcast_arrays(mu0, Fz, k)
     with np.errstate(all="ignore"):
         quotient = Fz / k

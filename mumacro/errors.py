@@ -1,4 +1,4 @@
-"""The exceptions of the project.  They name what is wrong; they know nothing of HTTP."""
+"""The exceptions of the project.  They are independent of HTTP."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class MumacroError(Exception):
 
 
 class InputError(MumacroError, ValueError):
-    """One input value lies outside what the model is defined for.
+    """One input value is outside the range of the model.
 
     Attributes
     ----------

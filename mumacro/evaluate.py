@@ -7,7 +7,7 @@ bits: they run the same functions.
 
 Arrays of a table, as :mod:`mumacro.cells` makes them: ``coef`` (patches, 8, 8) of a quantity, ``blocks`` (sources + 1,
 BLOCK_COLUMNS), ``border`` (cells, 8) and ``pieces`` (3, PIECE_COLUMNS) of v~crit.  Nothing here reads out of bounds,
-whatever the input: what is illegal is NaN with the source -1.
+for any input: an illegal case is NaN with the source -1.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ NEXT_ORDER = (
 )
 # The stick fraction below the border is C(y~) sqrt(1 - rho); C is below the first, and below the second / sqrt(y~)
 EDGE_LOW, EDGE_HIGH = 0.7, 0.96
-CREEP = 1e-60  # v~ that stands for the limit v~ -> 0: far below anything that matters, far above underflow
+CREEP = 1e-60  # v~ that is used for the limit v~ -> 0: far below any speed of interest, far above underflow
 
 
 # --- many points ----------------------------------------------------------------------------------------
@@ -82,7 +82,7 @@ def _borders(n: int, at: Ints, local: Array, border: Array, crit: Array) -> None
 def _places(
     v: Array, y: Array, crit: Array, level: Array, block: Ints, a: Array, b: Array, base: Array, factor: Array
 ) -> None:
-    """Blocks, coordinates and forms; OTHER for what :func:`mumacro.charts.place` does not know."""
+    """Blocks, coordinates and forms; OTHER for points that :func:`mumacro.charts.place` does not handle."""
     for i in range(v.size):
         k, a[i], b[i], base[i], factor[i] = charts.place(v[i], y[i], crit[i], level[i])
         block[i] = k if charts.is_common(v[i], y[i]) else np.int64(OTHER)

@@ -1,4 +1,4 @@
-"""HDF5 from strangers: what a netCDF-4 file holds, by name, and nothing that costs more memory than it may.
+"""Reading HDF5 files from unknown sources: the parts of a netCDF-4 file, by name, with a limit of memory.
 
 The netCDF library reads all of a file when it opens it, follows links that lead back to where they came from until the
 stack is full, and unpacks what claims to be small.  Here only what is asked for is looked at, sizes are checked before
@@ -30,7 +30,7 @@ _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
 
 
 def open_image(image: bytes, refuse: Refuse) -> Group:
-    """The root of a file that lies in memory.
+    """The root of a file in memory.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Group:
         return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
 
     def groups(self) -> list[str]:
-        """The names of all that stands in this one and is no variable."""
+        """The names of all members that are not variables."""
         if self._id.get_num_objs() > MOST_GROUPS:
             raise self.refuse(f"{self.path} holds more than {MOST_GROUPS} parts")
         return [name.decode() for name in self._id if h5o.get_info(self._id, name).type != h5o.TYPE_DATASET]
@@ -149,7 +149,7 @@ class Group:
         return out
 
     def _unpacked(self, found: Any, name: str, shape: tuple[int, ...], filters: tuple[int, ...]) -> Array:
-        """The one chunk of a variable, unpacked here: the library unpacks whatever comes out."""
+        """The one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
         size = 8 * math.prod(shape)
         if found.get_num_chunks() != 1 or (chunk := found.get_chunk_info(0)).size > self._size or chunk.filter_mask:
             raise self.refuse(f"variable {name!r} in {self.path} is stored in an unknown way")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 __all__ = ["NAMES", "SI", "UNITS_OF", "Scale", "read_number", "scale_of", "split_unit", "suggestion"]
 
-#: what may be given, and the SI unit in words: an error says "give metres"
+#: unit names that may be given, and the SI unit in words, for errors such as "give metres"
 SI = {
     "mu0": ("-", "a plain number"),
     "Fz": ("N", "newtons"),
@@ -131,7 +131,7 @@ def read_number(name: str, text: str) -> float:
     Raises
     ------
     ValueError
-        The text is no plain number; the message says what to write instead.
+        The text is not a plain number; the message says what to write.
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""How kernels are compiled, and where the compiled code is kept between runs.
+"""How kernels are compiled, and where the compiled code is stored.
 
 numba compiles a kernel at its first call; the result is kept in a file.  Stored code is run as it is.  So its folder
 must belong to this user, and is named after a digest of all sources: after an update, old code would answer.  And every
-file carries a digest of its content: one that is damaged is compiled anew.
+file has a digest of its content: a damaged kernel is compiled again.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _private(folder: Path) -> bool:
             status = folder.stat()
             if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) or not _trusted(status):
                 return False
-            # who may rename a folder above it may put another in its place
+            # a user who can rename a folder above it can replace it
             for above in map(Path.stat, folder.parents):
                 free = above.st_mode & stat.S_IWOTH and not above.st_mode & stat.S_ISVTX
                 if free or (above.st_uid != _UNMAPPED and not _trusted(above)):
@@ -66,7 +66,7 @@ def _private(folder: Path) -> bool:
     return os.access(folder, os.R_OK | os.X_OK)
 
 
-_UNMAPPED = 65534  # whom a container sees as the owner of what lies outside
+_UNMAPPED = 65534  # the owner, as seen in a container, of files from outside
 
 
 def _trusted(status: os.stat_result) -> bool:
@@ -77,19 +77,19 @@ def _trusted(status: os.stat_result) -> bool:
 def cache_folder(*folders: Path) -> Path | None:
     """The folder for the library's kernels; with ``folders``, for kernels whose sources stand there.
 
-    ``NUMBA_CACHE_DIR`` says where it lies; else the user's cache.  None where neither is a folder that this user alone
-    can write to: kernels are then compiled anew in every process.
+    ``NUMBA_CACHE_DIR`` sets its place; else the user's cache.  None where neither is a folder that this user alone
+    can write to: then every process compiles the kernels again.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     try:
         base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mumacro"
     except RuntimeError:
-        print("mumacro: kernels are not kept between runs: this user has no home", file=sys.stderr)
+        print("mumacro: compiled kernels are not stored: this user has no home folder", file=sys.stderr)
         return None
     folder = base.absolute() / f"kernels-{source_digest(*folders)}"
     if _private(folder):
         return folder
-    print(f"mumacro: kernels are not kept between runs: {folder} is not this user's alone to write to", file=sys.stderr)
+    print(f"mumacro: compiled kernels are not stored: others can write to {folder}", file=sys.stderr)
     return None
 
 
@@ -145,14 +145,14 @@ class _Stored:
             _say_once(self.cache_path, error.strerror or str(error))
 
     def flush(self) -> None:
-        """Forget what is kept of this kernel."""
+        """Delete the stored code of this kernel."""
         for path in Path(self.cache_path).glob(f"{self._name}-*{_SUFFIX}"):
             path.unlink(missing_ok=True)
 
 
 @functools.cache
 def _say_once(folder: str, reason: str) -> None:
-    _log.warning("kernels that were compiled now cannot be kept in %s: %s", folder, reason)
+    _log.warning("compiled kernels cannot be stored in %s: %s", folder, reason)
 
 
 @overload
@@ -199,7 +199,7 @@ def part(*, inline: bool = False, fuse: bool = True) -> Callable[[Function], Fun
 
 
 def part(function: Callable[..., Any] | None = None, *, inline: bool = False, fuse: bool = True) -> Any:
-    """Compile a function that kernels call: it becomes part of their code, and is not kept by itself.
+    """Compile a function that kernels call: it becomes part of their code, and is not stored separately.
 
     With ``inline`` it is placed into every caller.  For small functions that return tuples: numba returns those
     through memory.

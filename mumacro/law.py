@@ -166,9 +166,9 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
 
 
 def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
-    """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN where one is not meant to hold.
+    """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the stated range.
 
-    ``case`` holds the other five inputs, as :func:`friction_law` had them.
+    ``case`` has the other five inputs, as in :func:`friction_law`.
     """
     full: dict[str, Any] = {"k": None, **checked_case(case, law.along), law.along: law.values}
     mu0 = np.asarray(full["mu0"], dtype=np.float64)

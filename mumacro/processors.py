@@ -13,7 +13,7 @@ __all__ = ["default_threads", "processors"]
 
 @functools.cache
 def processors() -> int:
-    """How many processors this process may use; a container's limit counts where the system tells it."""
+    """How many processors this process may use; the limit of a container counts, if the system gives it."""
     found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with suppress(OSError, ValueError):
         with open("/sys/fs/cgroup/cpu.max", encoding="ascii") as limit:
@@ -23,7 +23,7 @@ def processors() -> int:
 
 
 def default_threads() -> int:
-    """Threads of a call where nobody said how many.
+    """The default number of threads of a call.
 
     All processors in the main thread of a program.  One in any other thread and in a child process: whoever started
     those (Dask, joblib, multiprocessing, a pool of threads) shares the work out already.

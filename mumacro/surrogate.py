@@ -154,7 +154,7 @@ class Surrogate:
         for v, y, expected in ((0.1, 0.5, KNOWN_STICK_SLIP), (2.0, 1.0, KNOWN_CONTINUOUS)):
             mu, bound, _ = evaluate.common_ratio(v, y, *self._data)
             if not abs(mu - expected) <= bound + 1e-15:
-                raise TableError(self.path, f"known answer at v~={v}, y~={y} is {expected!r}, the table says {mu!r}")
+                raise TableError(self.path, f"known answer at v~={v}, y~={y} is {expected!r}, the table gives {mu!r}")
 
     # --- dimensionless --------------------------------------------------------------------------------
 
@@ -364,7 +364,7 @@ class Surrogate:
         Raises
         ------
         InputError
-            A scalar out of bounds; an input that is missing, unknown, said twice or no number; shapes that do not
+            A scalar out of bounds; an input that is missing, unknown, given twice or not a number; shapes that do not
             broadcast.
 
         Notes
@@ -458,7 +458,7 @@ class Surrogate:
         if cases is not None:
             picked = _picked(cases)
             if twice := picked.keys() & inputs.keys():
-                raise InputError(min(twice), inputs[min(twice)], "said once: in the cases or as a keyword")
+                raise InputError(min(twice), inputs[min(twice)], "given once: in the cases or as a keyword")
             inputs = {**picked, **inputs}
         if _labelled(inputs, cases):
             from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
@@ -501,7 +501,7 @@ class Surrogate:
         crit = self.border(np.atleast_1d(np.asarray(y, dtype=np.float64))).reshape(y.shape)
         margin = self.border.max_rel_error + 4.0 * charts.ROUNDING
         with np.errstate(all="ignore"):
-            # where the groups have left double range nothing is near the border but what cannot be told
+            # groups beyond double range are not near the border, or it cannot be decided
             extreme = (y == 0.0) | ~np.isfinite(y) | ~np.isfinite(v) | (v == 0.0)
             certain = np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit)
         return certain if certain.ndim else bool(certain)

@@ -1,4 +1,4 @@
-"""The version of the project: the one place where it stands.  The wheel, the tables and the service read it here."""
+"""The version of the project.  The wheel, the tables and the service read it here."""
 
 __all__ = ["__version__"]
 

@@ -12,7 +12,7 @@ from mumacro.errors import MumacroError
 
 try:
     import fcntl
-except ImportError:  # Windows: two processes are not told apart
+except ImportError:  # Windows: two processes are not distinguished
     fcntl = None  # type: ignore[assignment]
 
 __all__ = ["BusyError", "alone_in", "put", "sync_folder", "write_whole"]
@@ -64,7 +64,7 @@ def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
 def alone_in(folder: Path) -> Iterator[None]:
     """Make a folder and have it to oneself; one that is empty at the end goes away.
 
-    The system gives it back when a process dies, however it dies.
+    The system releases it when the process ends, in any way.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def alone_in(folder: Path) -> Iterator[None]:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(handle), folder.stat()):
                 break
-        os.close(handle)  # whoever had it has removed it meanwhile
+        os.close(handle)  # its owner has removed it since
     try:
         yield
     finally:

@@ -23,7 +23,7 @@ from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from mumacro.errors import MumacroError
@@ -178,7 +178,8 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
     for router in _ROUTERS:
         app.include_router(router)
     if settings.guide is not None:
-        app.mount("/guide", StaticFiles(directory=settings.guide, html=True))
+        app.mount("/guide/", StaticFiles(directory=settings.guide, html=True))
+        app.router.add_route("/guide", lambda _: RedirectResponse("guide/"), include_in_schema=False)
     install(app, keys=bool(keys))
     return app
 
@@ -188,7 +189,7 @@ def _guide_paths(folder: Path | None) -> set[str]:
     if folder is None:
         return set()
     below = ((path.relative_to(folder).as_posix(), path.is_dir()) for path in folder.rglob("*"))
-    return {"/guide/", *(f"/guide/{name}/" if is_folder else f"/guide/{name}" for name, is_folder in below)}
+    return {"/guide", "/guide/", *(f"/guide/{name}/" if is_folder else f"/guide/{name}" for name, is_folder in below)}
 
 
 async def _answer_invalid(request: Request, error: Exception) -> Response:
@@ -217,7 +218,7 @@ async def _answer_http(request: Request, error: Exception) -> Response:
 
 
 def _allowed_methods(path: str) -> str:
-    methods: set[str] = {"GET", "HEAD"} if path == "/openapi.json" or path.startswith("/guide/") else set()
+    methods: set[str] = {"GET", "HEAD"} if path == "/openapi.json" or path.startswith("/guide") else set()
     for router in _ROUTERS:
         for route in router.routes:
             if isinstance(route, APIRoute) and route.path == path:

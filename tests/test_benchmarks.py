@@ -61,7 +61,7 @@ def speed(printed: str) -> list[list[Row]]:
     return tables(printed)
 
 
-def test_comparison_has_a_row_for_everything_that_answers(speed: list[list[Row]]) -> None:
+def test_comparison_has_a_row_for_every_method(speed: list[list[Row]]) -> None:
     names = [row["what answers"] for row in speed[0]]
     for path in (ROOT / "tables").glob("*.nc"):
         assert names.count(f"**{path.stem}**") == 2, "one thread and all cores"

@@ -276,7 +276,7 @@ def test_the_gradient_lies_within_its_bound_of_differences_of_the_full_model(
     assert np.all(error <= found.gradient_bound[field][keep] * scale + noise)
 
 
-def test_what_is_differentiated_is_what_is_answered(fine: Surrogate) -> None:
+def test_the_gradient_is_that_of_the_answer(fine: Surrogate) -> None:
     """Central differences of the answers themselves, away from the edges of cells."""
     case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
     for place in ({}, {"v0": 0.3}, {"y0": 1e-5}, {"y0": 1e-5, "v0": 2.0}, {"v0": 1e-4}):

@@ -48,7 +48,7 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert json.loads(verified.stdout)["holds"] is True
 
 
-def test_build_cannot_write_where_a_folder_stands(run_builder: Run, tmp_path: Path) -> None:
+def test_build_refuses_a_folder_as_its_output(run_builder: Run, tmp_path: Path) -> None:
     (tmp_path / "taken.nc").mkdir()
     refused(run_builder("build", "--tolerance", "1e-2", "--out", tmp_path / "taken.nc"), "--out", "is a folder")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.nc"]

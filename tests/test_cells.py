@@ -131,7 +131,7 @@ def test_patch_is_a_polynomial_in_falling_powers() -> None:
         assert value(coef, 2, 0.5, -0.7) == 0.0
 
 
-def test_compiled_patch_says_what_plain_python_says() -> None:
+def test_compiled_patch_equals_plain_python() -> None:
     rng = np.random.default_rng(8)
     coef = rng.normal(size=(50, WIDTH, WIDTH))
     for p in range(50):
@@ -239,7 +239,7 @@ def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
 
 
 @pytest.mark.parametrize("chart", [chart for chart in CHARTS if chart.b.name == "s"], ids=lambda chart: chart.name)
-def test_cells_along_s_lie_on_the_nodes_axis_and_start_anew_at_the_knot(chart: Chart) -> None:
+def test_cells_along_s_are_on_the_nodes_axis_and_have_an_edge_at_the_knot(chart: Chart) -> None:
     cells = 8
     sigma, t = (x.reshape(cells, WIDTH) for x in cell_positions(chart.b, cells))
     assert np.all(np.diff(sigma.ravel()) > 0.0)

@@ -36,7 +36,7 @@ def test_agm_and_outer_take_arrays() -> None:
 
 
 @pytest.mark.parametrize("r", [0.01, 0.3, 1.0, 7.0, 100.0, 1e4])
-def test_second_order_is_the_average_that_it_stands_for(r: float) -> None:
+def test_second_order_is_its_defining_average(r: float) -> None:
     with mpmath.workdps(30):
 
         def integrand(tau: mpmath.mpf) -> mpmath.mpf:
@@ -79,7 +79,7 @@ def test_border_tails() -> None:
         assert float(closed_forms.border_large_amplitude(y)) == pytest.approx(border(y)[0], rel=0.08 / y + 2e-7)
 
 
-def test_the_blend_is_the_border_within_what_it_says() -> None:
+def test_the_blend_is_within_its_stated_error() -> None:
     y = np.geomspace(1e-4, 1e6, 61)
     exact = np.array([border(float(value))[0] for value in y])
     assert closed_forms.border_blend(y) == pytest.approx(exact, rel=0.006)

@@ -44,7 +44,7 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightes
         assert part in text
 
 
-def test_json_holds_every_bit_and_the_words_may_stand_apart(capsys, tightest):
+def test_json_has_every_bit_and_the_inputs_may_be_separate_arguments(capsys, tightest):
     expected = tightest.evaluate(**VALUES, gradient=True)
     for words in ((CASE, "--json", "--gradient"), (*CASE.split()[:3], "--json", *CASE.split()[3:], "--gradient")):
         answer = json.loads(said(capsys, 0, *words))
@@ -56,7 +56,7 @@ def test_json_holds_every_bit_and_the_words_may_stand_apart(capsys, tightest):
     assert spaced["mu_macro"] == expected.mu_macro
 
 
-def test_a_rigid_contact_is_said_and_json_knows_no_infinity(capsys, tightest):
+def test_a_rigid_contact_is_stated_and_json_has_no_infinity(capsys, tightest):
     answer = json.loads(said(capsys, 0, CASE.replace("1e6", "rigid"), "--json"), parse_constant=pytest.fail)
     assert answer["mu_macro"] == tightest.evaluate(**{**VALUES, "k": None}).mu_macro
     assert answer["v_tilde"] is None
@@ -120,7 +120,7 @@ def test_every_command_explains_itself(capsys, word):
 
 
 @pytest.mark.parametrize("words", [("--sideways",), ("law", CASE), ("solve-for", "mass", CASE), ("solve-for",)])
-def test_wrong_options_are_told_in_one_line(capsys, words):
+def test_wrong_options_are_reported_in_one_line(capsys, words):
     with pytest.raises(SystemExit) as caught:
         main(words)
     assert caught.value.code == 2
@@ -169,7 +169,7 @@ def test_solve_for_finds_what_gives_the_target(capsys, unknown):
         assert root["low"] <= root[unknown] <= root["high"]
 
 
-def test_solve_for_says_what_can_be_reached(capsys):
+def test_solve_for_reports_the_reachable_range(capsys):
     known = CASE.replace("v0=0.01", "")
     message = said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
     assert "out of reach" in message

@@ -248,7 +248,7 @@ def test_bounds_of_power_and_stick_fraction_are_no_blanket(table, sweep):
     assert np.median(of_both["stick"]) <= 30.0
 
 
-def test_known_answers_are_the_models(sweep):
+def test_known_answers_agree_with_the_model(sweep):
     solved = sweep.solve("full", np.array([0.1, 2.0]), np.array([0.5, 1.0]))["mu_ratio"]
     assert solved[0] == pytest.approx(KNOWN_STICK_SLIP, abs=2e-16)
     assert solved[1] == pytest.approx(KNOWN_CONTINUOUS, abs=2e-16)

@@ -154,7 +154,7 @@ def test_jax_gets_nan_for_illegal_cases_and_rigid_contact_for_none(jax: ModuleTy
     assert jax.grad(in_jax.mu_ratio, argnums=0)(0.0, 1.0) == math.inf
 
 
-def test_jax_is_told_what_is_not_offered(jax: ModuleType, in_jax: Any) -> None:
+def test_jax_raises_for_second_derivatives_and_float32(jax: ModuleType, in_jax: Any) -> None:
     with pytest.raises(NotImplementedError, match="second derivatives are not tabulated"):
         jax.hessian(lambda v: in_jax.mu_ratio(v, 0.5))(0.1)
     jax.config.update("jax_enable_x64", False)
@@ -242,7 +242,7 @@ def test_torch_gets_nan_for_illegal_cases_and_rigid_contact_for_none(torch: Modu
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_torch_is_told_what_is_not_offered(torch: ModuleType, in_torch: Any) -> None:
+def test_torch_raises_for_what_is_not_supported(torch: ModuleType, in_torch: Any) -> None:
     (v,) = leaves(torch, 0.1)
     (slope,) = torch.autograd.grad(in_torch.mu_ratio(v, 0.5), v, create_graph=True)
     with pytest.raises(NotImplementedError, match="second derivatives are not tabulated"):

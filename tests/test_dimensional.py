@@ -254,7 +254,7 @@ def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: st
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
-def test_an_illegal_value_of_an_array_spoils_its_case_alone(
+def test_an_illegal_value_of_an_array_affects_only_its_case(
     table: Surrogate, field: str, bad: float, asked: dict[str, bool]
 ) -> None:
     column = [PLAIN[field], bad, PLAIN[field]]
@@ -283,7 +283,7 @@ def test_an_illegal_value_of_an_array_spoils_its_case_alone(
 
 
 @pytest.mark.parametrize("field", FIELDS)
-def test_zero_is_legal_only_where_it_says_so(table: Surrogate, field: str) -> None:
+def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> None:
     if field in POSITIVE:
         with pytest.raises(InputError) as caught:
             table.evaluate(**{**PLAIN, field: 0.0})
@@ -297,7 +297,7 @@ def test_zero_is_legal_only_where_it_says_so(table: Surrogate, field: str) -> No
 
 
 @pytest.mark.parametrize("field", [name for name in FIELDS if name != "omega"])
-def test_every_input_must_be_said(table: Surrogate, field: str) -> None:
+def test_every_input_must_be_given(table: Surrogate, field: str) -> None:
     rest = {name: value for name, value in PLAIN.items() if name != field}
     for ask in (lambda: table.evaluate(**rest), lambda: table.evaluate(rest)):
         with pytest.raises(InputError, match=f"^{field} must be given") as caught:
@@ -306,7 +306,7 @@ def test_every_input_must_be_said(table: Surrogate, field: str) -> None:
             assert "None for rigid contact" in str(caught.value)
 
 
-def test_the_frequency_is_said_once_as_omega_or_f(table: Surrogate) -> None:
+def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
     rest = {name: value for name, value in PLAIN.items() if name != "omega"}
     frequency = 2e4
     expected = table.evaluate(**rest, omega=2.0 * math.pi * frequency)
@@ -338,7 +338,7 @@ def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> Non
     expected = table.evaluate(**PLAIN).mu_macro
     assert table.evaluate({**PLAIN, "note": "passed by"}).mu_macro == expected
     assert table.evaluate(rest, v0=PLAIN["v0"]).mu_macro == expected
-    with pytest.raises(InputError, match=r"^v0 must be said once"):
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(PLAIN, v0=1.0)
     with pytest.raises(InputError, match=r"^speed must be one of mu0, "):
         table.evaluate(**PLAIN, speed=1.0)
@@ -349,7 +349,7 @@ def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> Non
         table.evaluate(**PLAIN, illegal="ignore")
 
 
-def test_rigid_is_said_as_none_or_infinity_in_numbers_and_in_arrays(table: Surrogate) -> None:
+def test_rigid_is_given_as_none_or_infinity_in_numbers_and_in_arrays(table: Surrogate) -> None:
     expected = table.evaluate(**{**PLAIN, "k": None})
     assert expected.source == "rigid"
     assert table.evaluate(**{**PLAIN, "k": math.inf}).mu_macro == expected.mu_macro
@@ -362,7 +362,7 @@ def test_rigid_is_said_as_none_or_infinity_in_numbers_and_in_arrays(table: Surro
 
 
 @pytest.mark.parametrize("bad", ["much", [1.0, "x"], {"a": 1}, object(), 1j, [[1.0], [1.0, 2.0]]])
-def test_what_is_no_number_is_refused_by_name(table: Surrogate, bad: Any) -> None:
+def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, bad: Any) -> None:
     with pytest.raises(InputError, match=r"^Fz must be a real number or an array of them, got") as caught:
         table.evaluate(**{**PLAIN, "Fz": bad})
     assert caught.value.field == "Fz"
@@ -392,7 +392,7 @@ def test_faults_of_a_batch_come_in_order_one_for_a_case() -> None:
     ]  # fmt: skip
 
 
-def test_a_bad_scalar_spoils_every_case_of_a_batch() -> None:
+def test_a_bad_scalar_affects_every_case_of_a_batch() -> None:
     faults = find_faults({**PLAIN, "omega": -1.0, "v0": [1.0, 2.0, 3.0]})
     assert [(fault.index, fault.field) for fault in faults] == [(0, "omega"), (1, "omega"), (2, "omega")]
 
@@ -410,7 +410,7 @@ def test_faultless_batches_and_rigid_contacts() -> None:
 
 
 @pytest.mark.parametrize("n", [1, 255, 256, 1000])
-def test_columns_on_one_thread_say_what_the_array_says(table: Surrogate, n: int) -> None:
+def test_columns_on_one_thread_equal_the_array(table: Surrogate, n: int) -> None:
     rng = np.random.default_rng(n)
     columns = [
         rng.uniform(0.1, 0.8, n), 10.0 ** rng.uniform(-1.0, 3.0, n), 10.0 ** rng.uniform(4.0, 8.0, n),

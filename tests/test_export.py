@@ -106,7 +106,7 @@ def test_the_modelica_file_is_one_by_its_rules(table, written):
     assert np.array_equal(found["v_tilde_crit"], np.column_stack((table.y_tilde, table.v_tilde_crit)))
 
 
-def test_parquet_holds_the_rows_and_says_where_they_come_from(table, written):
+def test_parquet_has_the_rows_and_the_tables_attributes(table, written):
     parquet = pytest.importorskip("pyarrow.parquet")
     found = parquet.read_table(written / "grid.parquet")
     for name, column in long_columns(table).items():
@@ -159,7 +159,9 @@ def test_the_logarithmic_matrix_is_the_one_to_interpolate(written, surrogate):
     assert error["mu_ratio_log10"] < error["mu_ratio"] < 0.01
 
 
-def test_the_command_writes_here_by_default_and_says_what(run_builder, path, table, tmp_path, repository):
+def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
+    run_builder, path, table, tmp_path, repository
+):
     command = [sys.executable, "-m", "builder", "export", str(path), "--format", "mat"]
     environment = {**os.environ, "PYTHONPATH": str(repository)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
@@ -181,14 +183,14 @@ def test_the_command_writes_here_by_default_and_says_what(run_builder, path, tab
      (("tables/mumacro-1e-4.nc", "--format", "csv", "--out", "no/such/folder.csv"), 1, "no/such"),
      (("tables/mumacro-1e-4.nc", "--format", "csv", "--out", "tables/mumacro-1e-4.nc"), 1, "is the table itself")],
 )  # fmt: skip
-def test_what_cannot_be_exported_is_said_in_a_line(run_builder, arguments, code, said):
+def test_what_cannot_be_exported_is_reported_in_one_line(run_builder, arguments, code, said):
     done = run_builder("export", *arguments)
     assert done.returncode == code
     assert said in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_a_failure_leaves_what_was_there(path, tmp_path, monkeypatch):
+def test_a_failure_leaves_the_old_file(path, tmp_path, monkeypatch):
     out = tmp_path / "grid.csv"
     out.write_text("before")
 

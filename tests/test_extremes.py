@@ -85,7 +85,7 @@ def test_mu_is_linear_in_creeping_speeds_above_one(y: float) -> None:
 
 
 @pytest.mark.parametrize("y", [1.05, 1.3, 2.0, 5.0, 30.0, 1e3])
-def test_the_table_says_the_same_at_creep(y: float, tables_dir: Any) -> None:
+def test_the_table_agrees_at_creep(y: float, tables_dir: Any) -> None:
     s = Surrogate.open(tables_dir / "mumacro-1e-12.nc")
     for v in (1e-60, 1e-147, 1e-220, 1e-304):
         found = solve(v, y).mu_ratio

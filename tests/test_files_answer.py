@@ -34,7 +34,7 @@ DOUBLES = st.one_of(
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(*[DOUBLES] * 6), min_size=1, max_size=40))
-def test_every_row_has_the_bits_of_the_surrogate_or_stands_in_the_rejects(rows):
+def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows):
     surrogate = Surrogate.open()
     batch = pa.RecordBatch.from_pydict(
         dict(zip(NAMES, (list(column) for column in zip(*rows, strict=True)), strict=True))
@@ -126,21 +126,21 @@ def test_units_in_brackets_are_converted_exactly(table):
 @pytest.mark.parametrize(
     ("names", "parts"),
     [
-        (["mu0", "Fz", "K", "y0", "omega", "v0"], ["no column k", "'K' looks like it", "rename it to k [N/m]"]),
-        (["mu0", "Fz", "stiffness", "y0", "omega", "v0"], ["'stiffness' looks like it"]),
-        (["mu0", "Fz", "K [N/mm]", "y0", "omega", "v0"], ["'K [N/mm]' looks like it"]),
+        (["mu0", "Fz", "K", "y0", "omega", "v0"], ["no column k", "'K' is similar", "rename that column to k [N/m]"]),
+        (["mu0", "Fz", "stiffness", "y0", "omega", "v0"], ["'stiffness' is similar"]),
+        (["mu0", "Fz", "K [N/mm]", "y0", "omega", "v0"], ["'K [N/mm]' is similar"]),
         (["mu0", "Fz", "k [psi]", "y0", "omega", "v0"], ["unit that k cannot have", "N/mm"]),
         (["mu0", "Fz", "k", "y0", "omega [Hz]", "v0"], ["a frequency is f [Hz]"]),
         (["mu0", "Fz", "y0", "omega", "v0"], ["no column k [N/m]", "--rigid"]),
         (["mu0", "Fz", "k", "y0", "v0"], ["omega [rad/s] or f [Hz]"]),
-        (["mu0", "Fz", "k", "y0", "frequency", "v0"], ["'frequency' looks like it", "rename it to f [Hz]"]),
+        (["mu0", "Fz", "k", "y0", "frequency", "v0"], ["'frequency' is similar", "rename that column to f [Hz]"]),
         (["mu0", "Fz", "k", "y0", "omega", "f", "v0"], ["both f [Hz] and omega"]),
         (["mu0", "Fz", "k", "k [N/mm]", "y0", "omega", "v0"], ["k is there twice"]),
         (["mu0", "mu0", "Fz", "k", "y0", "omega", "v0"], ["'mu0' is there twice"]),
         (["mu0", "Fz", "k", "y0", "omega", "v0", "source"], ["'source' would be written twice"]),
     ],
 )  # fmt: skip
-def test_a_misnamed_column_is_never_taken_for_nothing(names, parts):
+def test_a_misnamed_column_is_never_ignored(names, parts):
     with pytest.raises(FilesError) as caught:
         find_columns(names)
     for part in parts:
@@ -148,7 +148,7 @@ def test_a_misnamed_column_is_never_taken_for_nothing(names, parts):
 
 
 @pytest.mark.parametrize("name", ["K", "k [N/mm]", "k", "Stiffness"])
-def test_rigid_is_refused_beside_a_column_that_says_otherwise(name):
+def test_rigid_is_refused_with_a_column_of_stiffness(name):
     with pytest.raises(FilesError):
         find_columns(["mu0", "Fz", name, "y0", "omega", "v0"], rigid=True)
 
@@ -158,7 +158,7 @@ def test_a_column_that_resembles_an_input_that_is_there_comes_along(table):
     assert found.column("speed").to_pylist() == ["slow"]
 
 
-def test_rigid_can_be_said_of_a_batch_without_k(table):
+def test_rigid_can_be_given_for_a_batch_without_k(table):
     batch = pa.RecordBatch.from_pydict({name: [value] for name, value in CASE.items() if name != "k"})
     found, _ = answer(batch, table, rigid=True)
     assert found.column("source")[0].as_py() == "rigid"

@@ -137,7 +137,7 @@ def test_columns_of_parquet_keep_their_types(tmp_path, table):
     assert read(tmp_path / "out.csv")[2]["text"] == "µ,\n"
 
 
-def test_text_goes_out_as_it_came(tmp_path, table):
+def test_text_columns_are_unchanged(tmp_path, table):
     lines = ['{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,"v0":1E-2,"id":12345678901234567890, "b":[1] }',
              '{"v0":0.01,"mu0":0.3,"Fz":10,"k":null,"y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}']  # fmt: skip
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
@@ -294,7 +294,7 @@ def test_a_quote_inside_a_cell_is_part_of_it(tmp_path, table):
 
 @pytest.mark.parametrize("start", ["ndjson", "parquet"])
 @pytest.mark.parametrize("end", ["ndjson", "csv"])
-def test_nan_goes_out_as_nothing(tmp_path, table, start, end):
+def test_nan_is_written_as_an_empty_cell_or_null(tmp_path, table, start, end):
     source = tmp_path / f"cases.{start}"
     if start == "ndjson":
         source.write_text(json.dumps({**CASE, "x": math.nan, "y": [math.inf]}))
@@ -305,7 +305,7 @@ def test_nan_goes_out_as_nothing(tmp_path, table, start, end):
     assert row["x"] == (None if end == "ndjson" else "")
 
 
-def test_mixed_types_are_told_in_a_line(tmp_path, capsys):
+def test_mixed_types_are_reported_in_one_line(tmp_path, capsys):
     lines = [json.dumps({**CASE, "x": 1}), json.dumps({**CASE, "x": "a"})]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     message = ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.parquet")
@@ -346,7 +346,7 @@ def test_a_run_that_is_stopped_between_naming_the_output_and_clearing_up_ends_we
 
 
 @pytest.mark.parametrize("left_over", [[], [".plan.json.abc.growing"]])
-def test_a_run_that_is_killed_before_it_has_a_plan_ends_well(tmp_path, table, left_over):
+def test_a_run_that_is_killed_before_its_list_is_written_resumes(tmp_path, table, left_over):
     source = write(cases(10), tmp_path / "cases.csv")
     (tmp_path / "out.csv.parts").mkdir()
     for name in left_over:
@@ -368,7 +368,7 @@ def test_two_runs_to_one_output_do_not_meet(tmp_path, capsys, table):
     assert left(tmp_path) == ["cases.csv", "out.csv"]
 
 
-def test_a_folder_of_parts_that_is_somebody_elses_is_left_alone(tmp_path, capsys):
+def test_a_folder_of_parts_of_another_run_is_unchanged(tmp_path, capsys):
     source = write(cases(10), tmp_path / "cases.csv")
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
@@ -451,7 +451,7 @@ def test_parts_of_another_run_and_outputs_that_exist_are_kept_unless_forced(tmp_
 
 @pytest.mark.skipif(os.name == "nt", reason="no limit of file sizes")
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_a_disk_that_is_full_is_told_in_a_line_and_the_run_goes_on_later(tmp_path, table, repository, kind):
+def test_a_full_disk_is_reported_in_one_line_and_the_run_resumes_later(tmp_path, table, repository, kind):
     source = write(cases(20_000), tmp_path / f"cases.{kind}")
     out = tmp_path / f"out.{kind}"
     program = (
@@ -479,7 +479,7 @@ def test_a_disk_that_is_full_is_told_in_a_line_and_the_run_goes_on_later(tmp_pat
     ("content", "parts"),
     [
         ("", ["is empty"]), ("a;b;c\n1;2;3\n", ["separated by commas"]), ("a,b\n1,2\n", ["no column mu0 [-]"]),
-        ("mu0,Fz,y0,omega,v0\n", ["no column k", "--rigid"]), ("mu0,Fz,K,y0,omega,v0\n", ["'K' looks like it"]),
+        ("mu0,Fz,y0,omega,v0\n", ["no column k", "--rigid"]), ("mu0,Fz,K,y0,omega,v0\n", ["'K' is similar"]),
         ("mu0,Fz,k,y0,omega,v0,v0 [m/s]\n", ["v0 is there twice"]), (f"{HEADER},source\n", ["would be written twice"]),
         ('"mu0,Fz\n', ["line 1 is no header"]),
     ],
@@ -493,7 +493,7 @@ def test_a_file_that_holds_no_cases_is_refused_by_name(tmp_path, capsys, content
     assert left(tmp_path) == ["cases.csv"]
 
 
-def test_damaged_and_missing_files_are_told_in_a_line(tmp_path, capsys):
+def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path, capsys):
     good = write(cases(5000), tmp_path / "good.parquet")
     (tmp_path / "text.parquet").write_text("no parquet")
     (tmp_path / "cut.csv.gz").write_bytes(write(cases(5000), tmp_path / "whole.csv.gz").read_bytes()[:50_000])
@@ -527,7 +527,7 @@ def test_a_file_without_rows_gives_a_file_without_rows(tmp_path, table, kind):
 
 def test_misnamed_keys_of_ndjson_are_refused(tmp_path, capsys):
     (tmp_path / "cases.ndjson").write_text(json.dumps({"K" if n == "k" else n: v for n, v in CASE.items()}))
-    assert "'K' looks like it" in ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
+    assert "'K' is similar" in ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path, repository):

@@ -56,7 +56,7 @@ def test_the_sources_compile_without_a_warning(unit, compilers, tmp_path):
 
 
 @pytest.mark.usefixtures("fmpy")
-def test_fmpy_finds_nothing_wrong(unit):
+def test_fmpy_finds_no_fault(unit):
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(unit)) == []

@@ -47,7 +47,7 @@ def first(found: Any) -> Any:
 
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", NO_NUMBERS)
-def test_what_is_no_number_is_refused_by_name(table: Surrogate, method: str, bad: str) -> None:
+def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, method: str, bad: str) -> None:
     for v, y, field in ((NO_NUMBERS[bad], 0.5, "v_tilde"), (0.1, NO_NUMBERS[bad], "y_tilde")):
         with pytest.raises(InputError) as caught:
             PLANE[method](table, v, y)
@@ -121,7 +121,7 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
-def test_what_is_masked_has_no_answer(table: Surrogate, kind: type) -> None:
+def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
     """A masked value is unknown: it is not answered with whatever lies beneath the mask."""
     masked = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
     found = table.mu_ratio(masked, 0.5)
@@ -133,7 +133,7 @@ def test_what_is_masked_has_no_answer(table: Surrogate, kind: type) -> None:
         table.mu_ratio(np.ma.masked, 0.5)
 
 
-def test_the_callers_floating_point_errors_are_left_alone(table: Surrogate) -> None:
+def test_the_callers_floating_point_settings_are_unchanged(table: Surrogate) -> None:
     with np.errstate(all="raise"):
         table.mu_ratio(np.array([1e-304, math.nan, 0.1]), np.array([1.4e5, 0.5, 0.5]))
         columns = {"mu0": [1e-300, 0.3], "Fz": 1e-300, "k": [math.inf, 1.0], "y0": 1e-300, "omega": 1e-300}
@@ -155,7 +155,7 @@ def test_of_must_be_a_quantity(table: Surrogate) -> None:
 
 @pytest.mark.parametrize("bad", NO_NUMBERS)
 @pytest.mark.parametrize("field", ["mu0", "k", "omega", "f", "v0"])
-def test_evaluate_refuses_what_is_no_number_by_name(table: Surrogate, field: str, bad: str) -> None:
+def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(table: Surrogate, field: str, bad: str) -> None:
     case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
     if field == "f":
         del case["omega"]

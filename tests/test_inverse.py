@@ -82,7 +82,7 @@ def test_targets_are_solved_together_as_alone(surrogate):
     ("unknown", "low", "high"),
     [("v0", 0.3 * math.sqrt(5.0) / 3.0, 0.3), ("y0", 0.0, 0.3), ("omega", 0.3 * math.sqrt(5.0) / 3.0, 0.3)],
 )
-def test_a_monotone_unknown_tells_its_reach(surrogate, unknown, low, high):
+def test_a_monotone_unknown_reports_its_reach(surrogate, unknown, low, high):
     targets = [0.999 * low, low + 0.5 * (high - low), 1.001 * high]
     solution = solve_for(surrogate, unknown, targets, others(CASE, unknown))
     assert [len(roots) for roots in solution.roots] == [0, 1, 0]
@@ -154,7 +154,7 @@ def test_friction_coefficients_are_found_far_out(surrogate):
     [("v0", {"y0": 0.0}), ("v0", {"omega": 0.0}), ("k", {"y0": 0.0}), ("Fz", {"omega": 0.0}), ("y0", {"omega": 0.0}),
      ("omega", {"y0": 0.0}), ("Fz", {"k": None})],
 )  # fmt: skip
-def test_an_input_without_influence_is_called_so(surrogate, unknown, changed):
+def test_an_input_without_influence_is_reported(surrogate, unknown, changed):
     case = {**CASE, **changed}
     value = surrogate.evaluate(**case).mu_macro
     solution = solve_for(surrogate, unknown, [value, 0.9 * value], others(case, unknown))
@@ -216,7 +216,7 @@ def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(surrogat
     assert all(crossing.value == pytest.approx(closest, rel=1e-3) for crossing in crossings)
 
 
-def test_a_fold_that_was_just_born_is_seen(surrogate):
+def test_a_fold_just_above_its_first_ratio_is_found(surrogate):
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
     target = float(surrogate.mu_ratio(0.6626, 6.626))  # between minimum and maximum, which differ by a thousandth
     roots = solve_for(surrogate, "k", target, case).roots[0]
@@ -277,7 +277,7 @@ def test_the_approximations_hold_where_they_should(surrogate):
     assert compare("corner", {**unit, "y0": 1.0}, v0=(1e-12, 1e-9)) < 1e-8  # O(mu~^3)
 
 
-def test_an_approximation_is_silent_where_it_is_not_meant(surrogate):
+def test_an_approximation_is_nan_outside_its_stated_range(surrogate):
     values = sweep_values("v0", 1e-3, 10.0, 11, "log")
     law = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 1e-5})  # y~ = 3.3
     found = approximations(surrogate, law, {**others(CASE, "v0"), "y0": 1e-5})

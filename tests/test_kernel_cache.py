@@ -67,7 +67,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_file_is_compiled_anew_and_mended(folder: Path, damage: str) -> None:
+def test_a_damaged_file_is_compiled_again_and_replaced(folder: Path, damage: str) -> None:
     declared()(1.5)
     whole = {path: path.read_bytes() for path in stored(folder)}
     for path in whole:
@@ -95,7 +95,7 @@ def test_every_flipped_byte_is_noticed(folder: Path) -> None:
         assert path.read_bytes() != b""
 
 
-def test_a_file_that_stands_in_for_another_is_not_run(folder: Path) -> None:
+def test_a_file_with_the_name_of_another_kernel_is_not_run(folder: Path) -> None:
     declared()(1.5)
     (one,) = stored(folder)
     whole = one.read_bytes()
@@ -171,7 +171,7 @@ def chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @posix
-def test_a_new_folder_is_its_users_alone(chosen: Path) -> None:
+def test_a_new_folder_can_be_written_by_its_user_only(chosen: Path) -> None:
     before = os.umask(0)
     try:
         assert kernel_cache.cache_folder() == chosen
@@ -190,7 +190,7 @@ def test_a_folder_that_belongs_to_somebody_else_is_not_used(
     (chosen / "planted.kernel").write_bytes(b"cos\nsystem\n(S'exit 1'\ntR.")
     os.chown(chosen if which == "the folder" else chosen.parent, 12345, 12345)
     assert kernel_cache.cache_folder() is None
-    assert "is not this user's alone to write to" in capsys.readouterr().err
+    assert "others can write to" in capsys.readouterr().err
 
 
 @posix
@@ -228,7 +228,7 @@ def test_a_link_to_somebody_elses_folder_is_not_used(chosen: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize("home", ["missing", "a file", "nowhere"])
-def test_without_a_home_nothing_is_kept_in_a_folder_of_all(tmp_path: Path, repository: Path, home: str) -> None:
+def test_without_a_home_no_kernel_is_stored_in_a_shared_folder(tmp_path: Path, repository: Path, home: str) -> None:
     """No predictable folder among the temporary files takes its place; the kernel runs, and a line says why."""
     (tmp_path / "file").touch()
     temporary = tmp_path / "temporary"
@@ -250,5 +250,5 @@ def test_without_a_home_nothing_is_kept_in_a_folder_of_all(tmp_path: Path, repos
         [sys.executable, "-c", program, home], env=environment, capture_output=True, text=True, timeout=120, check=True
     )
     assert done.stdout.strip() == "None"
-    assert "mumacro: kernels are not kept between runs: " in done.stderr
+    assert "mumacro: compiled kernels are not stored: " in done.stderr
     assert list(temporary.iterdir()) == []

@@ -138,7 +138,7 @@ def test_policies_hold_for_labels_too(table: Surrogate) -> None:
         table.evaluate(frame, illegal="raise")
     with pytest.raises(InputError, match=r"^Fz must be given"):
         table.evaluate(frame.drop(columns="Fz"))
-    with pytest.raises(InputError, match=r"^v0 must be said once"):
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(frame, v0=1.0)
     with pytest.raises(InputError, match=r"^k must be given"):
         table.evaluate(frame.drop(columns="k"))
@@ -261,7 +261,7 @@ def test_a_dask_dataset_stays_lazy(table: Surrogate) -> None:
         xr.testing.assert_identical(found.compute(), whole)
 
 
-def test_an_illegal_value_of_a_chunk_is_told_when_it_is_computed(table: Surrogate) -> None:
+def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surrogate) -> None:
     da = pytest.importorskip("dask.array")
     v0 = da.from_array(np.array([0.01, -1.0, 0.02]), chunks=2)
     found = table.evaluate(**{**CASE, "v0": v0}, illegal="raise")

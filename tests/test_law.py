@@ -28,7 +28,7 @@ def test_every_equation_number_names_a_column() -> None:
 
 
 @pytest.mark.parametrize("y", [1e-3, 0.1, 0.5, 0.99, 1.0])
-def test_formulas_of_continuous_sliding_say_nothing_of_stick_slip(surrogate, y) -> None:
+def test_formulas_of_continuous_sliding_are_nan_in_stick_slip(surrogate, y) -> None:
     crit = float(surrogate.v_tilde_crit(y))
     law, found, _ = columns(surrogate, y, crit * np.geomspace(1e-6, 1e6, 241))
     sliding = law.answer.regime == "continuous"
@@ -66,7 +66,7 @@ def test_the_papers_law_of_small_amplitudes(surrogate) -> None:
     assert miss["master_curve"] < 3e-3 * 0.25
 
 
-def test_every_formula_is_given_where_it_is_meant(surrogate) -> None:
+def test_every_formula_is_given_in_its_stated_range(surrogate) -> None:
     for y in (0.3, 1.0, 3.0):
         _, found, borders = columns(surrogate, y, np.geomspace(1e-3, 10.0, 31))
         assert found.keys() == APPROXIMATIONS.keys()
@@ -93,7 +93,7 @@ def test_extreme_inputs_give_numbers_or_nan_and_no_warning(surrogate, along) -> 
     assert (law.answer.mu_macro <= top).all()
 
 
-def test_rigid_contact_is_said_by_none_or_by_infinity(surrogate) -> None:
+def test_rigid_contact_is_given_as_none_or_infinity(surrogate) -> None:
     values = sweep_values("v0", 1e-3, 10.0, 5, "log")
     r = 2e-6 * 1.3e5 / values
     for stiffness in (None, math.inf):

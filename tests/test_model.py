@@ -198,7 +198,7 @@ def test_slip_ends_where_the_slip_speed_vanishes_first(v: float, y: float) -> No
     assert all(slip_speed(v, y, s, follow(v, y, start, angle, s)[0]) > 0.0 for s in dense[1:])
 
 
-def test_slip_that_never_ends_is_told_apart() -> None:
+def test_slip_without_an_end_has_its_own_status() -> None:
     w, out, _, _ = workspace()
     assert slip(3.0, 0.5, -HALF, 0, 0.1, 0, HALF, True, w, out) == NO_STICK
 

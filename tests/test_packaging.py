@@ -36,7 +36,7 @@ def test_a_checkout_finds_its_committed_tables(repository, tables_dir):
     assert repository / "tables" / "mumacro-1e-10.nc" in bundled.bundled_tables()
 
 
-def test_an_installed_package_finds_the_tables_inside_it_and_no_strangers(tmp_path, monkeypatch):
+def test_an_installed_package_finds_its_own_tables_and_no_others(tmp_path, monkeypatch):
     package, stranger = tmp_path / "mumacro", tmp_path / "tables"
     package.mkdir()
     stranger.mkdir()
@@ -49,7 +49,7 @@ def test_an_installed_package_finds_the_tables_inside_it_and_no_strangers(tmp_pa
 
 
 @pytest.mark.parametrize("module", ["service", "builder", "mumacro"])
-def test_a_bare_interpreter_is_told_in_one_line_what_to_install(repository, module):
+def test_without_packages_one_line_says_what_to_install(repository, module):
     # -S leaves site-packages out: nothing but the standard library is there
     done = subprocess.run(
         [sys.executable, "-S", "-m", module], cwd=repository, capture_output=True, text=True, timeout=60, check=False

@@ -118,6 +118,7 @@ def test_the_built_documentation_is_served_where_a_folder_is_named(tmp_path, tab
     with TestClient(create_app(settings, wait=True)) as guided:  # it needs no key
         assert guided.get("/guide/").text == guided.get("/guide/index.html").text == "<h1>Guide</h1>"
         assert guided.get("/guide/how-to/").text == "<h1>How to</h1>"
+        assert guided.get("/guide").url.path == "/guide/"
         assert guided.get("/static/page/names.json").json()["guide"] is True
         key = {"X-API-Key": "open-sesame"}
         for path in ("/guide/none.html", "/guide/..%2Fsecret"):

@@ -105,7 +105,7 @@ def test_a_typed_value_applies_on_commit(open_page, surrogate, case):
     assert page.complaints() == []
 
 
-def test_a_bad_value_greys_the_result_and_says_why(open_page, surrogate, case):
+def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate, case):
     from selenium.webdriver import Keys
 
     page = open_page()
@@ -113,7 +113,7 @@ def test_a_bad_value_greys_the_result_and_says_why(open_page, surrogate, case):
     assert page.is_old()
     assert page.find("#field-Fz").get_attribute("aria-invalid") == "true"
     assert page.text("#fault-Fz") == "Fz: “mm” is not a unit of Fz: give N, mN, kN."
-    assert page.text("#status") == f"{page.text('#fault-Fz')} What is grey belongs to earlier values."
+    assert page.text("#status") == f"{page.text('#fault-Fz')} Grey results belong to earlier values."
     # another field does not mend it, and nothing is asked meanwhile
     page.type("#field-mu0", "0.4")
     assert page.is_old()
@@ -171,7 +171,7 @@ def test_uncertainties_and_their_shares(open_page, surrogate, case):
     page.type("#field-y0", "3 µm")
     page.type("#field-v0", "1e-6")
     page.type("#std-y0", "0.3")
-    assert "of samples; by slopes it would be" in page.text("#uncertainty")
+    assert "from samples; first order, " in page.text("#uncertainty")
     link = page.find("#link").get_attribute("href")
     assert "mu0.std=0.01" in link
     page.type("#std-mu0", "")
@@ -186,7 +186,7 @@ def test_offline_the_result_is_grey_until_the_service_is_back(open_page, surroga
         page.offline(True)
         page.run("const slider = document.querySelector('#slider-v0'); slider.value = -1000;"
                  "slider.dispatchEvent(new Event('input'));")  # fmt: skip
-        page.wait_for("#status", "^The service does not answer. What is grey belongs to earlier values. Asking again")
+        page.wait_for("#status", "^The service does not answer. Grey results belong to earlier values. Asking again")
         assert page.is_old()
         assert page.text("#mu") == "0.240012"
     finally:
@@ -209,19 +209,19 @@ def answered_by(open_page):
     open_page.shown = None
 
 
-def test_a_busy_a_refusing_and_a_slow_service_are_told_apart(open_page, answered_by):
+def test_a_busy_a_refusing_and_a_slow_service_have_their_own_messages(open_page, answered_by):
     page = open_page()
     said = "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { 'Retry-After': '1' } })"
     answered_by(page, f"async () => {said % 503}")
     page.run("document.querySelector('#rigid').click();")
-    page.wait_for("#status", "^The service cannot answer now: too many cases. What is grey .* Asking again by itself")
+    page.wait_for("#status", "^The service cannot answer now: too many cases. Grey results .* Asking again by itself")
     assert page.is_old()
     answered_by(page, f"async () => {said % 422}")
-    page.wait_for("#status", "^The service refuses this: too many cases. What is grey belongs to earlier values.$")
+    page.wait_for("#status", "^The service refuses this: too many cases. Grey results belong to earlier values.$")
     assert page.is_old()
     answered_by(page, "(...all) => new Promise((done) => { window.late = () => done(window.real(...all)); })")
     page.run("document.querySelector('#rigid').click();")
-    page.wait_for("#status", "^Waiting for the service. What is grey belongs to earlier values.$")
+    page.wait_for("#status", "^Waiting for the service. Grey results belong to earlier values.$")
     assert page.is_old()
     page.run("window.fetch = window.real; window.late();")
     page.settle()
@@ -233,7 +233,7 @@ def test_an_answer_that_is_none_is_asked_for_again(open_page, answered_by):
     page = open_page()
     answered_by(page, "async () => new Response('<html>', { status: 200 })")
     page.run("document.querySelector('#rigid').click();")
-    page.wait_for("#status", "^What came back from the service is no answer .status 200.. .* Asking again by itself.$")
+    page.wait_for("#status", "^The response of the service cannot be read .status 200.. .* Asking again by itself.$")
     page.run("window.fetch = window.real;")
     page.settle()
     assert not page.is_old()
@@ -274,7 +274,7 @@ def test_a_link_reproduces_the_state(open_page):
         ("std_mu0=1&start=z", "start = z (“z” is not a number); std_mu0 = 1 (unknown)"),
     ],
 )
-def test_a_link_with_bad_values_says_so(open_page, address, said):
+def test_a_link_with_bad_values_is_reported(open_page, address, said):
     page = open_page("#" + quote(address, safe="=&"))
     assert said in page.text("#notice-text")
     assert page.find("#notice").is_displayed()

@@ -177,7 +177,7 @@ def test_the_range_of_the_law_is_chosen(open_page):
     assert "at v₀ = 5 mm/s to" in page.find("#law").get_attribute("aria-label")
     assert "at v₀ = 2000 mm/s" in page.find("#law").get_attribute("aria-label")
     page.type("#stop", "1")  # below the start: the service says what is wrong
-    page.wait_for("#law-status", "refuses this: .*stop.* What is grey")
+    page.wait_for("#law-status", "refuses this: .*stop.* Grey results")
     assert page.is_old("#law-section")
     assert not page.is_old()
     page.type("#stop", "x")

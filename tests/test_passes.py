@@ -117,7 +117,7 @@ def test_any_number_of_points(table: Surrogate, n: int) -> None:
     np.testing.assert_array_equal(table.mu_ratio(v, y), expected)
 
 
-def test_a_point_says_the_same_wherever_it_stands(table: Surrogate) -> None:
+def test_a_point_has_the_same_answer_at_every_position(table: Surrogate) -> None:
     rng = np.random.default_rng(8)
     v, y = 10.0 ** rng.uniform(-3.0, 3.0, 2000), 10.0 ** rng.uniform(-3.0, 3.0, 2000)
     mu = table.mu_ratio(v, y)

@@ -45,7 +45,7 @@ print(json.dumps({
 """
 
 
-def test_plain_python_says_what_the_compiled_code_says(repository: Path) -> None:
+def test_plain_python_equals_the_compiled_code(repository: Path) -> None:
     table = repository / "tables" / "mumacro-1e-10.nc"
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], input=json.dumps([POINTS, CASE, str(table)]), cwd=repository,

@@ -86,7 +86,7 @@ def table(request: pytest.FixtureRequest) -> Surrogate:
 
 
 @pytest.mark.parametrize("promise", ["finite", "monotone", "neighbours", "seams", "fresh_solves", "same_bits"])
-def test_answers_keep_their_promises_over_the_full_double_range(table: Surrogate, promise: str) -> None:
+def test_answers_have_their_properties_over_the_full_double_range(table: Surrogate, promise: str) -> None:
     found = getattr(answers, promise)(table, 0.01)
     assert found.tried >= 500
     assert found.broken == 0
@@ -153,21 +153,23 @@ def test_number_strings_give_the_bits_of_float_or_are_refused(tmp_path: Path, wh
         pytest.param("a clock that steps", marks=pytest.mark.slow),
     ],
 )
-def test_a_fault_loses_nothing(name: str) -> None:
+def test_a_fault_loses_no_data(name: str) -> None:
     what, seen = faults.tried(faults.FAULTS[name])
     if what == "not tried":
         pytest.skip(seen)
     assert what == "held", seen
 
 
-def test_a_full_disk_in_a_sweep_is_told_and_what_is_finished_is_kept(tmp_path: Path) -> None:
+def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Path) -> None:
     v, y = np.full(60, 0.1), np.geomspace(0.1, 10.0, 60)
     try:
         with faults.small_disk(tmp_path, "16k") as disk, Sweep(1, checkpoint=disk / "work.checkpoint") as sweep:
             sweep.solve("full", v[:20], y[:20])
             kept = faults.left(disk)
             many = np.geomspace(0.1, 10.0, 600)  # 29 kB of results
-            with pytest.raises(CheckpointError, match=r"work\.checkpoint: finished work cannot be kept: No space left"):
+            with pytest.raises(
+                CheckpointError, match=r"work\.checkpoint: finished work cannot be stored: No space left"
+            ):
                 sweep.solve("full", many, many)
             assert faults.left(disk) == kept
     except faults.NotTriedError as error:
@@ -196,7 +198,7 @@ def test_a_folder_is_given_back_at_the_end(tmp_path: Path) -> None:
     assert not folder.exists()
 
 
-def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_whole(tmp_path / "a", b"old")
 
     def fail(*_: object) -> None:
@@ -213,7 +215,7 @@ def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("script", [tables, faults, answers, strings], ids=lambda script: script.__name__)
-def test_every_section_of_a_script_stands_on_the_page_and_nothing_failed(script: ModuleType) -> None:
+def test_every_section_of_a_script_is_on_the_page_and_nothing_failed(script: ModuleType) -> None:
     page = PAGE.read_text("utf-8")
     for name in script.SECTIONS:
         section = re.search(rf"<!-- begin {name} -->\n(.*?)<!-- end {name} -->", page, re.DOTALL)

@@ -61,7 +61,7 @@ def test_a_seed_shifts_and_others_shift_otherwise() -> None:
 # --- designs --------------------------------------------------------------------------------------------
 
 
-def test_designs_compute_nothing_and_chunks_do_not_change_them(table: Surrogate) -> None:
+def test_designs_are_lazy_and_do_not_depend_on_chunks(table: Surrogate) -> None:
     inputs: dict[str, Any] = {**FIXED, "y0": lambda u: 1e-5 * u, "v0": lambda u: 10.0 ** (4.0 * u - 4.0)}
     with dask.config.set(scheduler=no_compute):
         huge = table.evaluate(sobol(2**50, chunk=2**44, **inputs))

@@ -135,7 +135,7 @@ def test_blank_lines_are_read_once(watched):
     assert time.monotonic() - started < 20
 
 
-def test_unfinished_bodies_hold_little(watched):
+def test_unfinished_bodies_take_little_memory(watched):
     head = f"POST {SINGLE} HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 16000000\r\n\r\n"
     raws = [connect(watched) for _ in range(100)]
     for raw in raws:
@@ -155,7 +155,7 @@ def test_idle_streams_hold_little(watched):
         raw.close()
 
 
-def test_an_upgrade_is_refused_and_what_follows_it_is_no_request(watched):
+def test_an_upgrade_is_refused_and_bytes_after_it_are_not_a_request(watched):
     body = json.dumps(CASE).encode()
     fields = f"Host: x\r\nConnection: Upgrade\r\nUpgrade: h2c\r\nContent-Length: {len(body)}\r\n\r\n"
     head = f"POST {SINGLE} HTTP/1.1\r\n{fields}"
@@ -192,7 +192,7 @@ def test_a_key_given_twice_is_refused(serving, surrogate):
     assert not any("two" in line for line in server.lines)
 
 
-def test_many_single_lines_are_answered_to_who_sends_first_and_reads_later(watched):
+def test_many_single_lines_are_answered_when_all_are_sent_before_reading(watched):
     line = json.dumps(CASE).encode() + b"\n"
     status, _, body = watched.ask("POST", BATCH, line * 150_000, {"Content-Type": "application/x-ndjson"})
     assert (status, body.count(b"\n")) == (200, 150_000)

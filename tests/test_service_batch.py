@@ -72,7 +72,7 @@ def test_a_batch_agrees_with_its_cases_one_by_one(client, case):
         assert result["limits"] == pytest.approx(single["limits"], rel=1e-13)
 
 
-def test_a_bad_case_spoils_only_itself_in_columns(client, case):
+def test_a_bad_case_affects_only_itself_in_columns(client, case):
     body = {**case, "v0": [0.1, -1, 0.2, 0.3, None], "Fz": [10, 10, "10", 20, 10], "k": [1e6, 1e6, 1e6, None, 1e6]}
     answer = client.post(PATH, json={**body, "include": ["groups", "limits"]}).json()
     for name in VALUES:
@@ -87,7 +87,7 @@ def test_a_bad_case_spoils_only_itself_in_columns(client, case):
     assert answer["mu_macro"][3] == pytest.approx(rigid["mu_macro"], rel=1e-13)
 
 
-def test_a_bad_case_spoils_only_itself_in_rows(client, case):
+def test_a_bad_case_affects_only_itself_in_rows(client, case):
     rows = [
         case,
         {**case, "mu0": 0},
@@ -123,14 +123,14 @@ def test_numbers_beyond_double_range_are_bad_cases_and_bad_scalars(client, case,
     assert (fault["pointer"], fault["bound"]) == ("#/v0", "finite and >= 0")
 
 
-def test_nothing_but_bad_cases_is_still_an_answer(client, case):
+def test_a_batch_of_bad_cases_only_is_answered(client, case):
     answer = client.post(PATH, json={**case, "v0": [-1, -2], "include": ["groups"]}).json()
     assert answer["mu_macro"] == [None, None]
     assert answer["groups"] == {"v_tilde": [None, None], "y_tilde": [None, None], "l0": [None, None]}
     assert answer["n_errors"] == 2
 
 
-def test_the_list_of_errors_is_bounded_and_their_number_is_told(client, case):
+def test_the_list_of_errors_is_bounded_and_their_number_is_given(client, case):
     answer = client.post(PATH, json={**case, "v0": [-1.0] * 5000 + [1.0]}).json()
     assert [error["index"] for error in answer["errors"]] == list(range(1000))
     assert answer["n_errors"] == 5000
@@ -157,7 +157,7 @@ def test_json_that_is_neither_columns_nor_rows_is_refused(client, problem, body)
 
 
 @pytest.mark.parametrize("body", [b"", b"[", b"{", b"[1,]", b"\xff" * 100_000])
-def test_what_is_no_json_is_malformed(client, problem, body):
+def test_a_body_that_is_not_json_is_malformed(client, problem, body):
     problem(client.post(PATH, content=body), 400)
 
 
@@ -210,7 +210,7 @@ def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
             assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
 
 
-def test_one_batch_too_many_is_turned_away_before_it_is_read(tables_dir, case, problem):
+def test_one_batch_too_many_is_refused_before_it_is_read(tables_dir, case, problem):
     app = create_app(Settings(tables=(tables_dir,), max_batches=2), wait=True)
     with TestClient(app) as client:
         app.state.work.used = 2

@@ -107,7 +107,7 @@ def test_a_line_that_never_ends_is_given_up(server, case):
         drip(raw, b"1\r\n \r\n")
 
 
-def test_a_caller_who_does_not_read_is_cut_and_holds_little(server, case):
+def test_a_client_that_does_not_read_is_disconnected_and_takes_little_memory(server, case):
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 300_001)]}).encode()
     with connect(server, receive_buffer=4096) as raw:
         raw.sendall(head(BATCH, len(body)) + body)
@@ -149,7 +149,7 @@ def stream(server, line, count):
     return received[0], max(sizes)
 
 
-def test_a_stream_holds_no_more_the_longer_it_gets(server, case):
+def test_the_memory_of_a_stream_does_not_grow_with_its_length(server, case):
     line = json.dumps({**case, "v0": [1e-4 * i for i in range(1, 1001)]}).encode() + b"\n"
     stream(server, line, 50)
     lines, short = stream(server, line, 200)
@@ -172,7 +172,7 @@ def test_answers_come_while_the_question_is_still_being_sent(server, case):
 
 
 @pytest.mark.parametrize("kind", ["application/x-ndjson", "application/json"])
-def test_who_asks_whether_to_go_on_is_told(server, case, kind):
+def test_expect_100_continue_is_answered(server, case, kind):
     body = json.dumps({**case, "v0": [0.01] * 5000}).encode()
     with connect(server) as raw:
         raw.sendall(head(BATCH, len(body), kind).replace(b"\r\n\r\n", b"\r\nExpect: 100-continue\r\n\r\n"))
@@ -247,7 +247,7 @@ def peak(server):
         return next(int(line.split()[1]) for line in status if line.startswith("VmHWM")) * 1024
 
 
-def test_many_large_batches_at_once_hold_little_more_than_their_bodies(serving, surrogate, case):
+def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(serving, surrogate, case):
     places, n = 6, 100_000
     rows = json.dumps([{**case, "v0": 1e-7 * i} for i in range(1, n + 1)]).encode()
     assert len(rows) > 8_000_000
@@ -269,7 +269,7 @@ def test_many_large_batches_at_once_hold_little_more_than_their_bodies(serving, 
 
 
 @pytest.mark.parametrize("step", [1000, 65_536, 300_000])
-def test_a_body_is_read_whole_in_pieces_of_any_size_and_after_leave_to_send_it(server, case, step):
+def test_a_body_is_read_in_pieces_of_any_size_and_after_100_continue(server, case, step):
     n = 20_000
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, n + 1)]}).encode()
     _, _, expected = server.ask("POST", BATCH, body, {"Content-Type": "application/json"})
@@ -295,7 +295,7 @@ def test_a_request_right_behind_a_large_body_is_answered(server, case):
     assert b'"alive"' in received
 
 
-def test_who_answers_batches_stands_back(server, case):
+def test_threads_for_batches_have_a_lower_priority(server, case):
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})
     assert server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] == 200
     found = {}
@@ -306,7 +306,7 @@ def test_who_answers_batches_stands_back(server, case):
 
 
 @pytest.mark.parametrize("sent", [300_000, 3_000_000])
-def test_a_caller_who_leaves_in_the_middle_of_a_body_frees_its_place(server, case, sent):
+def test_a_client_that_leaves_within_a_body_frees_its_place(server, case, sent):
     for _ in range(3):  # one more than there are places
         with connect(server) as raw:
             raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)

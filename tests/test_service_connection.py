@@ -69,7 +69,7 @@ def test_pipelined_requests_are_answered_in_order(raw, many):
     assert statuses == [200 if path == b"/livez" else 404 for path in wanted]
 
 
-def test_a_half_closed_caller_has_the_whole_answer(raw, case):
+def test_a_half_closed_client_gets_the_whole_answer(raw, case):
     raw.sendall(post(BATCH, json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]}).encode()))
     raw.shutdown(socket.SHUT_WR)
     received = rest(raw)
@@ -79,7 +79,7 @@ def test_a_half_closed_caller_has_the_whole_answer(raw, case):
 
 @pytest.mark.parametrize("path", [SINGLE, BATCH])
 @pytest.mark.parametrize("before", [b"", GET])
-def test_a_caller_who_ends_within_a_body_is_let_go_at_once(raw, path, before):
+def test_a_client_that_ends_within_a_body_is_disconnected_at_once(raw, path, before):
     raw.settimeout(10)  # less than the time that a slow caller has
     raw.sendall(before + f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n".encode() + b"{")
     raw.shutdown(socket.SHUT_WR)
@@ -121,7 +121,7 @@ def test_an_answer_without_fields_is_whole():
 
 
 @pytest.mark.parametrize("behind", [b"", GET])
-def test_an_application_that_ends_without_an_answer_is_told_of(behind):
+def test_an_application_that_ends_without_an_answer_is_reported(behind):
     async def silent(_scope, _receive, _send):
         pass
 
@@ -139,7 +139,7 @@ def test_a_field_that_would_break_the_head_is_not_written(field):
 
 
 @pytest.mark.parametrize("try_number", range(10))
-def test_who_sends_too_much_reads_why(live_server, try_number):
+def test_a_client_that_sends_too_much_can_read_the_reason(live_server, try_number):
     del try_number  # a reset would be seen in about half of the tries
     host, _, port = live_server.url.removeprefix("http://").rpartition(":")
     connection = http.client.HTTPConnection(host, int(port), timeout=30)
@@ -165,7 +165,7 @@ def test_who_sends_too_much_reads_why(live_server, try_number):
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
     ],
 )
-def test_what_is_no_http_is_refused_and_closed(raw, text):
+def test_a_request_that_is_not_http_is_refused_and_closed(raw, text):
     raw.sendall(GET)
     first = raw.recv(65536)
     raw.sendall(text)
@@ -175,7 +175,7 @@ def test_what_is_no_http_is_refused_and_closed(raw, text):
     assert received.count(b"HTTP/1.1 ") == 1
 
 
-def test_what_was_asked_in_good_order_is_answered_before_nonsense(raw, case):
+def test_good_requests_are_answered_before_a_malformed_one(raw, case):
     raw.sendall(post(SINGLE, json.dumps(case).encode()) + GET + b"nonsense\r\n\r\n")
     received = rest(raw)
     assert received.count(b"HTTP/1.1 200") == 2
@@ -187,7 +187,7 @@ def test_http_1_0_is_answered_and_closed(raw):
     assert rest(raw).startswith(b"HTTP/1.1 200")
 
 
-def test_a_caller_who_waits_to_go_on_is_told_so(raw, case):
+def test_a_client_that_expects_100_continue_gets_it(raw, case):
     body = json.dumps(case).encode()
     whole = post(SINGLE, body, "Expect: 100-continue\r\nConnection: close\r\n")
     raw.sendall(whole[: -len(body)])

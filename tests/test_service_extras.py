@@ -79,7 +79,7 @@ def test_an_entity_tag_follows_the_standard_deviations(client, case):
         ({"include": ["std"], "std": [1, 2]}, "#/std"),
     ],
 )
-def test_standard_deviations_go_with_the_wish_for_them(client, case, problem, options, pointer):
+def test_standard_deviations_are_given_if_and_only_if_std_is_included(client, case, problem, options, pointer):
     (fault,) = problem(client.post(PATH, json={**case, **options}), 422)["errors"]
     assert fault["pointer"] == pointer
     problem(client.post(f"{PATH}/batch", json={**case, "v0": [0.1, 0.2], **options}), 422)
@@ -132,7 +132,7 @@ def test_an_amplitude_below_double_range_leaves_the_stick_fraction_open(client, 
     assert answer["stick_fraction_bound"] == 1.0
 
 
-def test_what_comes_with_the_companions_comes_only_if_asked_for(client, case):
+def test_bounds_come_only_with_their_quantity(client, case):
     assert not {"stick_fraction", "stick_fraction_bound", "power"} & ask(client, case).keys()
     assert {"stick_fraction", "stick_fraction_bound"} <= ask(client, case, include=["stick_fraction"]).keys()
 

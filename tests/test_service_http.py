@@ -42,7 +42,7 @@ def test_an_unknown_path_is_not_found(client, problem, path):
 
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
-def test_a_wrong_method_is_told_the_right_ones(client, problem, path, method):
+def test_a_wrong_method_is_answered_with_the_right_ones(client, problem, path, method):
     response = client.request(method, path)
     problem(response, 405)
     assert response.headers["allow"] == PATHS[path]
@@ -89,7 +89,7 @@ def broken(tables_dir):
     return TestClient(app)
 
 
-def test_an_unforeseen_error_is_logged_and_not_told(broken, case, problem, caplog):
+def test_an_unexpected_error_is_logged_and_not_shown(broken, case, problem, caplog):
     response = broken.post("/v1/mu-macro", json=case)
     problem(response, 500)
     assert "secret" not in response.text
@@ -311,7 +311,7 @@ OFFERS = {
 
 
 @pytest.mark.parametrize("offer", OFFERS)
-def test_who_does_not_take_gzip_gets_none_from_any_route(client, case, offer):
+def test_no_route_compresses_for_a_client_without_gzip(client, case, offer):
     v0 = [1e-6 * i for i in range(1, 3001)]
     line = (json.dumps({**case, "v0": v0}) + "\n").encode()
     law = {**{name: case[name] for name in case if name != "v0"}, "start": 1e-4, "stop": 1.0, "points": 3000}

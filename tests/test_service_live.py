@@ -46,7 +46,7 @@ def test_it_is_checked_by_its_own_command(server, repository):
         assert check(unused.getsockname()[1]) == 1
 
 
-def test_the_file_arrives_whole(server, surrogate):
+def test_the_file_arrives_complete(server, surrogate):
     status, headers, body = server.ask("GET", "/v1/table.nc")
     assert (status, body) == (200, surrogate.path.read_bytes())
     assert headers["content-length"] == str(len(body))
@@ -136,7 +136,7 @@ def test_head_has_no_body(server):
     assert server.ask("HEAD", "/readyz")[::2] == (200, b"")
 
 
-def test_what_is_no_http_does_not_hurt(server):
+def test_a_request_that_is_not_http_does_no_harm(server):
     with socket.create_connection(("127.0.0.1", server.port), timeout=60) as raw:
         raw.sendall(b"nonsense\r\n\r\n")
         assert raw.recv(100).startswith(b"HTTP/1.1 400")
@@ -197,7 +197,7 @@ def test_a_port_that_is_taken_is_a_failure(repository, surrogate):
     assert "Traceback" not in process.stdout + process.stderr
 
 
-def test_workers_whose_parent_is_killed_end_and_give_the_port_back(serving, surrogate, case):
+def test_workers_whose_parent_is_killed_end_and_release_the_port(serving, surrogate, case):
     with serving(surrogate.path, "--workers", "2", MUMACRO_DRAIN_S="0.2") as server:
         server.wait_for_tables(2)
         children = Path(f"/proc/{server.process.pid}/task/{server.process.pid}/children")

@@ -31,7 +31,7 @@ def fields_of(lines):
     return [json.loads(line, object_pairs_hook=once) for line in lines]
 
 
-def test_who_says_where_it_comes_from_writes_no_line_of_its_own(serving, surrogate, case):
+def test_a_forwarded_address_cannot_forge_a_log_line(serving, surrogate, case):
     known = "&".join(f"{name}={value}" for name, value in case.items())
     with serving(surrogate.path) as server:
         for text in NO_ADDRESS:
@@ -48,7 +48,7 @@ def test_who_says_where_it_comes_from_writes_no_line_of_its_own(serving, surroga
     assert all(len(line["client"]) <= 64 and line["level"] == "info" for line in access)
 
 
-def test_paths_and_names_of_callers_write_no_line_of_their_own(serving, surrogate):
+def test_paths_and_names_of_clients_cannot_forge_a_log_line(serving, surrogate):
     with serving(surrogate.path) as server:
         for path in ("/%0a%7B%22level%22%3A%22error%22%7D", "/%22", "/%00", "/%ff", "/%E2%80%A8", "/a%0d%0ab"):
             assert server.ask("GET", path)[0] == 404
@@ -58,7 +58,7 @@ def test_paths_and_names_of_callers_write_no_line_of_their_own(serving, surrogat
     assert not [line for line in fields_of(server.lines) if line["level"] not in ("info", "warning")]
 
 
-def test_no_key_is_written_or_told(serving, surrogate, case):
+def test_no_key_is_logged_or_shown(serving, surrogate, case):
     keys = {"alice": "k3y-of-alice", "bob": "k3y-of-bob"}
     told = []
     settings = ",".join(f"{name}={key}" for name, key in keys.items())
@@ -92,7 +92,7 @@ def started(repository, surrogate):
     return process, int(found[1]), read
 
 
-def test_a_reader_of_the_log_who_stalls_holds_nobody_up(repository, surrogate, case):
+def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case):
     process, port, lines = started(repository, surrogate)
     try:
         query = f"{SINGLE}?" + "&".join(f"{name}={value}" for name, value in case.items())
@@ -135,7 +135,7 @@ def test_a_reader_of_the_log_who_stalls_holds_nobody_up(repository, surrogate, c
     assert lost + len(access) >= 14_000
 
 
-def test_a_reader_of_the_log_who_never_comes_back_does_not_keep_the_service_from_its_end(repository, surrogate):
+def test_a_log_reader_that_stays_stalled_does_not_prevent_the_end(repository, surrogate):
     process, port, _ = started(repository, surrogate)
     try:
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
@@ -151,7 +151,7 @@ def test_a_reader_of_the_log_who_never_comes_back_does_not_keep_the_service_from
         process.stdout.close()
 
 
-def test_a_reader_of_the_log_who_leaves_ends_nothing(repository, surrogate):
+def test_a_log_reader_that_leaves_does_not_end_the_service(repository, surrogate):
     process, port, _ = started(repository, surrogate)
     try:
         process.stdout.close()

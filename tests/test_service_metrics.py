@@ -99,7 +99,7 @@ def test_counters_are_described_and_under_the_key(tables_dir, problem):
         assert re.search(rf"^# TYPE {name}(_total)? (counter|histogram)$", text, re.MULTILINE)
 
 
-def test_every_worker_tells_the_sum_of_all(serving, surrogate, case):
+def test_every_worker_gives_the_sum_of_all(serving, surrogate, case):
     body = json.dumps(case)
     asked = 40
     with serving(surrogate.path, "--workers", "2") as server:

@@ -30,14 +30,14 @@ def test_every_double_is_read_exactly(values):
 
 @settings(max_examples=500, deadline=None)
 @given(text=st.from_regex(r"-?(0|[1-9][0-9]{0,15})(\\.[0-9]{1,20})?([eE][+-]?[0-9]{1,3})?", fullmatch=True))
-def test_what_is_taken_is_what_python_reads(text):
+def test_accepted_numbers_are_those_that_python_reads(text):
     size, columns = read(json.dumps({**CASE, "v0": "@"}).replace('"@"', f"[{text}]"))
     if size:
         assert columns[5, 0] == float(text)
 
 
 @pytest.mark.parametrize("behind", [b"\0", b"\n", b'\n{"mu0": 1}\n'])
-def test_a_block_ends_where_it_is_said_to(behind):
+def test_a_block_ends_at_its_stated_end(behind):
     size, columns = read(json.dumps(CASE), behind=behind)
     assert size == 2
     assert columns[:, 0].tolist() == [0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]
@@ -65,9 +65,9 @@ def test_rigid_contact_and_hertz_are_read():
         json.dumps({name: value for name, value in CASE.items() if name != "k"}),
     ],
 )  # fmt: skip
-def test_anything_else_is_left_to_others(text):
+def test_anything_else_is_not_accepted(text):
     assert read(text)[0] == 0
 
 
-def test_too_many_cases_are_told():
+def test_too_many_cases_are_reported():
     assert read(json.dumps(CASE), room=1)[0] == NO_ROOM

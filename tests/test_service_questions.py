@@ -31,7 +31,7 @@ def test_a_root_gives_its_target_back(client):
     assert root["low"] < root["value"] < root["high"] < (1.0 + 1e-9) * root["low"]
 
 
-def test_targets_keep_their_order_and_the_unreachable_say_why(client):
+def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client):
     targets = [0.25, 0.1, 0.29, 0.4]
     request = {**SOLVE, "unknown": "v0", "target": targets, "y0": CASE["y0"], "v0": None}
     answer = client.post("/v1/solve-for", json=request).json()
@@ -46,7 +46,7 @@ def test_targets_keep_their_order_and_the_unreachable_say_why(client):
         assert "reachable" in answer["results"][i]["reason"]
 
 
-def test_an_input_without_influence_is_told(client):
+def test_an_input_without_influence_is_reported(client):
     request = {**SOLVE, "unknown": "v0", "y0": 0.0, "v0": None}
     (result,) = client.post("/v1/solve-for", json=request).json()["results"]
     assert result["roots"] == []
@@ -88,7 +88,7 @@ def test_a_bad_question_is_refused_by_field(client, problem, changed, field):
 
 
 @pytest.mark.parametrize("path", ["/v1/solve-for", "/v1/law"])
-def test_what_is_no_question_is_refused(client, problem, path):
+def test_a_body_that_is_not_a_question_is_refused(client, problem, path):
     for body, status in ((b"", 400), (b"{", 400), (b"[]", 422), (b"3", 422), (b"{}", 422)):
         problem(client.post(path, content=body), status)
     problem(client.post(path, content=b'{"target": NaN, "start": NaN}'), 422)
@@ -119,7 +119,7 @@ def test_a_law_is_single_answers_in_a_row(client):
     assert "approximations" not in law
 
 
-def test_a_whole_number_is_one_however_it_is_written(client, problem):
+def test_an_integer_may_be_written_with_a_decimal_point(client, problem):
     body = json.dumps({**LAW, "points": 5}).replace('"points": 5', '"points": 5.0')
     assert len(client.post("/v1/law", content=body).json()["values"]) == 5
     for bad in (5.5, True, "5", 1e30):

@@ -95,7 +95,7 @@ def test_groups_are_the_dimensionless_inputs(client, case):
     assert groups["v_tilde"] == pytest.approx(0.01 / (l0 * 1.3e5), rel=1e-14)
 
 
-def test_rigid_contact_is_said_and_never_assumed(client, case, problem):
+def test_rigid_contact_is_stated_and_never_assumed(client, case, problem):
     null = client.post(PATH, json={**case, "k": None}).json()
     assert client.post(PATH, json={**case, "k": "rigid"}).json() == null
     assert client.get(PATH, params={**case, "k": "rigid"}).json() == null
@@ -130,7 +130,7 @@ def test_a_query_includes_by_commas(client, case, include):
 
 
 @pytest.mark.parametrize("name", ["curvature", "Groups", "x", ""])
-def test_what_cannot_be_included_is_refused_with_what_can(client, case, problem, name):
+def test_an_unknown_include_is_refused_with_the_known_ones(client, case, problem, name):
     for response in (
         client.post(PATH, json={**case, "include": [name]}),
         client.get(PATH, params={**case, "include": name}),
@@ -223,7 +223,7 @@ def test_a_frequency_is_given_once_in_either_unit(client, case, problem):
     [({"y0": "2um"}, "give metres, 2e-06"), ({"v0": "5 mm/s"}, "give metres per second, 0.005"), ({"K": 1}, "mean k?"),
      ({"stiffness": 1}, "mean k?"), ({"frequency": 1}, "mean f?"), ({"k": ""}, "rigid"), ({"v0": "0,01"}, "0.01")],
 )  # fmt: skip
-def test_a_refusal_says_what_was_meant(client, case, problem, change, advice):
+def test_a_refusal_suggests_the_right_field(client, case, problem, change, advice):
     (fault,) = problem(client.get(PATH, params={**case, **change}), 422)["errors"]
     assert advice in fault["reason"]
 
@@ -282,7 +282,7 @@ def test_json_that_is_no_object_is_refused(client, problem, body):
 
 
 @pytest.mark.parametrize("body", [b"", b" ", b"{", b"{'mu0': 1}", b"\xff\xfe", b"{} {}", b"[" * 50_000, b"nonsense"])
-def test_what_is_no_json_is_malformed(client, problem, body):
+def test_a_body_that_is_not_json_is_malformed(client, problem, body):
     problem(client.post(PATH, content=body), 400)
 
 
@@ -360,14 +360,14 @@ def test_head_is_get_without_the_body(client, case):
     assert (head.status_code, head.headers["etag"]) == (200, get.headers["etag"])
 
 
-def test_two_frequencies_in_the_deviations_of_a_query_are_told_by_name(client, case, problem):
+def test_two_frequencies_in_the_deviations_of_a_query_are_reported_by_name(client, case, problem):
     query = {**case, "include": "std", "std_omega": 1.0, "std_f": 1.0}
     (fault,) = problem(client.get(PATH, params=query), 422)["errors"]
     assert fault["parameter"] == "std_f"
     assert "not of both" in fault["reason"]
 
 
-def test_two_frequencies_in_the_case_and_in_its_deviations_are_both_told(client, case, problem):
+def test_two_frequencies_in_the_case_and_in_its_deviations_are_both_reported(client, case, problem):
     body = {**case, "f": 1.0, "include": ["std"], "std": {"omega": 1.0, "f": 1.0}}
     faults = problem(client.post(PATH, json=body), 422)["errors"]
     assert len(faults) == 2

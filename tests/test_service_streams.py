@@ -26,7 +26,7 @@ def lines_of(response):
     return [json.loads(line) for line in response.text.splitlines()]
 
 
-def test_a_line_is_answered_like_a_batch_or_a_case_of_its_own(client, case):
+def test_a_line_is_answered_like_a_batch_or_a_case(client, case):
     columns, rows = {**case, "v0": [0.1, -1, 0.2]}, [case, 17]
     body = "\n".join(map(json.dumps, (columns, rows, case))) + "\n"
     first, second, third = lines_of(client.post(PATH, content=body, headers=LINES))
@@ -35,7 +35,7 @@ def test_a_line_is_answered_like_a_batch_or_a_case_of_its_own(client, case):
     assert third == client.post("/v1/mu-macro", json=case).json()
 
 
-def test_a_bad_line_spoils_only_itself(client, case, surrogate):
+def test_a_bad_line_affects_only_itself(client, case, surrogate):
     good = json.dumps(case)
     body = "\n".join([good, "{", "", '{"mu0": 1}', json.dumps({**case, "v0": -1}), "17", good])
     answers = lines_of(client.post(PATH, content=body, headers=LINES))
@@ -67,7 +67,7 @@ def test_options_of_a_stream_come_with_its_query_or_its_lines(client, case):
     assert second["status"] == 422  # given twice
 
 
-def test_a_stream_that_nothing_can_answer_is_refused_as_a_whole(client, case, problem):
+def test_a_stream_with_bad_options_is_refused_as_a_whole(client, case, problem):
     body = json.dumps(case)
     problem(client.post(PATH, params={"tolerance": 1e-30}, content=body, headers=LINES), 422)
     problem(client.post(PATH, params={"nonsense": 1}, content=body, headers=LINES), 422)
@@ -142,7 +142,7 @@ def test_arrow_keeps_order_over_record_batches_and_slices(client, case):
     assert answered.num_rows == 150_000
 
 
-def test_a_bad_arrow_case_spoils_only_itself(client, case):
+def test_a_bad_arrow_case_affects_only_itself(client, case):
     n = 6
     columns = {name: pa.array([value] * n) for name, value in case.items()}
     columns["v0"] = pa.array([0.1, -1.0, None, float("nan"), 0.1, 0.1])
@@ -190,7 +190,7 @@ def test_arrow_columns_that_do_not_fit_are_refused(client, case, problem, change
     assert problem(response, 422)["errors"][0]["field"] == field
 
 
-def test_what_is_no_arrow_stream_is_malformed(client, case, problem):
+def test_a_body_that_is_not_an_arrow_stream_is_malformed(client, case, problem):
     good = stream_of(pa.record_batch({name: [value] for name, value in case.items()}))
     for body in (b"nonsense", b"\xff" * 100, good[:100], good[: len(good) // 2]):
         problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 400)
@@ -271,7 +271,7 @@ def test_a_stream_is_compressed_line_by_line(client, case):
     )
 
 
-def test_lines_of_one_case_each_are_answered_alike_alone_and_together(client, case):
+def test_lines_of_one_case_have_the_same_answer_alone_and_together(client, case):
     rows = [{**case, "v0": 1e-3 * i} for i in range(1, 100)]
     lines = [json.dumps(row) for row in rows]
     together = lines_of(client.post(PATH, content="\n".join(lines), headers=LINES))
@@ -286,7 +286,7 @@ def test_lines_of_one_case_each_are_answered_alike_alone_and_together(client, ca
 @pytest.mark.parametrize(
     "odd", ['{"mu0":1', '{"a":{}}', "{},{}", '{"v0":2}', "[]", "{} {}", '{"include":["groups"]}', ""]
 )
-def test_an_odd_line_among_plain_ones_spoils_only_itself(client, case, odd):
+def test_an_odd_line_among_plain_ones_affects_only_itself(client, case, odd):
     good = json.dumps(case)
     (expected,) = lines_of(client.post(PATH, content=good, headers=LINES))
     answers = lines_of(client.post(PATH, content="\n".join([good, odd, good, good]), headers=LINES))
@@ -301,7 +301,7 @@ def test_halves_of_objects_are_not_joined_over_lines(client, case):
     assert [answer.get("status") for answer in answers] == [400, 400, None]
 
 
-def test_bad_lines_among_many_plain_ones_are_told_by_their_number(client, case):
+def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(client, case):
     n, bad = 3000, range(3, 3000, 7)
     lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(n)]
     for index in bad:

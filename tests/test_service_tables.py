@@ -153,7 +153,7 @@ def test_a_wrong_known_answer_is_not_ready(surrogate, problem, monkeypatch):
         assert "known answer" in problem(client.get("/readyz"), 503)["detail"]
 
 
-def test_an_error_nobody_foresaw_while_loading_is_not_told(surrogate, problem, monkeypatch):
+def test_an_unexpected_error_while_loading_is_not_shown(surrogate, problem, monkeypatch):
     def broken(_self):
         raise RuntimeError("secret")
 

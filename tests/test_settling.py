@@ -48,7 +48,7 @@ def test_the_slip_path_is_the_solvers(surrogate, v, y) -> None:
 
 
 @pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
-def test_a_small_disturbance_decays_as_promised(surrogate, naive, v, y) -> None:
+def test_a_small_disturbance_decays_as_derived(surrogate, naive, v, y) -> None:
     start = naive.march(v, y, STEPS, naive.periods_until_steady(v, y))[-1]
     size = 1e-5
     here = start / np.hypot(*start) if np.hypot(*start) > 1.0 - 1e-9 else start
@@ -80,7 +80,7 @@ def test_any_disturbance_is_gone_in_time(surrogate, naive, v, y) -> None:
                 assert left <= 0.01 * first + 2e-3
 
 
-def test_nothing_that_stands_still_settles(surrogate) -> None:
+def test_without_slip_the_settling_time_is_infinite(surrogate) -> None:
     for changed in ({"v0": 0.0}, {"v0": 0.0, "y0": 0.0}, {"v0": 0.0, "omega": 0.0}, {"k": None, "v0": 0.0, "y0": 0.0}):
         found = settling(surrogate, **{**CASE, **changed})
         assert (found.periods, found.time, found.slip_path) == (math.inf, math.inf, 0.0)
@@ -133,7 +133,7 @@ def test_a_bad_input_is_named(surrogate) -> None:
     assert caught.value.field == "Fz"
 
 
-def test_an_illegal_case_spoils_only_itself(surrogate) -> None:
+def test_an_illegal_case_affects_only_itself(surrogate) -> None:
     found = settling(surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.array([0.3, 0.3, 0.3])})
     assert found.periods[0] == settling(surrogate, **CASE).periods
     for column in (found.periods, found.periods_any, found.time, found.slip_path, found.error_bound):

@@ -121,13 +121,13 @@ def workers() -> Iterator[Any]:
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("call", workers())
-def test_workers_start_no_threads_unless_told(call: Callable[..., Any]) -> None:
+def test_workers_start_no_threads_by_default(call: Callable[..., Any]) -> None:
     unasked = Surrogate.open(1e-4)
     assert unasked.threads == processors()
     assert call(operator.attrgetter("threads"), unasked) == 1
 
 
-def test_eight_threads_may_ask_everything_at_once(table: Surrogate) -> None:
+def test_eight_threads_may_evaluate_at_once(table: Surrogate) -> None:
     expected = everything(table, 70_000)
     fresh = Surrogate.open(table.path, threads=2)  # power and stick fraction are not prepared yet
     with ThreadPoolExecutor(8) as pool:

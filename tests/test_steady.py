@@ -184,7 +184,7 @@ def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float]
 @pytest.mark.parametrize(
     ("v", "y"), [(1.0, 1e-10), (1e3, 1e-200), (1e-21, 1e-10), (2e-21, 1e-10), (1e-15, 1e-267), (3e-20, 1e-12)]
 )
-def test_amplitudes_below_the_scaled_one_report_the_speeds_of_their_own_problem(v: float, y: float) -> None:
+def test_amplitudes_below_the_scaled_one_report_unscaled_speeds(v: float, y: float) -> None:
     found = solve(v, y)
     assert found.slip_speed == pytest.approx(v, rel=1e-9)
     if found.regime == "continuous":
@@ -396,7 +396,7 @@ def test_every_status_has_advice() -> None:
     assert all(ADVICE.values())
 
 
-def test_a_stick_phase_without_end_is_told_apart() -> None:
+def test_a_stick_phase_without_end_has_its_own_status() -> None:
     # slip stops with the spring nearly across: half a swing of 2 y~ = 0.4 back cannot stretch it to the limit again
     w, out, orbit, _ = workspace()
     _, status = sections._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)

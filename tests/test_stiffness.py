@@ -65,7 +65,7 @@ def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_l
     assert same.k == pytest.approx(same.k_normal, rel=1e-14)
 
 
-def test_stiffness_scales_as_it_must() -> None:
+def test_stiffness_has_its_scaling_laws() -> None:
     # lengths times 2, forces times 4: the same strains, k twice
     small = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL)
     large = cylinder_on_flat(1e-2, 1e-2, 400.0, STEEL, STEEL)

@@ -106,7 +106,7 @@ def test_speeds_whose_square_overflows_still_follow_the_elliptic_integral(table:
     assert set(source) == {SOURCES.index("tail_fast")}
 
 
-def test_bound_next_to_the_corner_never_says_nothing(table: Surrogate) -> None:
+def test_bound_next_to_the_corner_is_small(table: Surrogate) -> None:
     # one digit of y~ moves mu~ by at most the root of two digits, however steep the cusp is
     v = np.geomspace(1e-300, 1e-9, 400)
     _, bound, _ = table.ratio_with_bound(v, 1.0)
@@ -228,7 +228,7 @@ def test_broadcasting(fine: Surrogate) -> None:
         fine.mu_ratio(np.ones(3), np.ones(2))
 
 
-def test_scalars_and_arrays_agree_bit_for_bit_in_everything_they_say(table: Surrogate) -> None:
+def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
     rng = np.random.default_rng(6)
     n = 400
     columns = {
@@ -265,7 +265,7 @@ def test_answer_shows_itself(fine: Surrogate) -> None:
     assert not hasattr(found, "__dict__")
 
 
-def test_one_bad_value_in_an_array_of_groups_spoils_only_itself(fine: Surrogate) -> None:
+def test_one_bad_value_in_an_array_of_groups_affects_only_itself(fine: Surrogate) -> None:
     v = np.array([0.1, -1.0, math.nan, math.inf, math.inf, 0.1])
     y = np.array([0.5, 0.5, 0.5, 0.5, math.inf, math.inf])
     found = fine.mu_ratio(v, y)
@@ -315,7 +315,7 @@ def test_warm_up_and_self_check_pass(table: Surrogate) -> None:
 # --- sharing ------------------------------------------------------------------------------------------
 
 
-def test_threads_may_ask_everything_at_once(fine: Surrogate) -> None:
+def test_threads_may_evaluate_at_once(fine: Surrogate) -> None:
     rng = np.random.default_rng(4)
     v, y = log_uniform(rng, 1e-3, 1e3, 30_000), log_uniform(rng, 1e-3, 1e3, 30_000)
     inputs = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": y, "omega": 1.0, "v0": v}

@@ -30,7 +30,7 @@ def test_values_do_not_depend_on_workers_or_chunks(monkeypatch: pytest.MonkeyPat
         assert np.array_equal(again[name], expected[name])
 
 
-def test_every_kind_says_what_a_single_solve_says() -> None:
+def test_every_kind_equals_a_single_solve() -> None:
     v, y = points(40)
     with Sweep(2) as sweep:
         full = sweep.solve("full", v, y)
@@ -46,7 +46,7 @@ def test_every_kind_says_what_a_single_solve_says() -> None:
         assert (crit["deficit"][i], crit["mu_ratio"][i]) == border(y[i])
 
 
-def test_shapes_broadcast_and_nothing_gives_nothing() -> None:
+def test_shapes_broadcast_and_an_empty_array_gives_an_empty_array() -> None:
     with Sweep(1) as sweep:
         plane = sweep.solve("full", np.geomspace(0.1, 1.0, 3)[:, None], np.geomspace(0.5, 5.0, 4))
         assert plane["mu_ratio"].shape == (3, 4)

@@ -376,7 +376,7 @@ def test_a_write_that_is_interrupted_leaves_nothing(tmp_path: Path, monkeypatch:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_where_a_folder_stands_no_table_is_written(tmp_path: Path) -> None:
+def test_a_folder_as_output_is_refused(tmp_path: Path) -> None:
     (tmp_path / "taken.nc").mkdir()
     with pytest.raises(TableError, match="cannot be written"):
         write_table(read_table(TABLE), tmp_path / "taken.nc")
@@ -391,7 +391,7 @@ def test_a_folder_that_must_not_be_written_to(tmp_path: Path) -> None:
         write_table(read_table(TABLE), closed / "new.nc")
 
 
-def test_every_variable_in_every_group_says_what_it_is() -> None:
+def test_every_variable_in_every_group_has_a_description() -> None:
     with xr.open_datatree(TABLE) as tree:
         assert tree.attrs["Conventions"] == "CF-1.11"
         assert tree.mu_ratio.attrs["ancillary_variables"] == "error_estimate"

@@ -116,7 +116,7 @@ def test_foreign_files_are_refused(tmp_path):
             Surrogate.open(path)
 
 
-def test_nothing_is_left_where_nothing_can_be_written(source, tmp_path):
+def test_no_file_is_left_where_none_can_be_written(source, tmp_path):
     with pytest.raises(TableError, match="cannot be written"):
         write_table(read_table(source), tmp_path / "no" / "such" / "table.nc")
     assert not list(tmp_path.iterdir())

@@ -26,7 +26,7 @@ def test_page_names_every_committed_table_and_no_other(tables_dir: Path, lines: 
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_page_repeats_what_the_file_holds(tables_dir: Path, lines: dict[str, list[list[str]]], name: str) -> None:
+def test_page_agrees_with_the_file(tables_dir: Path, lines: dict[str, list[list[str]]], name: str) -> None:
     s = Surrogate.open(tables_dir / name)
     (tolerance, solves, size, memory, absolute, relative, stick, power), (_, _, same, checksum) = lines[name]
     assert checksum == s.checksum

@@ -43,7 +43,7 @@ def test_info(client):
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_what_a_model_says_of_itself(client, model):
+def test_the_description_of_a_model(client, model):
     support = {"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False}
     assert ask(client, "ModelInfo", {"name": model}).json() == {"support": support}
     assert ask(client, "InputSizes", {"name": model}).json() == {"inputSizes": [6]}
@@ -97,7 +97,7 @@ def test_the_gradient_is_the_difference_quotient(client, model):
     assert product == pytest.approx(sum(a * b for a, b in zip(slopes, vec, strict=True)), rel=1e-12)
 
 
-def test_a_scalar_stands_for_a_vector(client):
+def test_a_scalar_is_used_for_every_component(client):
     request = {"name": "mu_macro", "input": [POINT], **WRT}
     slopes = ask(client, "Gradient", {**request, "sens": [2.5]}).json()
     assert ask(client, "Gradient", {**request, "sens": 2.5}).json() == slopes
@@ -119,7 +119,7 @@ def test_a_missing_name_is_a_model_not_found(client, endpoint):
 
 @pytest.mark.parametrize("body", [b"", b"{", b"\xff", b"[1]", b"3", b"null", b'"mu_macro"'])
 @pytest.mark.parametrize("endpoint", POSTS)
-def test_what_is_no_object_is_invalid_input(client, endpoint, body):
+def test_a_body_that_is_not_an_object_is_invalid_input(client, endpoint, body):
     refused(client.post(f"/{endpoint}", content=body), "InvalidInput")
 
 
@@ -135,7 +135,7 @@ def test_hessians_are_not_offered(client):
      ["0.3"], [[*POINT[:5], "0.01"]], [[*POINT[:5], True]], [[*POINT[:5], None]], [[*POINT[:5], [0.01]]],
      [[0, *POINT[1:]]], [[-0.3, *POINT[1:]]], [[*POINT[:5], -1e-9]], [[*POINT[:5], 10**400]]],
 )  # fmt: skip
-def test_an_invalid_input_is_told(client, endpoint, vectors):
+def test_an_invalid_input_is_reported(client, endpoint, vectors):
     body = {"name": "mu_macro", "input": vectors, **WRT, "sens": [1.0], "vec": [1.0] * 6}
     refused(ask(client, endpoint, body), "InvalidInput")
 
@@ -195,7 +195,7 @@ def test_an_answer_is_finite_or_an_error_of_the_protocol(client, vector, model):
 
 
 @pytest.mark.parametrize("path", ["/Info", *(f"/{name}" for name in POSTS)])
-def test_a_wrong_method_is_told_in_the_protocols_form(client, path):
+def test_a_wrong_method_is_reported_in_the_protocols_form(client, path):
     response = client.request("DELETE", path)
     refused(response, "UnsupportedFeature", 405)
     assert response.headers["allow"] == ("GET, HEAD" if path == "/Info" else "POST")

@@ -25,7 +25,7 @@ def full_model(columns):
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_what_the_gradient_says_of_uncertain_inputs_is_what_the_full_model_says(surrogate, sweep, place):
+def test_first_order_uncertainty_agrees_with_the_full_model(surrogate, sweep, place):
     """The standard deviation of mu_macro to first order, against that of solves at random inputs."""
     case = {**CASE, **PLACES[place]}
     share = {"mu0": 0.004, "Fz": 0.003, "k": 0.004, "y0": 0.003, "omega": 0.002, "v0": 0.005}

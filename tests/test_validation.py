@@ -64,14 +64,14 @@ def test_every_equation_is_judged(equation: int) -> None:
     assert equation in found
 
 
-def test_every_figure_stands_on_the_page() -> None:
+def test_every_figure_is_on_the_page() -> None:
     page = PAGE.read_text("utf-8")
     drawn = {path.name for path in (ROOT / "docs" / "figures").glob("fig*.png")}
     assert set(re.findall(r"\]\(figures/(fig\w+\.png)\)", page)) == drawn
     assert len(drawn) == 8
 
 
-def test_what_the_text_says_between_the_tables() -> None:
+def test_the_statements_between_the_tables() -> None:
     # the border meets the line of small angles
     for y, side in ((1.055, 1.0), (1.065, -1.0)):
         assert side * (np.hypot(1.0, border(y)[0]) - y) > 0.0

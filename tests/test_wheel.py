@@ -66,7 +66,7 @@ def _case():
     return {name: float(value) for name, value in (word.split("=") for word in CASE.split())}
 
 
-def test_the_tables_lie_inside_the_package_and_nothing_generic_beside_it(installed):
+def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(installed):
     found = json.loads(installed.run("mumacro", "table", "--json"))
     site = Path(found["path"]).parents[2]
     assert site.name == "site-packages"
@@ -85,7 +85,7 @@ def test_the_tables_lie_inside_the_package_and_nothing_generic_beside_it(install
         (("export", "--format", "csv"), "builder"),
     ],
 )
-def test_what_needs_more_says_in_one_line_what_to_install(installed, words, extra):
+def test_without_an_extra_one_line_says_what_to_install(installed, words, extra):
     message = installed.run("mumacro", *words, code=1)
     assert len(message.splitlines()) == 1
     assert f"pip install 'mumacro[{extra}]'" in message

@@ -6,7 +6,7 @@ follows.  The language is the one the kernels are written in: floats, integers a
 arrays, element by element.  Anything else raises :class:`TranslationError` with the place, so that a kernel which
 outgrows the language is noticed when the header is made and not when it is used.
 
-Python's meaning is kept: evaluation order, true division, comparison chains, ``min`` and ``max`` that keep the first
+C has the meaning of Python: evaluation order, true division, comparison chains, ``min`` and ``max`` that keep the first
 of equals.  Operations are not reordered, so that C and the interpreted Python give the same bits wherever the two use
 the same mathematical library; the compiled kernels may differ in the last digits, since they fuse multiply-adds.
 """

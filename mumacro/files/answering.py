@@ -21,7 +21,7 @@ __all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "numbers"]
 
 Array = NDArray[np.float64]
 
-#: what is said of a row that has no answer: its index, the input (null: the row itself), what stands there, why not
+#: of a row without an answer: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema([("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())])
 
 _PLAIN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(?i:nan|inf|infinity)$"
@@ -73,7 +73,7 @@ def answer(
     Raises
     ------
     FilesError
-        A column is missing, misnamed or holds no numbers.
+        A column is missing, has a wrong name or no numbers.
 
     Examples
     --------

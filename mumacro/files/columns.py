@@ -1,4 +1,4 @@
-"""Which column of a file is which input, and in which unit.  What looks like an input and is none is refused."""
+"""Which column of a file is which input, and in which unit.  Names similar to a missing input are refused."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Columns:
 
     @property
     def rigid(self) -> bool:
-        """Whether every contact is rigid because the user said so."""
+        """Whether every contact is rigid, by the user's option."""
         return "k" not in self.places
 
 
@@ -39,7 +39,7 @@ def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str]
     names : sequence of str
         The headings, such as ``Fz``, ``k [N/mm]`` or ``note``.
     rigid : bool
-        The user says that all contacts are rigid; then there must be no column for k.
+        All contacts are rigid; then there must be no column for k.
     added : sequence of str
         Names that answers will take.
 
@@ -80,7 +80,7 @@ def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str]
     if {"f", "omega"} <= places.keys():
         raise FilesError("there are both f [Hz] and omega [rad/s]; leave one out")
     if rigid and "k" in places:
-        raise FilesError(f"--rigid was said, but there is a column {places['k'][0]!r}; leave one out")
+        raise FilesError(f"--rigid is given, but there is a column {places['k'][0]!r}; leave one out")
     _check_missing(names, places, rigid)
     return Columns(places)
 
@@ -95,13 +95,11 @@ def _check_missing(names: Sequence[str], places: dict[str, tuple[str, Scale]], r
         if alike:
             meant = suggestion(split_unit(alike[0])[0]) or name
             unit = SI[meant][0]
-            remedy = (
-                f"the column {alike[0]!r} looks like it: rename it to {meant} [{unit}] (or another unit in brackets)"
-            )
+            remedy = f"{alike[0]!r} is similar: rename that column to {meant} [{unit}] (or another unit in brackets)"
             raise FilesError(f"there is no column {name}; {remedy}")
         if name == "k":
             if not rigid:
-                raise FilesError("there is no column k [N/m]; say --rigid if all contacts are rigid")
+                raise FilesError("there is no column k [N/m]; give --rigid if all contacts are rigid")
         else:
             hint = "omega [rad/s] or f [Hz]" if name == "omega" else f"{name} [{SI[name][0]}]"
             raise FilesError(f"there is no column {hint}; there are {', '.join(map(repr, names))}")

@@ -22,7 +22,7 @@ __all__ = ["main"]
 _COLUMNS = """\
 columns, by name in any order; another unit stands in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
-  an empty cell or "rigid" in k is a rigid contact; without a column k say --rigid
+  an empty cell or "rigid" in k is a rigid contact; without a column k give --rigid
   other columns come along as they are
 added: mu_macro, mu_ratio, regime, error_bound, source
 rows without an answer stand in OUT.rejects.csv only: row (from 1), field, value, reason
@@ -31,7 +31,7 @@ examples:
   mumacro eval cases.parquet -o out.parquet
   mumacro eval 'runs/2024-*.csv.gz' -o answers/ --table 1e-7
 
-A run that was stopped goes on when the same command is given again, and ends with the same bytes.
+A stopped run resumes when the same command is given again; the output has the same bytes.
 exit codes: 0 every row answered, 3 some rows rejected, 1 could not run, 2 wrong words, 130 interrupted
 """
 
@@ -44,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("cases", nargs="+", help="files, folders or patterns, all of one format")
     parser.add_argument(
-        "-o", "--out", required=True, help="the file to write; its ending tells the format; or a folder/"
+        "-o", "--out", required=True, help="the file to write; its ending sets the format; or a folder/"
     )
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table")
     parser.add_argument("--rigid", action="store_true", help="there is no column k: all contacts are rigid")
@@ -102,7 +102,7 @@ def main(words: Sequence[str]) -> int:
                 on_error=chosen.on_error, force=chosen.force, part_rows=chosen.part_rows, progress=report,
             )  # fmt: skip
     except KeyboardInterrupt:
-        print("mumacro eval: stopped; the same command goes on from here", file=sys.stderr)
+        print("mumacro eval: stopped; the same command resumes", file=sys.stderr)
         return 130
     except pa.ArrowException as error:
         raise FilesError(f"{chosen.cases[0]}: {one_line(error)}") from None

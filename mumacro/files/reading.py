@@ -43,7 +43,7 @@ _PACKED = (".csv.gz", ".ndjson.gz", ".jsonl.gz")
 
 
 def format_of(path: Path) -> tuple[str, bool] | None:
-    """The format that a name's ending tells and whether it is packed; None for another ending."""
+    """The format by a name's ending, and whether it is compressed; None for another ending."""
     name = path.name.lower()
     packed = name.endswith(_PACKED)
     found = FORMATS.get(Path(name.removesuffix(".gz")).suffix if packed else Path(name).suffix)
@@ -418,7 +418,7 @@ class NdjsonSource(_TextSource):
         return Block(batch, np.array(rows, np.int64), records.place, lines, faults)
 
     def _read_inputs(self, row: int, found: dict[str, Any]) -> Fault | None:
-        """Turn the inputs of one object into doubles; or say what is wrong with one."""
+        """The inputs of one object as doubles, or the fault of one of them."""
         for name, (column, _) in self.columns.places.items():
             value = found.get(column)
             if name == "k" and (value is None or (isinstance(value, str) and value.strip().lower() in ("", "rigid"))):
@@ -427,7 +427,7 @@ class NdjsonSource(_TextSource):
                 found[column] = None
                 continue
             if value is None:
-                continue  # said where all missing values are
+                continue  # reported with all missing values
             shown = shorten(json.dumps(value).encode())
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 return Fault(row, name, shown, "must be a number")
@@ -464,7 +464,7 @@ def _json_table(texts: list[bytes], schema: pa.Schema, unexpected: str) -> pa.Ta
 
 
 def _check_said(texts: list[bytes], stiffness: pa.Array, column: str) -> None:
-    """A k that is null must stand there: a line without it has forgotten it."""
+    """A null k must be written: a line without k is refused."""
     said = re.compile(rb'"' + re.escape(json.dumps(column)[1:-1].encode()) + rb'"\s*:')
     for i in np.flatnonzero(stiffness.is_null().to_numpy(zero_copy_only=False)).tolist():
         if said.search(texts[i]) is None or texts[i].count(b"{") > 1:

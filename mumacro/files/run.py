@@ -2,7 +2,7 @@
 
 While it runs, ``OUT.parts`` holds a plan (what is answered, how, from which table), the finished parts, and a note of
 each with the place where the next one begins.  A part that has its note is never made again, and one without it is
-made anew from the place that the note before it names, with the same bytes.
+written again from the place that the note before it names, with the same bytes.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Summary:
 
 @dataclass
 class _Note:
-    """What stands in a part, and where the next one begins."""
+    """The contents of a part, and where the next one begins."""
 
     place: Place
     rows: int = 0
@@ -205,13 +205,13 @@ class _Run:
     # --- begin --------------------------------------------------------------------------------------
 
     def begin(self, force: bool) -> None:
-        """Take up the parts that a run like this one left, or make room for them."""
+        """Take over the parts of an earlier run of the same command, or make a folder for them."""
         plan = json.dumps(self.plan).encode()
         kept = self.parts / "plan.json"
         if not (kept.is_file() and kept.read_bytes() == plan):
             if not force and any(path.name[0] != "." for path in self.parts.iterdir()):
                 raise FilesError(
-                    f"{self.parts}: holds parts of another run (input, options or table differ); --force drops them"
+                    f"{self.parts}: has parts of another run (input, options or table differ); --force deletes them"
                 )
             if not force:
                 self._check_free()
@@ -219,7 +219,7 @@ class _Run:
             write_whole(kept, plan)
 
     def _clear(self) -> None:
-        """Empty the folder of parts: the last note first, then parts, then the plan; who is stopped here can go on."""
+        """Empty the folder of parts.  In this order a stopped run can resume: last note, parts, plan.json."""
         found = sorted(self.parts.iterdir(), reverse=True)
         for path in sorted(found, key=lambda path: (path.name == "plan.json", path.suffix != ".json")):
             path.unlink()

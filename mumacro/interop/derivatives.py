@@ -1,4 +1,4 @@
-"""What an automatic differentiator asks of a table: values and slopes of arrays, and nothing that raises half-way.
+"""Values and slopes of arrays for automatic differentiation, without exceptions for single cases.
 
 Illegal cases are NaN: a traced program cannot stop for one of its values.  Slopes are one-sided at v = 0, where some
 are infinite.

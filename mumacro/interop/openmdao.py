@@ -28,7 +28,7 @@ class Friction(om.ExplicitComponent):  # type: ignore[misc]
     vec_size : int
         Cases at once: the length of every input and output.
     power : bool
-        Also give ``oscillation_power``, what the shaker puts into the contact: mu0 Fz l0 omega <y~ cos tau u_y> [W].
+        Also give ``oscillation_power``, the mean power of the shaker: mu0 Fz l0 omega <y~ cos tau u_y> [W].
 
     Notes
     -----

@@ -69,7 +69,7 @@ class _Slopes(torch.autograd.Function):  # type: ignore[misc]
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
-        """Nothing is kept: there is no further derivative."""
+        """Stores nothing: there is no further derivative."""
 
     @staticmethod
     def backward(ctx: Any, *_: Any) -> Any:

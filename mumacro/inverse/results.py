@@ -104,7 +104,7 @@ def checked_case(case: Mapping[str, float | None], without: str) -> dict[str, fl
     Raises
     ------
     InputError
-        A value is missing, out of bounds, said twice, or given for the unknown.
+        A value is missing, out of bounds, given twice, or given for the unknown.
     """
     if without not in FIELDS:
         raise InputError("unknown", without, f"one of {', '.join(FIELDS)}")

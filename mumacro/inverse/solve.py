@@ -9,7 +9,7 @@ v0     rises from the static limit to mu0     one; mu0 itself is not reached
 y0     falls from mu0 to 0                    one; 0 is not reached, unless v0 = 0
 omega  falls from mu0 to the static limit     one; the static limit is not reached
 k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0 above 9.72 it falls to a minimum at y~
-                                              from 4.1 to 6.5, rises to a maximum (at y~ = 0.115 r^2 for large r), and
+                                              from 4.1 to 6.4, rises to a maximum (at y~ = 0.115 r^2 for large r), and
                                               falls again
 Fz     the same in 1/Fz                       the same
 mu0    rises: it would fold only where        one, but searched like k and Fz
@@ -210,7 +210,7 @@ def solve_for(
     Returns
     -------
     Solution
-        All roots of every target, ascending, each with the interval that the error bound leaves; and what is in reach.
+        All roots of every target, ascending, each with its interval from the error bound; and the reachable range.
 
     Raises
     ------

@@ -56,7 +56,7 @@ _UNITS: dict[str, dict[str, int]] = {
 
 
 class CompilerError(MumacroError):
-    """A compiler that is there refuses the unit's sources; the text is what it said."""
+    """The C compiler refuses the unit's sources; the text is its message."""
 
 
 def write_fmu2(table: Table, out: BinaryIO) -> None:
@@ -108,7 +108,7 @@ def _binaries(sources: dict[str, str], version: int) -> dict[str, bytes]:
                     raise CompilerError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
                 found[place] = made.read_bytes()
     if not found:
-        print("mumacro: no C compiler is installed: the FMU holds sources and no binary", file=sys.stderr)
+        print("mumacro: no C compiler is installed: the FMU has sources and no binary", file=sys.stderr)
     return found
 
 

@@ -34,7 +34,7 @@ function showUncertainty(found) {
   if (place.hidden) return;
   if (found.std === null) place.textContent = "± not finite: the slope is infinite here";
   else if (found.std_first_order_enough) place.textContent = `± ${show(found.std, 3)} (one standard deviation)`;
-  else place.textContent = `± ${show(found.std_sampled, 3)} (one standard deviation, of samples; by slopes it would be ${show(found.std, 3)}: the law bends too much for them)`;
+  else place.textContent = `± ${show(found.std_sampled, 3)} (one standard deviation, from samples; first order, ${show(found.std, 3)}, is not accurate enough here)`;
 }
 
 /** Per cent that mu_macro changes when an input grows by 1 %, and the input's share of the variance. */

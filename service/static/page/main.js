@@ -16,7 +16,7 @@ import { fromAddress, startState, toAddress } from "./state.js";
 import { Status } from "./status.js";
 
 const $ = (id) => document.getElementById(id);
-const OLD = "What is grey belongs to earlier values.";
+const OLD = "Grey results belong to earlier values.";
 const status = new Status($("status"), $("main"));
 const lawStatus = new Status($("law-status"), $("law-section"));
 let state, form, lawForm, solver;
@@ -99,7 +99,7 @@ function readAddress() {
   form.clear();
   lawForm.forget("start", "stop", "curves");
   $("notice").hidden = !read.faults.length;
-  $("notice-text").textContent = read.faults.length ? `This link holds what cannot be used, and start values stand in its place: ${read.faults.join("; ")}.` : "";
+  $("notice-text").textContent = read.faults.length ? `This link has values that cannot be used; start values replace them: ${read.faults.join("; ")}.` : "";
   change({});
 }
 
@@ -126,7 +126,7 @@ function movePoint() {
   const out = Number.isNaN(v) || Number.isNaN(y) ? [0, 0] : map.outside(v, y);
   const sides = [["ṽ", v, out[0]], ["ỹ", y, out[1]]].filter(([, , side]) => side !== 0).map(([name, value]) => `${name} = ${show(value, 3)}`);
   $("map-out").hidden = !sides.length;
-  $("map-out").textContent = !sides.length ? "" : rigid ? "Rigid contact: ṽ and ỹ are infinite; the arrow on the frame shows where to." : `The point is outside of this map (${sides.join(", ")}): the arrow on the frame points to it.`;
+  $("map-out").textContent = !sides.length ? "" : rigid ? "Rigid contact: ṽ and ỹ are infinite; the arrow on the frame shows the direction." : `The point is outside of this map (${sides.join(", ")}): the arrow on the frame points to it.`;
   $("map").setAttribute("aria-label", `Map of the friction ratio. The point: speed ${show(v, 3)}, amplitude ${show(y, 3)}, ratio ${show(answer.mu_ratio, 3)}, ${REGIMES[answer.regime]}.`);
 }
 
@@ -179,7 +179,7 @@ function moveTo(v, y) {
   const { values, rigid } = state;
   if (rigid || values.omega === 0) {
     hovered = false; // what the place itself would read is of no use now
-    $("map-read").textContent = rigid ? "A rigid contact has no place inside the map: switch it off to move the point." : "Without a frequency there is no place inside the map.";
+    $("map-read").textContent = rigid ? "A rigid contact has no point inside the map: switch it off to move the point." : "Without a frequency there is no point inside the map.";
     return;
   }
   const length = (values.mu0 * values.Fz) / values.k;
