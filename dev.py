@@ -7,6 +7,7 @@
     python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until it is told to stop
+    python3 dev.py page            the page as a folder for any static host, in build/page; needs zig, or clang and lld
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 
@@ -253,6 +254,16 @@ def build_docs(folder: str | Path) -> int:
     return run(BIN / "sphinx-build", "-W", "--keep-going", "-q", "docs", folder, env=environment())
 
 
+def build_page(folder: str) -> int:
+    """Make the page that computes in the browser from the table of 1e-7: a folder for any static host."""
+    table, module = "tables/mumacro-1e-7.nc", "build/mumacro.wasm"
+    (ROOT / "build").mkdir(exist_ok=True)
+    python = (PYTHON, "-m")
+    export = (*python, "builder", "export", table, "--format", "wasm", "--out", module)
+    code = run(*export, env=environment(), quiet=True)
+    return code or run(*python, "service.static_page", table, module, folder, env=environment())
+
+
 def check_packages() -> list[str]:
     """Build what would be uploaded, into a temporary folder, and check it; return the names of what failed."""
     failed = []
@@ -419,6 +430,11 @@ def main(arguments: list[str]) -> int:
             ensure("dev")
             code = build_docs("build/docs")
             print("The site is in build/docs: open build/docs/index.html" if code == 0 else "FAILED: see above")
+            return code
+        if word == "page" and not rest:
+            ensure("dev")
+            code = build_page("build/page")
+            print("The page is in build/page; try it:  python3 -m http.server -d build/page" if code == 0 else "FAILED")
             return code
         if word == "serve":
             return serve(rest)

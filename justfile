@@ -27,6 +27,10 @@ fix:
 serve *ARGS:
     {{python}} dev.py serve {{ARGS}}
 
+# The page as a folder for any static host: it computes in the browser
+page:
+    {{python}} dev.py page
+
 # Pin the dependencies again; `just lock --upgrade` moves them forward
 lock *ARGS:
     {{python}} dev.py lock {{ARGS}}

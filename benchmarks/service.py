@@ -5,8 +5,8 @@
     python benchmarks/service.py --only waiting start            some of the parts that need no other
     python benchmarks/service.py --peers /path/to/other/python   an interpreter that has umbridge or mlserver
 
-Needs ``wrk``, ``curl``, Linux, and two processors: the servers get one, who asks the other.  Servers run side by side
-and are asked in turn, so that a busy neighbour slows all of them; of the rounds the median counts.
+Needs ``wrk``, ``curl``, ``nginx``, Linux, and two processors: the servers get one, who asks the other.  Servers run
+side by side and are asked in turn, so that a busy neighbour slows all of them; of the rounds the median counts.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import http.client
 import json
+import math
 import os
 import shutil
 import signal
@@ -25,7 +26,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ from service.formats.columns import numbers_ready
 from service.quantities import QUANTITIES
 from service.tables import LoadedTable
 
+CHOICES = ("includes", "waiting", "streams", "once", "start", "replicas", "advice")
 PAGE = ROOT / "docs" / "service.md"
 PLACES = {"over-http": ROOT / "README.md"}  # all else is on the page
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
@@ -598,6 +600,138 @@ def measure_streams() -> list[list[str]]:
     return rows
 
 
+# --- replicas and advice ------------------------------------------------------------------------------
+
+_NGINX = """
+daemon off; master_process off; pid {folder}/pid; error_log {folder}/error.log warn;
+events {{ worker_connections 1024; }}
+http {{
+  access_log off; client_max_body_size 1g; proxy_http_version 1.1; proxy_set_header Connection "";
+  client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy; fastcgi_temp_path {folder}/fastcgi;
+  uwsgi_temp_path {folder}/uwsgi; scgi_temp_path {folder}/scgi;
+  upstream replicas {{ {servers} keepalive 64; }}
+  server {{ listen 127.0.0.1:{port}; location / {{ proxy_pass http://replicas; }} }}
+}}
+"""
+
+
+def nginx(replicas: Sequence[Server], folder: Path) -> Any:
+    """A proxy of one process in front of some servers, on their core."""
+    port = free_port()
+    home = folder / f"nginx-{len(replicas)}"
+    home.mkdir(exist_ok=True)
+    servers = " ".join(f"server 127.0.0.1:{replica.port};" for replica in replicas)
+    (home / "nginx.conf").write_text(_NGINX.format(folder=home, servers=servers, port=port))
+    program = shutil.which("nginx", path=f"{os.environ['PATH']}:/usr/sbin")
+    if program is None:
+        raise SystemExit("nginx is not installed")
+    return running("nginx", [program, "-p", str(home), "-c", str(home / "nginx.conf")], port, "/readyz")
+
+
+def measure_replicas(rounds: int, seconds: int, folder: Path) -> str:
+    """Requests a second and processor time of one and two replicas, asked directly and through nginx.
+
+    Replicas, proxy and caller share two processors, so requests a second cannot double here; how far they would grow
+    with a core for each process is told by the processor time of each.
+    """
+    script, rows, cost = post().script(folder), [], {}
+    with ours() as first, ours() as second:
+        os.sched_setaffinity(second.process.pid, {CLIENT_CORE})
+        for thread in Path(f"/proc/{second.process.pid}/task").iterdir():
+            os.sched_setaffinity(int(thread.name), {CLIENT_CORE})
+        for server in (first, second):
+            load(server, script, 1)
+        for label, replicas, proxied in (("one, asked directly", [first], False), ("one behind nginx", [first], True),
+                                         ("two behind nginx", [first, second], True)):  # fmt: skip
+            progress(label)
+            with nginx(replicas, folder) if proxied else nullcontext(first) as asked:
+                runs = []
+                for _ in range(rounds):
+                    before = [server.cpu() for server in (first, second)]
+                    spent, rate = load(asked, script, seconds)
+                    one, two = (server.cpu() - old for server, old in zip((first, second), before, strict=True))
+                    a_request = 1e6 * (one + two) / (rate * seconds)
+                    runs.append((rate, a_request, spent if proxied else 0.0, two / (one + two)))
+                rate, service, proxy, share = map(statistics.median, zip(*runs, strict=True))
+                cost[label] = (service, proxy)
+                shown = quantity(proxy) if proxied else "-"
+                rows.append([label, quantity(rate), quantity(service), shown, f"{share:.2f}"])
+    service, proxy = cost["two behind nginx"]
+    head = ["replicas", "requests/s", "service [us] a request", "nginx [us] a request", "share of the second"]
+    note = (
+        f"With a core for each process one replica answers {quantity(1e6 / service)} requests a second, and one "
+        f"process of nginx passes {quantity(1e6 / proxy)} on: the rate grows with the number of replicas up to "
+        f"{max(1, int(service / proxy))} for each process of nginx."
+    )
+    return markdown(head, rows) + "\n\n" + note
+
+
+_LIBRARY = """
+import time
+import numpy as np
+import mumacro
+from mumacro.dimensional import FIELDS
+s = mumacro.open()
+case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
+s.evaluate(**case)
+columns = {name: np.full(100_000, value) for name, value in case.items()}
+s.on_one_thread().evaluate_columns(*columns.values())
+ready = time.perf_counter()
+for _ in range(10_000): s.evaluate(**case)
+one = (time.perf_counter() - ready) / 1e4
+ready = time.perf_counter()
+s.on_one_thread().evaluate_columns(*columns.values())
+print(one, (time.perf_counter() - ready) / 1e5)
+"""
+
+
+def measure_advice(rounds: int) -> str:
+    """What each way of asking costs the caller who waits, and from how many cases on the next one is faster."""
+    with ours() as server:
+        case = json.dumps(cases(1)[0]).encode()
+        caller = Caller(server.port)
+
+        def wait(ask: Callable[[], object], times: int) -> float:
+            """Seconds for one, best of the rounds."""
+            found = []
+            for _ in range(rounds):
+                begun = time.perf_counter()
+                for _ in range(times):
+                    ask()
+                found.append((time.perf_counter() - begun) / times)
+            return min(found)
+
+        new = wait(lambda: server.ask("POST", "/v1/mu-macro", case), 200)
+        kept = wait(lambda: caller.ask("/v1/mu-macro", case, KINDS["columns"]), 200)
+        ways = [("one case, new connection", 0.0, new), ("one case, connection kept", 0.0, kept)]
+        for form in ("columns", "arrow"):
+            small, large = body_of(form, 1), body_of(form, 100_000)
+            fixed = wait(lambda small=small, form=form: caller.ask(BATCH, small, KINDS[form]), 200)  # type: ignore[misc]
+            whole = wait(lambda large=large, form=form: caller.ask(BATCH, large, KINDS[form]), 3)  # type: ignore[misc]
+            ways.append((f"batch, {LABELS[form]}", fixed, (whole - fixed) / 1e5))
+    bare, whole, single, array = [], [], [], []
+    for _ in range(rounds):
+        begun = time.perf_counter()
+        subprocess.run([sys.executable, "-c", "pass"], check=True)
+        bare.append(time.perf_counter() - begun)
+        begun = time.perf_counter()
+        words = [sys.executable, "-c", _LIBRARY]
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+        one, each = map(float, done)
+        whole.append(time.perf_counter() - begun - 1e4 * one - 1e5 * each)
+        single.append(one)
+        array.append(each)
+    start = min(whole) - min(bare)
+    ways += [("library, a call a case", start, min(single)), ("library, arrays", start, min(array))]
+    rows = []
+    for name, fixed, each in ways:
+        # from how many cases on this way takes less time than one case at a time on a kept connection
+        against = "-" if kept <= each else f"{math.ceil(fixed / (kept - each)) or 1:,}"
+        rows.append([name, quantity(1e3 * fixed), quantity(1e6 * each), against])
+    head = ["way", "once [ms]", "each case [us]", "faster than requests on a kept connection from [cases]"]
+    return markdown(head, rows)
+
+
 def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path) -> None:
     """Million cases and requests a second over the size of a batch."""
     import matplotlib
@@ -665,6 +799,8 @@ def others(options: argparse.Namespace, folder: Path) -> dict[str, Callable[[], 
             ["batches of 100,000 at once", "one body [MB]", *(f"{n} [MB]" for n in AT_ONCE)], measure_at_once()
         ),
         "start": lambda: markdown(["one worker, one table", ""], measure_start(options.rounds)),
+        "replicas": lambda: measure_replicas(options.rounds, options.seconds, folder),
+        "advice": lambda: measure_advice(options.rounds),
     }
 
 
@@ -713,7 +849,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--seconds", type=int, default=3)
     parser.add_argument("--peers", nargs="*", default=[], metavar="PYTHON")
-    parser.add_argument("--only", nargs="*", default=[], choices=("includes", "waiting", "streams", "once", "start"))
+    parser.add_argument("--only", nargs="*", default=[], choices=CHOICES)
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     for program in ("wrk", "taskset", "curl"):

@@ -28,6 +28,7 @@ from mumacro.table import Table, json_attributes, read_table
 
 from .c.fmu.model import write_fmu2, write_fmu3
 from .c.header import write_header
+from .c.wasm import write_wasm
 
 __all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
 
@@ -126,6 +127,7 @@ FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None]]] = {
     "mat": ("{}.mat", _mat),
     "modelica": ("{}.txt", _modelica),
     "parquet": ("{}.parquet", _parquet),
+    "wasm": ("mumacro.wasm", write_wasm),
 }
 
 

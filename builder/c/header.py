@@ -18,7 +18,7 @@ from . import questions
 from .translate import Translator
 from .types import FLOAT, INT, Array, literal
 
-__all__ = ["header_text", "write_header"]
+__all__ = ["header_text", "texts", "write_header"]
 
 _HERE = Path(__file__).parent
 _SIX = [FLOAT] * len(dimensional.FIELDS)
@@ -88,8 +88,8 @@ def header_text(table: Table) -> str:
         "mumacro_in_cells_##of, mumacro_in_blocks_##of",
         "#define mumacro_in_table_of(of) mumacro_in_cells_of(of), mumacro_in_border_cells, mumacro_in_pieces\n",
         f"static const signed char mumacro_in_regimes[] = {{{_row(charts.REGIME_OF_SOURCE)}}};",
-        _texts("mumacro_in_source_names", charts.SOURCES),
-        _texts("mumacro_in_error_texts", errors),
+        texts("mumacro_in_source_names", charts.SOURCES),
+        texts("mumacro_in_error_texts", errors),
         *(_table(name, values) for name, values in {**into.tables, **arrays}.items()),
         *(_struct(struct.name, struct.items) for struct in into.structs.values()),
         _text("primitives.h"),
@@ -152,8 +152,9 @@ def _names(comment: str, prefix: str, names: Sequence[str]) -> str:
     return f"/* {comment} */\nenum {{ {', '.join(f'MUMACRO_{prefix}{name.upper()}' for name in names)} }};\n"
 
 
-def _texts(name: str, texts: Sequence[str]) -> str:
-    quoted = ", ".join(f'"{text}"' for text in texts)
+def texts(name: str, values: Sequence[str]) -> str:
+    """A constant array of texts."""
+    quoted = ", ".join(f'"{text}"' for text in values)
     return f"static const char *const {name}[] = {{{quoted}}};"
 
 

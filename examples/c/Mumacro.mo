@@ -1,5 +1,5 @@
 package Mumacro "Macroscopic friction of an oscillated sliding contact, by mumacro.h"
-  function muMacro "mu_macro, smooth in each regime; NaN where an input is illegal"
+  pure function muMacro "mu_macro, smooth in each regime; NaN where an input is illegal"
     input Real mu0(min=0) "Coulomb friction coefficient";
     input Real Fz(unit="N") "normal force";
     input Real k(unit="N/m") "tangential stiffness";
@@ -12,7 +12,7 @@ package Mumacro "Macroscopic friction of an oscillated sliding contact, by mumac
     annotation (derivative = muMacro_der);
   end muMacro;
 
-  function muMacro_der "its derivative along a direction of the inputs"
+  pure function muMacro_der "its derivative along a direction of the inputs"
     input Real mu0, Fz, k, y0, omega, v0;
     input Real der_mu0, der_Fz, der_k, der_y0, der_omega, der_v0;
     output Real der_mu;
@@ -23,7 +23,7 @@ package Mumacro "Macroscopic friction of an oscillated sliding contact, by mumac
     der_mu := g*{der_mu0, der_Fz, der_k, der_y0, der_omega, der_v0};
   end muMacro_der;
 
-  function gradient "d mu_macro / d (mu0, Fz, k, y0, omega, v0)"
+  pure function gradient "d mu_macro / d (mu0, Fz, k, y0, omega, v0)"
     input Real mu0, Fz, k, y0, omega, v0;
     output Real g[6];
   external "C" mumacro_modelica_gradient(mu0, Fz, k, y0, omega, v0, g)

@@ -18,13 +18,13 @@ from ..kernel import BOUNDS, POSITIVE, UNITS
 from ..tables import tables_of
 from . import etag_matches, file_answer
 
-__all__ = ["ASSETS", "OPEN_PATHS", "POLICY", "router"]
+__all__ = ["ASSETS", "FOLDER", "OPEN_PATHS", "POLICY", "map_content", "names_content", "router"]
 
 router = APIRouter(include_in_schema=False)
 
-_FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
+FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
-ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(_FOLDER.iterdir()) if path.suffix in _TYPES}
+ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(FOLDER.iterdir()) if path.suffix in _TYPES}
 _NAMES = "/static/page/names.json"
 #: paths without an API key: the page and its parts, which hold no number
 OPEN_PATHS = frozenset({"/", _NAMES, *(f"/static/page/{name}" for name in ASSETS)})
@@ -48,12 +48,12 @@ _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coar
 async def page(request: Request) -> Response:
     """Return the page."""
     headers = {"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer", "Cache-Control": "no-cache"}
-    return file_answer(request, _FOLDER / "index.html", headers, media_type="text/html")
+    return file_answer(request, FOLDER / "index.html", headers, media_type="text/html")
 
 
 def _add_asset(name: str, media_type: str) -> None:
     async def asset(request: Request) -> Response:
-        return file_answer(request, _FOLDER / name, {"Cache-Control": "no-cache"}, media_type=media_type)
+        return file_answer(request, FOLDER / name, {"Cache-Control": "no-cache"}, media_type=media_type)
 
     router.add_api_route(f"/static/page/{name}", asset, methods=["GET", "HEAD"], name=f"page-{name}")
 
@@ -66,6 +66,12 @@ for _name, _media_type in ASSETS.items():
 @router.get(_NAMES)
 async def names(request: Request) -> Response:
     """Return the library's inputs, units, bounds, approximations and borders, and whether there is a guide."""
+    content = names_content(request.app.state.settings.guide is not None)
+    return Response(content, headers={"Cache-Control": "no-cache"}, media_type="application/json")
+
+
+def names_content(guide: bool) -> bytes:
+    """``names.json``."""
     inputs = {
         name: {
             "unit": UNITS[name], "bound": BOUNDS[name], "positive": name in POSITIVE,
@@ -75,9 +81,7 @@ async def names(request: Request) -> Response:
     }  # fmt: skip
     about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
     of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
-    guide = request.app.state.settings.guide is not None
-    content = dump({"inputs": inputs, "approximations": about, "borders": of_paper, "guide": guide})
-    return Response(content, headers={"Cache-Control": "no-cache"}, media_type="application/json")
+    return dump({"inputs": inputs, "approximations": about, "borders": of_paper, "guide": guide})
 
 
 @router.head("/static/page/map.json")
@@ -89,7 +93,7 @@ async def map_data(request: Request) -> Response:
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
-    content = await anyio.to_thread.run_sync(_map, surrogate)
+    content = await anyio.to_thread.run_sync(map_content, surrogate)
     return Response(content, headers=headers, media_type="application/json")
 
 
@@ -98,7 +102,8 @@ def _equations(name: str) -> list[int]:
     return [number for number, found in EQUATIONS.items() if found == name]
 
 
-def _map(surrogate: Surrogate) -> bytes:
+def map_content(surrogate: Surrogate) -> bytes:
+    """``map.json``."""
     axes = {}
     for name, (low, high) in {"v_tilde": _V_DECADES, "y_tilde": _Y_DECADES}.items():
         axes[name] = {"start": 10.0**low, "stop": 10.0**high, "n": _PER_DECADE * (high - low) + 1}

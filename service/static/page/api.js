@@ -1,51 +1,10 @@
-// Questions to the service.
-import { withKey } from "./key.js";
+// Questions and their answers: who answers is said in service.js.
+export { KeyWanted, Refused } from "./failures.js";
+export { get, post } from "./service.js";
+import { KeyWanted, Refused, Unanswered } from "./failures.js";
 
-const WAIT_MS = 20_000; // for an answer
 const SLOW_MS = 1_500; // after which the old answer is marked as old
 const AGAIN_S = [1, 2, 4, 8]; // between attempts, as long as there is no answer
-
-/** The service wants a key, or another one. */
-export class KeyWanted extends Error {}
-
-/** No answer for now: worth asking again after so many seconds, or when the channel thinks so. */
-class Unanswered extends Error {
-  constructor(message, seconds = null) {
-    super(message);
-    this.seconds = seconds;
-  }
-}
-
-/** What was asked is refused; `faults` are { field, reason }. */
-export class Refused extends Error {
-  constructor(message, faults) {
-    super(message);
-    this.faults = faults;
-  }
-}
-
-async function ask(path, options) {
-  let response, body;
-  try {
-    response = await fetch(path, { ...options, signal: AbortSignal.timeout(WAIT_MS) });
-    body = await response.json();
-  } catch (error) {
-    if (response === undefined || error.name === "TimeoutError") throw new Unanswered("The service does not answer.");
-    throw new Unanswered(`The response of the service cannot be read (status ${response.status}).`);
-  }
-  if (response.ok) return body;
-  if (response.status === 401) throw new KeyWanted("This service asks for an API key.");
-  const why = body.detail ?? `status ${response.status}`;
-  if (response.status >= 500 || response.status === 408 || response.status === 429) {
-    throw new Unanswered(`The service cannot answer now: ${why}.`, Number(response.headers.get("Retry-After")) || null);
-  }
-  throw new Refused(`The service refuses this: ${why}.`, body.errors ?? []);
-}
-
-const query = (values) => new URLSearchParams(Object.entries(values).filter(([, value]) => value !== undefined));
-export const get = (path, values) => ask(values ? `${path}?${query(values)}` : path, withKey());
-export const post = (path, body) =>
-  ask(path, { method: "POST", ...withKey({ "Content-Type": "application/json" }), body: JSON.stringify(body) });
 
 /**
  * One question in flight; while it is, only the newest of those that come is kept.  Where there is no answer it is

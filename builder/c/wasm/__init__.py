@@ -1,0 +1,63 @@
+"""``--format wasm``: a table as a WebAssembly module for a web page, made of the C header.
+
+It is compiled by zig or, where that is not installed, by clang with wasm-ld; it needs no C library.  ``log`` and
+``exp`` are JavaScript's.  Exported are ``memory`` and the functions of ``module.c``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import BinaryIO
+
+from mumacro import charts
+from mumacro.errors import MumacroError
+from mumacro.table import Table
+
+from ..header import header_text, texts
+
+__all__ = ["WasmError", "compiler", "write_wasm"]
+
+_HERE = Path(__file__).parent
+_OPTIONS = (
+    "-O2", "-std=c99", "-ffreestanding", "-nostdlib", "-fno-math-errno", "-ffp-contract=off", "-mbulk-memory",
+    "-isystem", str(_HERE / "include"), "-Wl,--no-entry", "-Wl,--strip-all",
+)  # fmt: skip
+
+
+class WasmError(MumacroError):
+    """There is no compiler for WebAssembly, or it refuses the source; the text says which."""
+
+
+def compiler() -> list[str] | None:
+    """The command of a compiler for WebAssembly; None without one."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-freestanding"]
+    clang = shutil.which("clang")
+    return [clang, "--target=wasm32"] if clang and shutil.which("wasm-ld") else None
+
+
+def write_wasm(table: Table, out: BinaryIO) -> None:
+    """Write the module for ``table``.
+
+    Raises
+    ------
+    WasmError
+        No compiler is installed, or it fails.
+    """
+    command = compiler()
+    if command is None:
+        raise WasmError("WebAssembly needs zig (pip install ziglang), or clang with lld; neither is installed")
+    source = (header_text(table), texts("regime_names", charts.REGIMES), (_HERE / "module.c").read_text("ascii"))
+    with tempfile.TemporaryDirectory(prefix="mumacro-") as name:
+        folder = Path(name)
+        (folder / "module.c").write_text("\n".join(source), "ascii")
+        words = [*command, *_OPTIONS, "module.c", "-o", "mumacro.wasm"]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode != 0:
+            raise WasmError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
+        out.write((folder / "mumacro.wasm").read_bytes())

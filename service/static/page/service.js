@@ -1,0 +1,28 @@
+// Questions to the service.  A page without one has another file in the place of this: ../alone/service.js.
+import { KeyWanted, Refused, Unanswered } from "./failures.js";
+import { withKey } from "./key.js";
+
+const WAIT_MS = 20_000; // for an answer
+
+async function ask(path, options) {
+  let response, body;
+  try {
+    response = await fetch(path, { ...options, signal: AbortSignal.timeout(WAIT_MS) });
+    body = await response.json();
+  } catch (error) {
+    if (response === undefined || error.name === "TimeoutError") throw new Unanswered("The service does not answer.");
+    throw new Unanswered(`What came back from the service is no answer (status ${response.status}).`);
+  }
+  if (response.ok) return body;
+  if (response.status === 401) throw new KeyWanted("This service asks for an API key.");
+  const why = body.detail ?? `status ${response.status}`;
+  if (response.status >= 500 || response.status === 408 || response.status === 429) {
+    throw new Unanswered(`The service cannot answer now: ${why}.`, Number(response.headers.get("Retry-After")) || null);
+  }
+  throw new Refused(`The service refuses this: ${why}.`, body.errors ?? []);
+}
+
+const query = (values) => new URLSearchParams(Object.entries(values).filter(([, value]) => value !== undefined));
+export const get = (path, values) => ask(values ? `${path}?${query(values)}` : path, withKey());
+export const post = (path, body) =>
+  ask(path, { method: "POST", ...withKey({ "Content-Type": "application/json" }), body: JSON.stringify(body) });

@@ -1,0 +1,87 @@
+"""The page as a folder for any static host: it computes in the browser, from a table compiled to WebAssembly.
+
+    python -m builder export tables/mumacro-1e-7.nc --format wasm --out mumacro.wasm
+    python -m service.static_page tables/mumacro-1e-7.nc mumacro.wasm FOLDER
+
+It is the page of the service with another file in the place of ``service.js``.  What it does not offer is hidden, and
+the page says so.
+"""
+
+from __future__ import annotations
+
+import html
+import shutil
+import sys
+from pathlib import Path
+
+from mumacro import MumacroError, Surrogate
+
+from .routes.page import ASSETS, FOLDER, POLICY, map_content, names_content
+
+__all__ = ["write_page"]
+
+_POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'").replace(
+    "; frame-ancestors 'none'", ""
+)  # a page cannot say of itself who may frame it
+
+
+class PageError(MumacroError):
+    """The module is not of that table."""
+
+
+def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
+    """Write the folder ``out`` from a table and the module that was exported from it; what is in it is replaced.
+
+    Raises
+    ------
+    PageError
+        The module was exported from another table.
+    TableError, OSError
+        The table cannot be read; a file cannot be read or written.
+    """
+    surrogate, module = Surrogate.open(table), wasm.read_bytes()
+    if surrogate.checksum.encode() not in module:
+        raise PageError(f"{wasm} was not exported from {table}")
+    parts = out / "static" / "page"
+    parts.mkdir(parents=True, exist_ok=True)
+    for name in ASSETS:
+        shutil.copyfile(FOLDER / name, parts / name)
+    shutil.copyfile(FOLDER.parent / "alone" / "service.js", parts / "service.js")
+    made = {"mumacro.wasm": module, "names.json": names_content(guide=False), "map.json": map_content(surrogate)}
+    for name, content in made.items():
+        (parts / name).write_bytes(content)
+    text = (FOLDER / "index.html").read_text("utf-8")
+    for place, new in (
+        ("<title>", f'<meta http-equiv="Content-Security-Policy" content="{html.escape(_POLICY)}">\n<title>'),
+        ("<body>", '<body class="alone">'),
+        ("</header>", f'<p id="alone" class="notice">{_about(surrogate)}</p>\n</header>'),
+    ):
+        before, after = text.split(place)  # which is there once
+        text = before + new + after
+    (out / "index.html").write_text(text, "utf-8")
+    return surrogate
+
+
+def _about(surrogate: Surrogate) -> str:
+    name = html.escape(f"{surrogate.id}, tolerance {surrogate.tolerance:g}, checksum {surrogate.checksum[:12]}")
+    return (
+        f"Everything here is computed in this browser, from the table {name}; no server is asked. Not offered here: "
+        "solving for an input, uncertainties, and the approximations beside the law."
+    )
+
+
+def main(words: list[str]) -> int:
+    """``python -m service.static_page TABLE MODULE FOLDER``."""
+    if len(words) != 3:
+        print(__doc__, file=sys.stderr)
+        return 2
+    try:
+        write_page(*map(Path, words))
+    except (MumacroError, OSError) as error:
+        print(f"service.static_page: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

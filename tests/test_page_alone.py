@@ -1,0 +1,172 @@
+"""The page without a service: a folder that computes in the browser, and goes on when its host is gone."""
+
+import functools
+import http.server
+import threading
+
+import numpy as np
+import pytest
+
+from builder.c.wasm import compiler
+from builder.export import export_table
+from mumacro import Surrogate
+from mumacro.dimensional import FIELDS
+from service.static_page import PageError, main, write_page
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+
+
+@pytest.fixture(scope="module")
+def table(tables_dir):
+    return Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=1)
+
+
+@pytest.fixture(scope="module")
+def folder(table, tmp_path_factory):
+    """The page's folder."""
+    if compiler() is None:
+        pytest.skip("neither zig nor clang with lld is installed")
+    root = tmp_path_factory.mktemp("alone")
+    export_table(table.path, "wasm", root / "mumacro.wasm")
+    assert main([str(table.path), str(root / "mumacro.wasm"), str(root / "page")]) == 0
+    return root / "page"
+
+
+class Host:
+    """A static host on a loopback port."""
+
+    def __init__(self, folder):
+        class Handler(http.server.SimpleHTTPRequestHandler):
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=folder))
+        self.url = f"http://127.0.0.1:{self.server.server_port}"
+        self.thread = threading.Thread(target=self.server.serve_forever)
+        self.thread.start()
+
+    def stop(self):
+        if self.thread.is_alive():
+            self.server.shutdown()
+            self.thread.join()
+            self.server.server_close()
+
+
+@pytest.fixture(scope="module")
+def host(folder):
+    """One for all tests that do not stop it."""
+    made = Host(folder)
+    yield made
+    made.stop()
+
+
+def test_the_module_is_small_and_names_its_table(folder, table):
+    module = (folder / "static" / "page" / "mumacro.wasm").read_bytes()
+    assert module[:4] == b"\0asm"
+    assert len(module) < 300_000
+    assert table.checksum.encode() in module
+
+
+def test_a_module_of_another_table_is_refused(folder, tables_dir, tmp_path, capsys):
+    module = folder / "static" / "page" / "mumacro.wasm"
+    with pytest.raises(PageError, match="not exported from"):
+        write_page(tables_dir / "mumacro-1e-4.nc", module, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert main([str(tables_dir / "mumacro-1e-4.nc"), str(module), str(tmp_path)]) == 1
+    assert main([]) == 2
+    assert "not exported from" in capsys.readouterr().err
+
+
+def test_it_answers_and_goes_on_when_its_host_is_gone(open_page, folder, table):
+    host = Host(folder)
+    page = open_page("", url=host.url, new=True).settle()
+    told = page.text("#alone")
+    for part in (table.id, f"tolerance {table.tolerance:g}", table.checksum[:12], "Not offered here"):
+        assert part in told
+    expected = table.evaluate(**CASE)
+    assert float(page.text("#mu")) == page.rounded(expected.mu_macro)
+    assert page.text("#source") == expected.source
+    assert table.checksum[:12] in page.text("#table")
+    host.stop()
+    page.type("#field-v0", "200 mm/s")
+    page.settle()
+    assert float(page.text("#mu")) == page.rounded(table.evaluate(**{**CASE, "v0": 0.2}).mu_macro)
+    page.click("#rigid")
+    assert float(page.text("#mu")) == page.rounded(table.evaluate(**{**CASE, "k": None, "v0": 0.2}).mu_macro)
+    page.choose("#along", "y0")
+    assert page.text("#law-input") == "y₀ [µm]"
+    assert page.text("#law-status") == page.text("#status") == ""
+    assert not page.is_old()
+    for hidden in ("#solve", "#approximations", "#std-v0", "nav a[href='docs']"):
+        assert not page.find(hidden).is_displayed()
+    assert page.complaints() == []
+
+
+def test_its_numbers_are_pythons(open_page, host, table):
+    """Cases of every regime by the million would take as long as they do in C; these are some thousand."""
+    rng = np.random.default_rng(13)
+    n = 20_000
+    v, y = 10.0 ** rng.uniform(-4.0, 4.0, (2, n))
+    cases = {"mu0": rng.uniform(0.05, 1.5, n), "Fz": 10.0 ** rng.uniform(-2, 4, n), "k": 10.0 ** rng.uniform(3, 9, n)}
+    length = cases["mu0"] * cases["Fz"] / cases["k"]
+    cases |= {"y0": y * length, "omega": 10.0 ** rng.uniform(1, 6, n)}
+    cases["v0"] = v * length * cases["omega"]
+    answer = table.evaluate(cases, gradient=True)
+    page = open_page("", url=host.url, new=True).settle()
+    found = np.array(page.run(
+        f"const cases = {list(map(list, zip(*(cases[name].tolist() for name in FIELDS), strict=True)))};"
+        "const { evaluate } = await import('./static/page/service.js');"
+        f"const names = {list(FIELDS)};"
+        "return cases.map((row) => { const a = evaluate(Object.fromEntries(names.map((name, i) => [name, row[i]])));"
+        " return [a.mu_macro, a.error_bound, ...names.map((name) => a.gradient[name])]; });"
+    ))  # fmt: skip
+    # the same operations as interpreted Python; compiled Python joins products and sums
+    assert np.all(np.abs(found[:, 0] - answer.mu_macro) <= answer.error_bound)
+    ulp = np.abs(found[:, 0] - answer.mu_macro) / np.spacing(answer.mu_macro)
+    assert np.mean(ulp > 4.0) < 5e-3
+    for i, name in enumerate(FIELDS):
+        assert np.all(np.abs(found[:, 2 + i] - answer.gradient[name]) <= answer.gradient_bound[name])
+
+
+@pytest.mark.parametrize("along", FIELDS)
+@pytest.mark.parametrize("scale", ["log", "linear"])
+def test_its_laws_are_the_services(open_page, host, client, along, scale):
+    given = {name: value for name, value in CASE.items() if name != along}
+    asked = {
+        **given,
+        "along": along,
+        "start": 0.1 * CASE[along],
+        "stop": 50.0 * CASE[along],
+        "points": 101,
+        "scale": scale,
+    }
+    expected = client.post("/v1/law", json={**asked, "tolerance": 1e-7}).json()
+    page = open_page("", url=host.url, new=False)
+    found = page.run(f"return (await import('./static/page/service.js')).post('v1/law', {asked});")
+    for name in ("values", "mu_macro", "mu_static"):
+        assert found[name] == pytest.approx(expected[name], rel=1e-12), name
+    assert found["regime"] == expected["regime"]
+    assert len(found["border"]) == len(expected["border"]) == 1
+    for name in ("value", "mu_macro"):
+        assert found["border"][0][name] == pytest.approx(expected["border"][0][name], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changed", [{}, {"k": "rigid"}, {"y0": 0.0}, {"omega": 0.0}, {"v0": 0.0}, {"y0": 5e-6}, {"v0": 30.0}]
+)
+def test_its_readout_is_the_services(open_page, host, client, changed):
+    include = "groups,limits,stick_fraction,power,gradient"
+    asked = {**CASE, **changed, "include": include}
+    expected = client.get("/v1/mu-macro", params={**asked, "tolerance": 1e-7}).json()
+    page = open_page("", url=host.url, new=False)
+    found = page.run(f"return (await import('./static/page/service.js')).get('v1/mu-macro', {asked});")
+    assert (found["regime"], found["source"]) == (expected["regime"], expected["source"])
+    for path in (
+        "mu_macro", "mu_ratio", "groups.v_tilde", "groups.y_tilde", "groups.l0", "limits.mu_static", "limits.v0_crit",
+        "stick_fraction", "power.oscillation", "power.saved", *(f"gradient.{name}" for name in FIELDS),
+    ):  # fmt: skip
+        mine, theirs = found, expected
+        for part in path.split("."):
+            mine, theirs = mine[part], theirs[part]
+        assert (mine is None) == (theirs is None), path
+        assert mine is None or mine == pytest.approx(theirs, rel=1e-9), path
