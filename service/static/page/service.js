@@ -11,7 +11,7 @@ async function ask(path, options) {
     body = await response.json();
   } catch (error) {
     if (response === undefined || error.name === "TimeoutError") throw new Unanswered("The service does not answer.");
-    throw new Unanswered(`What came back from the service is no answer (status ${response.status}).`);
+    throw new Unanswered(`The response of the service cannot be read (status ${response.status}).`);
   }
   if (response.ok) return body;
   if (response.status === 401) throw new KeyWanted("This service asks for an API key.");
