@@ -256,7 +256,8 @@ FIELDS = (
 )
 PATHS = (
     *GETS, "/", "/docs", "/livez", "/readyz", "/healthz", "/metrics", "/openapi.json", "/Info", "/nowhere", "/v1/",
-    "//", "/static/page/main.js", "/static/page/map.json", "/static/page/../x", "/v1/mu-macro/batch/csv", "/%00", "/\u00e9",
+    "//", "/static/page/main.js", "/static/page/map.json", "/static/page/../x", "/v1/mu-macro/batch/csv", "/%00",
+    "/\u00e9",
 )  # fmt: skip
 
 

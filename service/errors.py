@@ -63,7 +63,8 @@ def safe_value(value: object) -> object:
     if isinstance(value, int):
         return value if -(2**63) <= value < 2**64 else "an integer beyond double range"
     if isinstance(value, str):
-        return value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
+        short = value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
+        return short.encode("utf-8", "replace").decode()  # half of a surrogate pair is no text
     return "an object" if isinstance(value, Mapping) else "a list" if isinstance(value, Sequence) else "a value"
 
 
