@@ -23,6 +23,7 @@ from .kernel import BOUNDS, INPUTS
 from .logs import request_id
 
 __all__ = [
+    "MAX_FIELD_FAULTS",
     "PROBLEMS",
     "BatchTooLargeError",
     "BodyTooLargeError",
@@ -316,7 +317,8 @@ def faults_of(
         elif kind == "extra_forbidden":
             name = str(path[-1])
             names = known if len(path) == 1 else INPUTS
-            fault = FieldFault(name, unknown_name(name, names), value, place=place, path=path)
+            reason = unknown_name(name, names) if len(found) < MAX_FIELD_FAULTS else "unknown field"  # no more are told
+            fault = FieldFault(name, reason, value, place=place, path=path)
         else:
             name = str(path[0]) if path else "body"
             reason = _reason(kind, name, value, entry["msg"], all_bounds, place)
