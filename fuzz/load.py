@@ -113,8 +113,11 @@ async def closed_loop(port: int, asked: Sequence[Question], seen: Seen, seconds:
     return done / seconds
 
 
-async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: float, rate: float) -> None:
-    """Requests at random moments, ``rate`` a second on average; each takes a free connection, or opens one."""
+async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: float, rate: float) -> float:
+    """Requests at random moments, ``rate`` a second on average; each takes a free connection, or opens one.
+
+    Ends when all are answered; tells at which moment the last one was due.
+    """
     chance = random.Random(2)  # noqa: S311
     free: list[Caller] = []
     tasks: set[asyncio.Task[None]] = set()
@@ -142,6 +145,7 @@ async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: f
     await asyncio.gather(*tasks)
     for caller in free:
         caller.close()
+    return begun + seconds
 
 
 async def idle(port: int, count: int, lost: Counter[str]) -> None:
@@ -225,7 +229,10 @@ def mixed_load(share: float) -> str:
         capacity = asyncio.run(closed_loop(server.port, asked, first, max(CAPACITY_S * share, 2.0), CONNECTIONS))
         alone = Seen(expected)
         load = open_loop(server.port, asked, alone, MIXED_S * share, 0.8 * capacity)
+        before = server.busy(), time.process_time(), time.perf_counter()
         samples = asyncio.run(watched(server, load))
+        elapsed = time.perf_counter() - before[2]
+        busy, own = (server.busy() - before[0]) / elapsed, (time.process_time() - before[1]) / elapsed
         among, counts = Seen(expected), Counter[str]()
 
         async def with_others() -> None:
@@ -249,7 +256,8 @@ def mixed_load(share: float) -> str:
     refused = alone.statuses[503] + among.statuses[503]
     text = (
         f"Capacity {capacity:,.0f} requests a second; asked {alone.asked:,} requests at 80 % of it in "
-        f"{MIXED_S * share / 60.0:.3g} min, then {among.asked:,} at 40 % of it beside the others in {beside:.0f} s. "
+        f"{MIXED_S * share / 60.0:.3g} min (the service used {busy:.0%} of a processor, the "
+        f"callers {own:.0%}), then {among.asked:,} at 40 % of it beside the others in {beside:.0f} s. "
         f"{alone.broken + among.broken} connections broken, {alone.wrong + among.wrong} answers with other bits, "
         f"{refused} requests refused, exit code {code}. "
         f"Memory grew by {slope(samples):.1f} MB an hour over the second half, to at most {peak:.0f} MB with the "
@@ -265,7 +273,7 @@ def overload(share: float) -> str:
     """Three times as much as can be answered."""
     started = time.perf_counter()
     open_files(20_000)
-    asked = questions(HEAVY, 400, 20_000)
+    asked = questions(HEAVY, 120, 20_000)
     with serving(CLIENT_TIMEOUT_S=30) as server:
         expected = answers(server, asked)
 
@@ -287,11 +295,10 @@ def overload(share: float) -> str:
 
         async def too_much() -> None:
             nonlocal recovery
-            await open_loop(server.port, asked, seen, max(OVERLOAD_S * share, 2.0), 3.0 * capacity)
-            begun = time.perf_counter()
-            while time.perf_counter() - begun < 60.0:
+            ended = await open_loop(server.port, asked, seen, max(OVERLOAD_S * share, 2.0), 3.0 * capacity)
+            while time.perf_counter() - ended < 60.0:
                 if await rounds() < 2.0 * quiet + 0.01:
-                    recovery = time.perf_counter() - begun
+                    recovery = time.perf_counter() - ended
                     return
 
         asyncio.run(too_much())
@@ -302,7 +309,7 @@ def overload(share: float) -> str:
         f"Capacity {capacity:,.0f} requests a second, seven in ten of them batches of 20,000 cases; {seen.asked:,} "
         f"were asked at three times that in {max(OVERLOAD_S * share, 2.0):.0f} s. {seen.statuses[200]:,} were "
         f"answered, {seen.wrong} of them with other bits; {rest:,} were refused with 503 and Retry-After, "
-        f"{seen.unexplained} in another way; {seen.broken} connections broke. {recovery:.2f} s after the last answer "
+        f"{seen.unexplained} in another way; {seen.broken} connections broke. {recovery:.2f} s after the last question "
         "every kind of request was answered as fast as before (twice the time at most). Memory at most "
         f"{peak:.0f} MB, exit code {code}."
     )

@@ -164,3 +164,22 @@ def test_every_way_of_asking_gives_the_same_bits(client, surrogate, columns, exp
     found = np.array(way(client, surrogate, columns), dtype=np.float64)
     assert found.size in (MANY, FEW)
     assert np.array_equal(found.view(np.int64), expected[: found.size].view(np.int64))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_of_a_key_that_is_given_twice_the_last_counts_in_every_form(client, case, name):
+    other = {**case, name: 1.5 * case[name]}
+
+    def twice(end=""):
+        members = [f"{json.dumps(key)}: {value}" for key, value in case.items()]
+        return "{" + ", ".join([*members, f'"{name}": {other[name]}']) + end + "}"
+
+    expected = client.post(SINGLE, json=other).json()["mu_macro"]
+    assert expected != client.post(SINGLE, json=case).json()["mu_macro"]
+    assert client.post(SINGLE, content=twice()).json()["mu_macro"] == expected
+    assert client.post(SINGLE, content=twice(', "include": ["groups"]')).json()["mu_macro"] == expected
+    assert client.post(BATCH, content=twice(f', "v0": [{other["v0"]}]')).json()["mu_macro"] == [expected]
+    assert client.post(BATCH, content=f"[{twice()}]").json()["results"][0]["mu_macro"] == expected
+    for lines in (1, 3):
+        answer = client.post(BATCH, content=(twice() + "\n") * lines, headers=LINES)
+        assert {json.loads(line)["mu_macro"] for line in answer.iter_lines()} == {expected}
