@@ -198,7 +198,7 @@ def case(chance: random.Random) -> dict[str, float]:
 def questions(shares: dict[str, int], n: int, size: int, seed: int = 1) -> list[Question]:
     """``n`` random requests of these kinds, in proportion to the shares; batches have ``size`` cases.
 
-    Kinds: "single", "batch", "stream", "inverse", "page".
+    Kinds: "single", "batch", "stream", "inverse", "law", "page".
     """
     chance = random.Random(seed)  # noqa: S311
     made = []
@@ -219,6 +219,10 @@ def questions(shares: dict[str, int], n: int, size: int, seed: int = 1) -> list[
             del one["v0"]
             asked = {**one, "unknown": "v0", "quantity": "mu_ratio", "target": chance.uniform(0.1, 0.9)}
             text = request("/v1/solve-for", json.dumps(asked).encode())
+        elif kind == "law":
+            del one["v0"]
+            law = {**one, "start": 1e-5, "stop": 10.0, "points": size, "include": ["power", "stick_fraction"]}
+            text = request("/v1/law", json.dumps(law).encode())
         else:
             text = request(chance.choice(pages))
         made.append(Question(kind, text))
