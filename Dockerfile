@@ -36,7 +36,7 @@ ENV NUMBA_CPU_NAME=generic \
     PYTHONPATH=/app
 RUN venv/bin/python -m compileall -q mumacro service \
     && venv/bin/python -m service warm --tables tables \
-    && find cache -name '*.kernel' | grep . \
+    && test -n "$(find cache -name '*.kernel' -print -quit)" \
     && chmod -R a+rX cache
 
 FROM ${BASE}

@@ -73,6 +73,11 @@ class Server:
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith(what)) / 1024.0
 
+    def busy(self) -> float:
+        """Seconds of a processor that it has used."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def children(self) -> list[int]:
         """Processes that it started."""
         number = self.process.pid
@@ -193,7 +198,7 @@ def case(chance: random.Random) -> dict[str, float]:
 def questions(shares: dict[str, int], n: int, size: int, seed: int = 1) -> list[Question]:
     """``n`` random requests of these kinds, in proportion to the shares; batches have ``size`` cases.
 
-    Kinds: "single", "batch", "stream", "inverse", "page".
+    Kinds: "single", "batch", "stream", "inverse", "law", "page".
     """
     chance = random.Random(seed)  # noqa: S311
     made = []
@@ -214,6 +219,10 @@ def questions(shares: dict[str, int], n: int, size: int, seed: int = 1) -> list[
             del one["v0"]
             asked = {**one, "unknown": "v0", "quantity": "mu_ratio", "target": chance.uniform(0.1, 0.9)}
             text = request("/v1/solve-for", json.dumps(asked).encode())
+        elif kind == "law":
+            del one["v0"]
+            law = {**one, "start": 1e-5, "stop": 10.0, "points": size, "include": ["power", "stick_fraction"]}
+            text = request("/v1/law", json.dumps(law).encode())
         else:
             text = request(chance.choice(pages))
         made.append(Question(kind, text))

@@ -10,6 +10,7 @@ The seed of a share of the work is its number, so that what is found can be had 
 from __future__ import annotations
 
 import asyncio
+import gzip
 import json
 import os
 import random
@@ -337,8 +338,11 @@ async def ask_app(app: Any, request: Request) -> tuple[int, bytes, bytes]:
             pieces.append(message.get("body", b""))
 
     await app(scope, receive, send)
-    kind = next((value for name, value in start["headers"] if name.lower() == b"content-type"), b"")
-    return start["status"], kind, b"".join(pieces)
+    fields = {name.lower(): value for name, value in start["headers"]}
+    body = b"".join(pieces)
+    if fields.get(b"content-encoding") == b"gzip" and body:
+        body = gzip.decompress(body)
+    return start["status"], fields.get(b"content-type", b""), body
 
 
 class Found:
@@ -424,10 +428,10 @@ async def ask_live(port: int, seed: int, count: int, found: Found) -> None:
             continue  # has no body, whatever its head says
         try:
             reply = await asyncio.wait_for(caller.ask(wire(request)), 60.0)
-            fault = "" if reply.headers.get(b"content-encoding") else fault_of(
-                request, reply.status, reply.headers.get(b"content-type", b""), reply.body
-            )  # fmt: skip
-            status = reply.status
+            status, body = reply.status, reply.body
+            if reply.headers.get(b"content-encoding") == b"gzip":
+                body = gzip.decompress(body)
+            fault = fault_of(request, status, reply.headers.get(b"content-type", b""), body)
         except (*FAULT, TimeoutError) as error:
             status, fault = 0, f"{type(error).__name__}: {error}"
         found.note(name, request, status, fault, 0.0)

@@ -23,6 +23,7 @@ from .kernel import BOUNDS, INPUTS
 from .logs import request_id
 
 __all__ = [
+    "MAX_FIELD_FAULTS",
     "PROBLEMS",
     "BatchTooLargeError",
     "BodyTooLargeError",
@@ -63,7 +64,8 @@ def safe_value(value: object) -> object:
     if isinstance(value, int):
         return value if -(2**63) <= value < 2**64 else "an integer beyond double range"
     if isinstance(value, str):
-        return value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
+        short = value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
+        return short.encode("utf-8", "replace").decode()  # half of a surrogate pair is no text
     return "an object" if isinstance(value, Mapping) else "a list" if isinstance(value, Sequence) else "a value"
 
 
@@ -315,7 +317,8 @@ def faults_of(
         elif kind == "extra_forbidden":
             name = str(path[-1])
             names = known if len(path) == 1 else INPUTS
-            fault = FieldFault(name, unknown_name(name, names), value, place=place, path=path)
+            reason = unknown_name(name, names) if len(found) < MAX_FIELD_FAULTS else "unknown field"  # no more are told
+            fault = FieldFault(name, reason, value, place=place, path=path)
         else:
             name = str(path[0]) if path else "body"
             reason = _reason(kind, name, value, entry["msg"], all_bounds, place)

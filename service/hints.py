@@ -18,7 +18,7 @@ __all__ = [
 ]
 
 #: a number in a query or a cell, narrower than Python's; an unescaped "+" of a query arrives as a space
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+\- ]?\d+)?", re.ASCII)
+NUMBER = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+\- ]?\d+)?", re.ASCII)
 STATE_K = "is required: the tangential stiffness [N/m], or {rigid} for rigid contact"
 STATE_OMEGA = "is required: omega [rad/s], or f [Hz] in its place"
 ONE_FREQUENCY = "omega is given, too: give exactly one of omega [rad/s] and f [Hz]"

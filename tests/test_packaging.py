@@ -10,6 +10,7 @@ import mumacro
 import service
 from mumacro import bundled
 from mumacro.extras import missing
+from service.settings import load_settings
 
 
 def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository):
@@ -24,6 +25,34 @@ def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository):
         found = re.findall(pattern, (repository / name).read_text("utf-8"), re.MULTILINE)
         assert found, name
         assert set(found) == {version}, name
+
+
+def test_the_manifest_gives_a_pod_nothing_that_it_does_not_need(repository):
+    yaml = pytest.importorskip("yaml", reason="the PyPI package PyYAML is not installed")
+    found = {
+        one["kind"]: one for one in yaml.safe_load_all((repository / "deploy" / "kubernetes.yaml").read_text("utf-8"))
+    }
+    assert {"Deployment", "Service", "HorizontalPodAutoscaler", "PodDisruptionBudget", "NetworkPolicy"} < found.keys()
+    pod = found["Deployment"]["spec"]["template"]["spec"]
+    (container,) = pod["containers"]
+    assert pod["automountServiceAccountToken"] is found["ServiceAccount"]["automountServiceAccountToken"] is False
+    assert pod["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
+    assert pod["securityContext"]["runAsNonRoot"] is True
+    allowed = container["securityContext"]
+    assert (allowed["allowPrivilegeEscalation"], allowed["readOnlyRootFilesystem"]) == (False, True)
+    assert allowed["capabilities"] == {"drop": ["ALL"]}
+    assert container["lifecycle"]["preStop"]
+    assert found["NetworkPolicy"]["spec"]["egress"] == []
+    labels = found["Deployment"]["spec"]["template"]["metadata"]["labels"]
+    for kind in ("NetworkPolicy", "PodDisruptionBudget", "Service"):
+        spec = found[kind]["spec"]
+        selector = spec.get("podSelector") or spec["selector"]
+        assert selector.get("matchLabels", selector).items() <= labels.items(), kind
+    scaled = found["HorizontalPodAutoscaler"]["spec"]
+    assert scaled["scaleTargetRef"]["name"] == found["Deployment"]["metadata"]["name"]
+    assert scaled["minReplicas"] > found["PodDisruptionBudget"]["spec"]["minAvailable"]
+    grace = load_settings().drain_s + load_settings().shutdown_grace_s + 3.0  # preStop
+    assert pod["terminationGracePeriodSeconds"] > grace
 
 
 def test_a_name_that_the_service_does_not_have_is_an_attribute_error():

@@ -30,9 +30,24 @@ def load(name: str) -> ModuleType:
         sys.path[:] = before
 
 
-tables, hostile, faults, answers, strings = map(
-    load, ("tables", "hostile_tables", "faults", "answers", "number_strings")
+tables, hostile, faults, answers, strings, traffic, restarts, strange = map(
+    load, ("tables", "hostile_tables", "faults", "answers", "number_strings", "load", "restarts", "strange")
 )
+
+
+# --- threats ------------------------------------------------------------------------------------------
+
+
+def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> None:
+    text = (ROOT / "docs" / "threats.md").read_text("utf-8")
+    named = re.findall(r"`(tests/\w+\.py)::(\w+)`", text)
+    assert len(named) >= 30
+    for path, name in named:
+        assert re.search(rf"^def {name}\(", (ROOT / path).read_text("utf-8"), re.MULTILINE), f"{path}::{name}"
+    lines = [line for line in text.splitlines() if line.startswith("| ") and line.count("|") == 5]
+    assert len(lines) >= 30
+    for line in lines:
+        assert "::" in line or line.startswith("| what is "), line
 
 
 # --- tables from strangers ----------------------------------------------------------------------------
@@ -214,7 +229,34 @@ def test_a_file_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.Monkey
 # --- the page -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("script", [tables, faults, answers, strings], ids=lambda script: script.__name__)
+# --- the service --------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", ["mixed_load", "overload"])
+def test_the_service_holds_under_load(section: str) -> None:
+    found = traffic.SECTIONS[section](0.02)
+    assert "FAILED" not in found, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", restarts.RESTARTS)
+def test_nobody_notices_that_a_process_ends(name: str) -> None:
+    outcome, seen = restarts.tried(restarts.RESTARTS[name], 0.05)
+    if outcome == "not tried":
+        pytest.skip(seen)
+    assert outcome == "held", seen
+
+
+@pytest.mark.slow
+def test_strange_requests_are_answered_or_refused() -> None:
+    found = strange.strange_requests(0.003)
+    assert "FAILED" not in found, found
+
+
+@pytest.mark.parametrize(
+    "script", [tables, faults, answers, strings, traffic, restarts, strange], ids=lambda script: script.__name__
+)
 def test_every_section_of_a_script_is_on_the_page_and_nothing_failed(script: ModuleType) -> None:
     page = PAGE.read_text("utf-8")
     for name in script.SECTIONS:

@@ -121,6 +121,30 @@ def test_a_large_body_of_nonsense_costs_little(watched, path, body):
         connection.close()
 
 
+HEADER = "mu0,Fz,k,y0,omega,v0\n"
+CSV = {
+    "digits": HEADER + "1" * 130_000 + "x,1,1,1,1,1\n",
+    "blanks in the header": f"mu0 ({' ' * 130_000},Fz,k,y0,omega,v0\n1,1,1,1,1,1\n",
+    "more blanks in the header": f"mu0{' ' * 130_000}x,Fz,k,y0,omega,v0\n1,1,1,1,1,1\n",
+    "columns": "a," * 5_000_000 + "\n",
+}
+
+
+@pytest.mark.parametrize("name", CSV)
+def test_csv_that_a_pattern_could_read_in_many_ways_costs_little(watched, name):
+    status, _, _ = watched.ask("POST", BATCH, CSV[name], {"Content-Type": "text/csv"})
+    assert status == (200 if name == "digits" else 422)
+
+
+@pytest.mark.parametrize("path", [SINGLE, "/v1/mu-macro.txt", "/v1/law.csv", "/v1/table"])
+@pytest.mark.parametrize(
+    "query", ["mu0=" + "1" * 60_000 + "x", "&".join(f"a{i}=" for i in range(9000)), "include=" + "a," * 30_000],
+    ids=["digits", "names", "include"],
+)  # fmt: skip
+def test_a_long_query_costs_little(watched, path, query):
+    assert watched.ask("GET", f"{path}?{query}")[0] == 422
+
+
 def test_brackets_are_counted_before_they_are_read(watched):
     status, _, _ = watched.ask(
         "POST", BATCH, json.dumps({**CASE, "v0": "@"}).replace('"@"', "[" + "[]," * 5_000_000 + "1]")

@@ -210,6 +210,17 @@ def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
             assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
 
 
+@pytest.mark.parametrize("end", ["\n", "\r", "\r\n"])
+def test_lines_of_csv_are_counted_however_they_end(tables_dir, case, problem, end):
+    head, row = ",".join(case), ",".join(map(str, case.values()))
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=10), wait=True)) as client:
+        for many, status in ((10, 200), (11, 413)):
+            text = end.join([head, *[row] * many])
+            answer = client.post(PATH, content=text, headers={"Content-Type": "text/csv"})
+            assert answer.status_code == status
+    assert problem(answer, 413)["max_batch"] == 10
+
+
 def test_one_batch_too_many_is_refused_before_it_is_read(tables_dir, case, problem):
     app = create_app(Settings(tables=(tables_dir,), max_batches=2), wait=True)
     with TestClient(app) as client:

@@ -411,3 +411,47 @@ def test_the_short_way_and_the_long_way_give_one_answer(server, case, extra):
     _, _, other = server.ask("GET", "/v1/mu-macro?" + "&".join(f"{name}={value}" for name, value in case.items()))
     assert answer == json.loads(other)
     assert {"content-length", "content-type", "date", "x-request-id", "x-content-type-options"} <= names
+
+
+def test_two_thousand_idle_connections_are_kept_and_keep_nobody_waiting(serving, surrogate, case):
+    resource = pytest.importorskip("resource", reason="this system has no limits of open files to set")
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 5000:
+        pytest.skip("this user may not open 5,000 files")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 5000), hard))
+    ask = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
+    try:
+        with serving(surrogate.path, MUMACRO_MAX_CONNECTIONS="2500", MUMACRO_KEEP_ALIVE_S="600") as server:
+            base = memory(server)
+            raws = [connect(server) for _ in range(2000)]
+            for _ in range(2):
+                for raw in raws:
+                    raw.sendall(ask)
+                for raw in raws:
+                    assert raw.recv(4096).startswith(b"HTTP/1.1 200")
+                body = json.dumps(case)
+                assert server.ask("POST", "/v1/mu-macro", body, {"Content-Type": "application/json"})[0] == 200
+                assert memory(server) - base < 100_000_000
+            for raw in raws:
+                raw.close()
+            assert server.stop() == 0
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_connection_too_many_is_told_to_come_again(serving, surrogate):
+    with serving(surrogate.path, MUMACRO_MAX_CONNECTIONS="20") as server:
+        ask = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
+        raws = [connect(server) for _ in range(20)]
+        for raw in raws:
+            raw.sendall(ask)
+            assert raw.recv(4096).startswith(b"HTTP/1.1 200")
+        with connect(server) as late:
+            late.sendall(ask)
+            answer = read_to_end(late).lower()
+        assert answer.startswith(b"http/1.1 503")
+        assert b"retry-after: 1\r\n" in answer
+        for raw in raws:
+            raw.sendall(ask)
+            assert raw.recv(4096).startswith(b"HTTP/1.1 200")
+            raw.close()

@@ -129,6 +129,21 @@ def test_without_the_key_there_is_no_answer(closed, case, problem, headers):
         assert response.headers["www-authenticate"] == "Bearer"
 
 
+def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed):
+    open_to_all = {"/livez", "/readyz", "/healthz", "/", "/docs", "/static/page/names.json"}
+    open_to_all |= {f"/static/page/{name}" for name in PAGE_ASSETS} | {f"/static/swagger-ui/{name}" for name in ASSETS}
+    routes = {route.path for route in closed.app.routes}
+    assert open_to_all < routes
+    assert len(routes - open_to_all) >= 20
+    for path in routes:
+        for method in ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS"):
+            response = closed.request(method, path)
+            assert (response.status_code != 401) == (path in open_to_all), f"{method} {path}: {response.status_code}"
+            assert closed.request(method, path, headers={"X-API-Key": "s3cret-key"}).status_code != 401
+    for path in ("/livez/", "//livez", "/docs/../v1/table", "/static/page/../../v1/table", "/V1/TABLE", "/%2fv1/table"):
+        assert closed.get(path).status_code == 401
+
+
 @pytest.mark.parametrize("headers", [{"X-API-Key": "s3cret-key"}, {"Authorization": "bearer s3cret-key"}])
 def test_the_key_opens(closed, case, headers):
     response = closed.get("/v1/mu-macro", params=case, headers=headers)
@@ -330,3 +345,24 @@ def test_no_route_compresses_for_a_client_without_gzip(client, case, offer):
         assert answer.status_code == 200, answer.text
         assert ("content-encoding" in answer.headers) == OFFERS[offer], answer.request.url
     assert "content-encoding" not in client.get("/v1/table.nc", headers=asked).headers
+
+
+def test_every_answer_has_the_headers_that_keep_a_browser_from_harm(client, case):
+    policies = {}
+    for path in ("/", "/docs"):
+        policy = client.get(path).headers["content-security-policy"]
+        policies[path] = dict(part.strip().split(" ", 1) for part in policy.split(";"))
+        assert client.get(path).headers["referrer-policy"] == "no-referrer"
+    for policy in policies.values():
+        assert policy["default-src"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
+        assert policy["script-src"] == policy["connect-src"] == "'self'"
+    assert "unsafe" not in str(policies["/"])
+    for response in (
+        client.get("/v1/mu-macro", params=case), client.post("/v1/mu-macro/batch", json=[case]), client.get("/nowhere"),
+        client.post("/v1/mu-macro", content=b"{"), client.put("/livez"), client.get("/v1/table.nc"),
+    ):  # fmt: skip
+        assert response.headers["x-content-type-options"] == "nosniff"
+        assert "access-control-allow-origin" not in response.headers
+        assert "server" not in response.headers
+        assert "set-cookie" not in response.headers
+    assert client.get("/nowhere").headers["cache-control"] == "no-store"

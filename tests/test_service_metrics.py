@@ -59,6 +59,23 @@ def test_requests_are_counted_by_route_method_and_status(fresh, case):
     assert 0 < found["mumacro_request_duration_seconds_sum", PATH] < 60
 
 
+def test_callers_make_no_labels(fresh, case):
+    """However many paths, methods and names callers think of, the number of series stays."""
+
+    def ask(i):
+        fresh.get(f"/nowhere/{i}")
+        fresh.request(f"BREW{i}", f"/v1/{i}")
+        fresh.get("/v1/table", params={"id": f"t{i}"})
+        fresh.post(PATH, json=case, headers={"X-Request-ID": f"id{i}", "User-Agent": f"agent{i}"})
+
+    ask(0)
+    before = scrape(fresh).keys()
+    before = scrape(fresh).keys()  # now it counts the first question for itself, too
+    for i in range(1, 200):
+        ask(i)
+    assert scrape(fresh).keys() == before
+
+
 def test_cases_are_counted_by_source_and_regime(fresh, case, surrogate):
     rows = [{**case, "v0": v0} for v0 in (0, 1e-4, 0.01, 0.1, 10.0)] + [{**case, "v0": -1}] * 4
     answers = [fresh.post(PATH, json=row).json() for row in rows[:5]]

@@ -2,6 +2,7 @@
 
 import json
 
+import orjson
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -59,3 +60,13 @@ def test_any_query_is_answered(client, path, pairs):
 @given(query=st.text(alphabet=st.characters(min_codepoint=33, max_codepoint=126, exclude_characters="#"), max_size=40))
 def test_any_raw_query_is_answered(client, query):
     assert_answered(client.get(f"/v1/mu-macro?{query}"))
+
+
+@pytest.mark.parametrize("path", [*POST_PATHS, "/v1/solve-for", "/v1/law"])
+@pytest.mark.parametrize(
+    "body", [r'"\ud800"', r'{"mu0":"\ud800"}', r'{"\ud800":1}', r'{"std":{"\ud800":1}}', r'["\udfff"]']
+)
+def test_half_of_a_surrogate_pair_is_refused_in_json_that_every_parser_reads(client, path, body):
+    response = client.post(path, content=body.encode())
+    assert response.status_code in (200, 400, 422)
+    orjson.loads(response.content)  # which is strict

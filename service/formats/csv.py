@@ -5,11 +5,12 @@ import io
 import math
 import re
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import FieldFault, MalformedBodyError, missing_inputs, refusal
+from ..errors import MAX_FIELD_FAULTS, FieldFault, MalformedBodyError, missing_inputs, refusal
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
 from ..hints import NUMBER, TOO_FREQUENT, number_hint, unknown_name
 from ..kernel import BOUNDS, FIELDS, INPUTS, RAD_PER_CYCLE, UNITS
@@ -21,6 +22,7 @@ __all__: list[str] = []
 _HEADER = re.compile(r"\s*([A-Za-z_0-9~]+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*")
 _RIGID = ("", "rigid", "inf", "null")
 _SLICE = 4096  # lines that are written at a time
+_LONGEST_NAME = 100  # characters of a cell of the header
 
 
 class Csv:
@@ -50,14 +52,14 @@ class Csv:
 
     def read(self, text: bytearray, max_batch: int) -> tuple[Batch, dict[str, Any]]:
         """See :class:`Format`."""
-        if text.count(b"\n") > max_batch + 1:
-            raise too_large(max_batch)
         try:
             lines = csv.reader(io.StringIO(text.decode("utf-8-sig"), newline=""), strict=True)
             names = _names(next(lines, []))
-            rows = [cells for cells in lines if cells]
+            rows = list(islice(filter(None, lines), max_batch + 1))
         except (UnicodeDecodeError, csv.Error) as error:
             raise MalformedBodyError(f"the body is not CSV: {error}") from None
+        if len(rows) > max_batch:
+            raise too_large(max_batch)
         columns = np.full((6, len(rows)), np.nan)
         reasons: dict[int, Reason] = {}
         places = [FIELDS.index("omega" if name == "f" else name) for name in names]
@@ -100,8 +102,8 @@ def _cells(column: Any) -> list[Any]:
 
 def _names(header: list[str]) -> list[str]:
     faults, names = [], []
-    for cell in header:
-        found = _HEADER.fullmatch(cell)
+    for cell in header[:MAX_FIELD_FAULTS]:  # as many cannot all be right, and no more are told
+        found = _HEADER.fullmatch(cell) if len(cell) <= _LONGEST_NAME else None
         name, unit = (found[1], found[2]) if found else (cell, None)
         if name not in INPUTS:
             faults.append(FieldFault(cell, unknown_name(name, INPUTS)))
