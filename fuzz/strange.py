@@ -457,7 +457,7 @@ def strange_requests(share: float) -> str:
                 before = server.memory()
         grown = server.memory() - before
         assert server.ask("GET", "/readyz")[0] == 200
-        errors = [line for line in server.log.read_text().splitlines() if '"logger": "mumacro.error"' in line]
+        errors = server.errors()
         code = server.stop()
     for fault, text in (found.bad + live.bad)[:50]:
         progress(f"{fault}: {text}")
