@@ -83,6 +83,10 @@ class Server:
         number = self.process.pid
         return [int(child) for child in Path(f"/proc/{number}/task/{number}/children").read_text().split()]
 
+    def errors(self) -> list[str]:
+        """Lines of its log about what nobody foresaw."""
+        return [line for line in self.log.read_text().splitlines() if '"logger": "mumacro.error"' in line]
+
     def stop(self, number: int = signal.SIGTERM) -> int:
         """End it; the exit code."""
         self.process.send_signal(number)
@@ -130,6 +134,11 @@ class Caller:
         self._place = host, port
         self._reader: asyncio.StreamReader | None = None
         self._writer: asyncio.StreamWriter | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the next request goes over a connection that has been used before."""
+        return self._writer is not None
 
     async def ask(self, text: bytes) -> Reply:
         """Send the request, read the answer; raises one of FAULT."""

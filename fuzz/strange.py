@@ -444,7 +444,8 @@ def strange_requests(share: float) -> str:
 
     started = time.perf_counter()
     total = max(200, round(TOTAL * share))
-    straight, size = total - total // LIVE, min(PART, total)
+    straight = total - total // LIVE
+    size = min(PART, -(-straight // (os.cpu_count() or 1)))
     found, live = Found(), Found()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         starts = range(0, straight, size)
@@ -457,7 +458,7 @@ def strange_requests(share: float) -> str:
                 before = server.memory()
         grown = server.memory() - before
         assert server.ask("GET", "/readyz")[0] == 200
-        errors = [line for line in server.log.read_text().splitlines() if '"logger": "mumacro.error"' in line]
+        errors = server.errors()
         code = server.stop()
     for fault, text in (found.bad + live.bad)[:50]:
         progress(f"{fault}: {text}")
@@ -466,7 +467,8 @@ def strange_requests(share: float) -> str:
     statuses = found.statuses + live.statuses
     told = ", ".join(f"{status}: {count:,}" for status, count in sorted(statuses.items()))
     bad = Counter(fault for fault, _ in found.bad + live.bad)
-    text = (
+    text = "" if share == 1.0 else f"{share:.1%} of the full run of {TOTAL:,} requests. "
+    text += (
         f"Statuses: {told}. Bad answers, crashes and answers that took more than {HANG_S:.0f} s: {sum(bad.values())}. "
         f"Slowest {found.slowest:.2f} s of a processor. A process of {size:,} requests took at most "
         f"{found.memory:.0f} MB more than after its first tenth, the running service {grown:.0f} MB more than after "

@@ -81,8 +81,9 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
     """Load the tables, become ready, then load the rest; ``/livez`` is answered meanwhile."""
     loop = asyncio.get_running_loop()
     tables: Tables = app.state.tables
-    await loop.run_in_executor(threads, tables.load)
-    app.state.metrics.start([table.label for table in tables.loaded])
+    await loop.run_in_executor(threads, tables.load, app.state.metrics.start)
+    if not tables.loaded:
+        app.state.metrics.start([])
     tables.ready = tables.fault is None
     try:
         await loop.run_in_executor(threads, _load_more, tables)

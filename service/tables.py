@@ -2,12 +2,12 @@
 
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import orjson
 from fastapi import Depends
@@ -130,8 +130,11 @@ class Tables:
         self.draining = False
         self.warm = False  # whether everything compiled is loaded, not only what the first answers need
 
-    def load(self) -> None:
-        """Load all tables.  A refused table makes the service not ready; it never stops the process."""
+    def load(self, before_answers: Callable[[list[dict[str, Any]]], None] | None = None) -> None:
+        """Load all tables.  A refused table makes the service not ready; it never stops the process.
+
+        ``before_answers`` is called with the labels of the tables before the first question is answered.
+        """
         try:
             tables = [LoadedTable.open(path) for path in table_files(self.paths)]
             names = [table.surrogate.id for table in tables]
@@ -147,8 +150,11 @@ class Tables:
         else:
             tables.sort(key=lambda table: (table.surrogate.tolerance, table.surrogate.id))
             self.loaded = tuple(replace(table, cell=first_cell(i)) for i, table in enumerate(tables))
+            labels = [table.label for table in self.loaded]
+            if before_answers is not None:
+                before_answers(labels)
             self.fault = None
-            _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in self.loaded]}})
+            _log.info("tables are loaded", extra={"fields": {"tables": labels}})
 
     def check(self) -> None:
         """Raise NotReadyError if a table does not give its known answer, or if the service is stopping."""

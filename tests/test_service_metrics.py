@@ -59,6 +59,20 @@ def test_requests_are_counted_by_route_method_and_status(fresh, case):
     assert 0 < found["mumacro_request_duration_seconds_sum", PATH] < 60
 
 
+def test_there_are_counters_before_the_first_question_is_answered(tables_dir, monkeypatch):
+    app = create_app(Settings(tables=(tables_dir,)), wait=True)
+    start, faults = app.state.metrics.start, []
+
+    def watched(labels):
+        faults.append(app.state.tables.fault)
+        start(labels)
+
+    monkeypatch.setattr(app.state.metrics, "start", watched)
+    with TestClient(app):
+        assert app.state.tables.fault is None
+    assert faults == ["the tables are not loaded yet"]
+
+
 def test_callers_make_no_labels(fresh, case):
     """However many paths, methods and names callers think of, the number of series stays."""
 
