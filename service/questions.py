@@ -1,8 +1,11 @@
 """Requests and answers of ``/v1/solve-for`` and ``/v1/law``."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, create_model, model_validator
+
+from mumacro.law import APPROXIMATIONS, BORDERS
 
 from .hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA
 from .kernel import BOUNDS, FIELDS, INPUTS, RAD_PER_CYCLE
@@ -286,6 +289,10 @@ class BorderMark(BaseModel):
     mu_macro: float = Field(description="[-]")
 
 
+def _listed(columns: Mapping[str, str]) -> str:
+    return "; ".join(f"{name}: {text}" for name, text in columns.items())
+
+
 class _CurveBase(BaseModel):
     """A friction law in columns."""
 
@@ -298,13 +305,12 @@ class _CurveBase(BaseModel):
     border: list[BorderMark] = Field(description="Up to two places inside the range")
     approximations: dict[str, list[float | None]] | None = Field(
         None,
-        description="Only if asked for [-]: static (16), creep, small_amplitude (31), continuous, rigid (35), corner; "
-        "null: not meant there",
+        description=f"Only if asked for [-]; null: outside the range of the formula. {_listed(APPROXIMATIONS)}",
     )
     border_speeds: dict[str, list[float | None]] | None = Field(
         None,
-        description="Only with approximations [m/s]: v0 at which continuous sliding begins for each case: exact, "
-        "small_amplitude, large_amplitude (26), blend; null: not meant there",
+        description="Only with approximations [m/s]: v0 at which continuous sliding begins for each case; null: "
+        f"outside the range of the formula. {_listed(BORDERS)}",
     )
 
 
