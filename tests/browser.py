@@ -119,6 +119,8 @@ class Page:
             self.settle_unless_bad()
 
     def settle_unless_bad(self):
+        # a question begins with the frame after the one that took the value
+        self.run("await new Promise((next) => requestAnimationFrame(() => requestAnimationFrame(next)));")
         if self.run("return document.querySelector('#main').dataset.asking;") == "true":
             self.settle()
 

@@ -164,7 +164,7 @@ def test_uncertainties_and_their_shares(open_page, surrogate, case):
     slopes = surrogate.evaluate(**case, gradient=True).gradient
     parts = {"mu0": 0.01 * slopes["mu0"], "y0": 1e-7 * slopes["y0"]}
     std = math.hypot(*parts.values())
-    assert page.text("#uncertainty") == f"± {std:.3g} (one standard deviation)"
+    page.wait_for("#uncertainty", f"^± {std:.3g} \\(one standard deviation\\)$")
     for name in case:
         assert page.text(f"#share-{name}") == f"{100 * (parts.get(name, 0) / std) ** 2:.1f} %"
     # at the corner slopes say nothing: then it is samples

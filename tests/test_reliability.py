@@ -233,22 +233,6 @@ def test_a_file_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("section", ["mixed_load", "overload"])
-def test_the_service_holds_under_load(section: str) -> None:
-    found = traffic.SECTIONS[section](0.02)
-    assert "FAILED" not in found, found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", restarts.RESTARTS)
-def test_nobody_notices_that_a_process_ends(name: str) -> None:
-    outcome, seen = restarts.tried(restarts.RESTARTS[name], 0.05)
-    if outcome == "not tried":
-        pytest.skip(seen)
-    assert outcome == "held", seen
-
-
-@pytest.mark.slow
 def test_strange_requests_are_answered_or_refused() -> None:
     found = strange.strange_requests(0.003)
     assert "FAILED" not in found, found
