@@ -23,6 +23,7 @@ from measuring import ROOT, free_port, machine, markdown, progress, quantity, wr
 CASE = "mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5"
 OPEN = "import numpy as np, mumacro; s = mumacro.open(); "
 MANY = f"s.evaluate({CASE}, v0=np.geomspace(1e-3, 1.0, 1000))"
+SOLVE = f"from mumacro.inverse import solve_for; solve_for(s, 'v0', 0.25, dict({CASE}))"
 SCRIPTS = {
     "`import mumacro`": "import mumacro",
     "`mumacro.open()`": OPEN,
@@ -32,7 +33,7 @@ SCRIPTS = {
     + MANY.replace("np.geomspace(1e-3, 1.0, 1000)", "np.linspace(0.0, 1.0, 1000)"),
     "one case with its gradient": OPEN + f"s.evaluate({CASE}, v0=0.01, gradient=True)",
     "one power, `s.power(v, y)`": OPEN + "s.power(0.1, 2.0)",
-    "one root, `s.solve_for(...)`": OPEN + "s.solve_for('y0', 0.15, mu0=0.3, Fz=10.0, k=1e6, omega=1.3e5, v0=0.01)",
+    "one root, `solve_for(...)`": OPEN + SOLVE,
 }
 COMMANDS = {
     "`mumacro 'mu0=0.3 ...'`, one case": ["-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 omega=1.3e5 v0=0.01"],
