@@ -224,4 +224,8 @@ def tables_of(request: Request) -> Tables:
     return tables
 
 
-TablesDep = Annotated[Tables, Depends(tables_of)]
+async def _tables(request: Request) -> Tables:  # async: the framework gives plain functions a thread each
+    return tables_of(request)
+
+
+TablesDep = Annotated[Tables, Depends(_tables)]

@@ -26,7 +26,7 @@ accepts("/v1/table", TableChoice.model_fields)
 accepts("/v1/table.nc", TableChoice.model_fields)
 
 
-def _chosen(choice: Annotated[TableChoice, Query()], tables: TablesDep) -> LoadedTable:
+async def _chosen(choice: Annotated[TableChoice, Query()], tables: TablesDep) -> LoadedTable:
     return tables.pick(choice.tolerance, "parameter") if choice.id is None else tables.named(choice.id)
 
 
