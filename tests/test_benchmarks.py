@@ -1,8 +1,6 @@
 """The scripts behind docs/benchmarks.md: they run, their tables hold what they promise, and the page is theirs."""
 
-import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -210,21 +208,3 @@ def test_sections_on_the_page_name_the_committed_tables() -> None:
     page = PAGE.read_text(encoding="utf-8")
     for path in (ROOT / "tables").glob("*.nc"):
         assert f"**{path.stem}**" in page
-
-
-def test_replicas_and_ways_of_asking_are_measured() -> None:
-    for program in ("wrk", "taskset", "curl", "nginx"):
-        if shutil.which(program, path=f"{os.environ['PATH']}:/usr/sbin") is None:
-            pytest.skip(f"{program} is not installed")
-    if len(os.sched_getaffinity(0)) < 2:
-        pytest.skip("server and caller want a processor each")
-    done = run("service", "--only", "replicas", "advice", "--rounds", "1", "--seconds", "1")
-    assert done.returncode == 0, done.stderr
-    replicas, ways = tables(done.stdout)
-    assert [row["nginx [us] a request"] == "-" for row in replicas] == [True, False, False]
-    shares = [number(row["share of the second"]) for row in replicas]
-    assert shares[0] < 0.1
-    assert shares[1] < 0.1
-    assert 0.2 < shares[2] < 0.8
-    assert len(ways) == 6
-    assert [row["way"].split(",")[0] for row in ways][::2] == ["one case", "batch", "library"]
