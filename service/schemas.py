@@ -24,7 +24,7 @@ from .quantities import QUANTITIES, Part
 __all__ = [
     "INCLUDES", "MAX_INCLUDE", "Answered", "BatchColumns", "BatchFault", "BatchQuery", "Case", "CaseAnswer",
     "CaseQuery", "CaseRequest", "ColumnsAnswer", "Health", "InputStd", "NotNegative", "Options", "Positive", "Problem",
-    "RequestFields", "Result", "RowsAnswer", "Stiffness", "TableAnswer", "TableChoice", "TableLabel", "canonical",
+    "Result", "RowsAnswer", "Stiffness", "TableAnswer", "TableChoice", "TableLabel", "canonical",
     "examples", "relation", "split_names", "std_fault",
 ]  # fmt: skip
 
@@ -64,8 +64,8 @@ def relation(field: str, reason: str) -> PydanticCustomError:
     return PydanticCustomError("relation", "{field}: {reason}", {"field": field, "reason": reason})
 
 
-class CaseFields(BaseModel):
-    """One case, in SI units, without the relations between its fields."""
+class Case(BaseModel):
+    """One case, in SI units; ``omega`` or ``f``, exactly one of them."""
 
     model_config = examples(_EXAMPLE)
 
@@ -90,35 +90,27 @@ class CaseFields(BaseModel):
             omega = RAD_PER_CYCLE * (self.f or 0.0)
         return self.mu0, self.Fz, k if isinstance(k, float) else math.inf, self.y0, omega, self.v0
 
-
-def _related(value: Any, handler: ModelWrapValidatorHandler[Any], title: str) -> Any:
-    """Check a case and the relations between its fields; a missing frequency is reported with the other faults."""
-    try:
-        made = handler(value)
-    except ValidationError as error:
-        if not isinstance(value, dict) or (value.get("omega") is None) != (value.get("f") is None):
-            raise
-        entries: Any = [
-            {"type": relation(**entry["ctx"]), "loc": entry["loc"], "input": entry["input"]}
-            if entry["type"] == "relation"
-            else {name: entry[name] for name in ("type", "loc", "input", "ctx") if name in entry}
-            for entry in error.errors(include_url=False)
-        ]
-        entries.append({"type": frequency_fault(value.get("f") is not None), "loc": (), "input": None})
-        raise ValidationError.from_exception_data(title, entries) from None
-    fault = made.fault()
-    if fault is not None:
-        raise fault
-    return made
-
-
-class Case(CaseFields):
-    """One case, in SI units; ``omega`` or ``f``, exactly one of them."""
-
     @model_validator(mode="wrap")
     @classmethod
     def _related(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Any:
-        return _related(value, handler, cls.__name__)
+        """Check a case and the relations between its fields; a missing frequency is reported with the other faults."""
+        try:
+            made = handler(value)
+        except ValidationError as error:
+            if not isinstance(value, dict) or (value.get("omega") is None) != (value.get("f") is None):
+                raise
+            entries: Any = [
+                {"type": relation(**entry["ctx"]), "loc": entry["loc"], "input": entry["input"]}
+                if entry["type"] == "relation"
+                else {name: entry[name] for name in ("type", "loc", "input", "ctx") if name in entry}
+                for entry in error.errors(include_url=False)
+            ]
+            entries.append({"type": frequency_fault(value.get("f") is not None), "loc": (), "input": None})
+            raise ValidationError.from_exception_data(cls.__name__, entries) from None
+        fault = made.fault()
+        if fault is not None:
+            raise fault
+        return made
 
 
 def frequency_fault(both: bool) -> PydanticCustomError:
@@ -186,8 +178,8 @@ def canonical(include: Any) -> tuple[str, ...]:
     return tuple(name for name in QUANTITIES if name in asked) if asked else ()
 
 
-class RequestFields(CaseFields):
-    """One case and the options of its answer, without the relations between the fields."""
+class CaseRequest(Case):
+    """One case and the options of its answer; ``omega`` or ``f``, exactly one of them."""
 
     include: IncludeList | None = Field(None, description=_INCLUDE)
     tolerance: Positive | None = Field(None, description=_TOLERANCE)
@@ -205,15 +197,6 @@ class RequestFields(CaseFields):
     def names(self) -> tuple[str, ...]:
         """Included names once each, in the order of the registry."""
         return canonical(self.include)
-
-
-class CaseRequest(RequestFields):
-    """One case and the options of its answer; ``omega`` or ``f``, exactly one of them."""
-
-    @model_validator(mode="wrap")
-    @classmethod
-    def _related(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Any:
-        return _related(value, handler, cls.__name__)
 
 
 # --- queries ------------------------------------------------------------------------------------------

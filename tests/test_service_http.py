@@ -97,6 +97,19 @@ def test_an_unexpected_error_is_logged_and_not_shown(broken, case, problem, capl
     assert "secret detail" in JsonFormatter().format(record)
 
 
+def test_an_unexpected_error_of_a_plain_case_is_one_of_any_other(client, case, problem, caplog, monkeypatch):
+    def fail(*_args):
+        raise RuntimeError("secret detail")
+
+    for module in ("service.single", "service.evaluation"):
+        monkeypatch.setattr(f"{module}.default_answer", fail)
+    for response in (client.post("/v1/mu-macro", json=case), client.get("/v1/mu-macro", params=case)):
+        assert problem(response, 500)["request_id"] == response.headers["x-request-id"]
+        assert "secret" not in response.text
+    assert [record.fields["status"] for record in caplog.records if record.name == "mumacro.access"] == [500, 500]
+    assert [record.name for record in caplog.records].count("mumacro.error") == 2
+
+
 @pytest.fixture
 def closed(tables_dir):
     """A client of an application with an API key."""

@@ -16,7 +16,7 @@ from ..formats.columns import dump
 from ..metrics import Metrics
 from ..openapi import ANSWER_HEADERS, problems
 from ..quantities import cost_of
-from ..schemas import CaseAnswer, CaseQuery, CaseRequest, RequestFields
+from ..schemas import CaseAnswer, CaseQuery, CaseRequest
 from ..settings import cache_fields
 from ..tables import LoadedTable, TablesDep
 from . import etag_matches, no_query, once_each, parameters_of
@@ -37,7 +37,7 @@ class ValueQuery(CaseQuery):
     )
 
 
-async def _answered(request: Request, table: LoadedTable, case: RequestFields) -> dict[str, Any]:
+async def _answered(request: Request, table: LoadedTable, case: CaseRequest) -> dict[str, Any]:
     # Code that is not loaded yet, or takes long, runs in a thread.
     costly = case.include and (not request.app.state.tables.warm or cost_of(case.names()) > 100)
     work = request.app.state.work
