@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import reporting
@@ -29,10 +28,6 @@ SMALLEST = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
 TOLERANCE = "1e-2"
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a user that owns nothing
-
-
-class NotTriedError(Exception):
-    """This machine or user may not do what the trial needs."""
 
 
 # --- what the trials share ----------------------------------------------------------------------------
@@ -79,7 +74,7 @@ def small_disk(folder: Path, size: str) -> Iterator[Path]:
     mount = shutil.which("mount")
     words = [str(mount), "-t", "tmpfs", "-o", f"size={size},mode=0777", "tmpfs", str(disk)]
     if mount is None or subprocess.run(words, capture_output=True, check=False).returncode:
-        raise NotTriedError("no small file system may be mounted here")
+        raise reporting.NotTriedError("no small file system may be mounted here")
     try:
         yield disk
     finally:
@@ -89,13 +84,13 @@ def small_disk(folder: Path, size: str) -> Iterator[Path]:
 def closed(folder: Path) -> Path:
     """A folder that another user may read and not write."""
     if not hasattr(os, "getuid") or os.getuid() != 0:
-        raise NotTriedError("only root may run a trial as another user")
+        raise reporting.NotTriedError("only root may run a trial as another user")
     folder.chmod(0o755)
     try:
         words = [*AS_NOBODY, sys.executable, "-c", "import numpy"]
         subprocess.run(words, cwd=folder, check=True, capture_output=True)
     except (OSError, subprocess.CalledProcessError):
-        raise NotTriedError("another user may not run this Python") from None
+        raise reporting.NotTriedError("another user may not run this Python") from None
     made = folder / "closed"
     made.mkdir(mode=0o755)
     return made
@@ -275,7 +270,7 @@ def kernels_that_cannot_be_kept(folder: Path) -> str:
 
 def no_home(folder: Path) -> str:
     if os.getuid() != 0:
-        raise NotTriedError("only root may run a trial as a user without a home")
+        raise reporting.NotTriedError("only root may run a trial as a user without a home")
     (folder / "tmp").mkdir(mode=0o777)
     (folder / "tmp").chmod(0o777)
     closed(folder)
@@ -322,15 +317,10 @@ FAULTS: dict[str, Callable[..., str]] = {
 }
 
 
-def tried(fault: Callable[..., Any]) -> tuple[str, str]:
+def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
     """Whether the project held, and what was seen."""
     with tempfile.TemporaryDirectory() as folder:
-        try:
-            return "held", fault(Path(folder))
-        except NotTriedError as reason:
-            return "not tried", str(reason)
-        except AssertionError as error:
-            return "FAILED", " ".join(str(error).split())[:200]
+        return reporting.tried(lambda: fault(Path(folder)))
 
 
 def faults(_share: float) -> str:

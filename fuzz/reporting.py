@@ -13,7 +13,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]  # in this order: both hold
 
 import measuring  # noqa: E402 (found by the lines above)
 
-__all__ = ["PAGE", "ROOT", "report", "took"]
+__all__ = ["PAGE", "ROOT", "NotTriedError", "report", "took", "tried"]
 
 PAGE = ROOT / "docs" / "reliability.md"
 
@@ -35,6 +35,20 @@ def report(text: str, sections: Mapping[str, Callable[[float], str]], arguments:
             print(f"## {name}\n\n{found}\n", flush=True)
             if given.write:
                 measuring.write_section(name, found, PAGE)
+
+
+class NotTriedError(Exception):
+    """A trial cannot be made here; the message says why."""
+
+
+def tried(trial: Callable[[], str]) -> tuple[str, str]:
+    """Whether the project held in a trial, and what was seen."""
+    try:
+        return "held", trial()
+    except NotTriedError as reason:
+        return "not tried", str(reason)
+    except AssertionError as error:
+        return "FAILED", " ".join(str(error).split())[:300]
 
 
 def took(started: float, *packages: str) -> str:

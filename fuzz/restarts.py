@@ -21,10 +21,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import reporting
-from faults import NotTriedError
 from load import Seen, answers, closed_loop
 from measuring import markdown
 from serving import CASE, FAULT, Caller, Server, questions, serving
@@ -206,7 +206,7 @@ def proxy(ports: list[int]) -> Iterator[int]:
     """nginx before these ports; the port where it listens."""
     program = shutil.which("nginx", path=os.environ.get("PATH", "") + ":/usr/sbin")
     if program is None:
-        raise NotTriedError("nginx is not installed")
+        raise reporting.NotTriedError("nginx is not installed")
     port = free_port()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "nginx.conf"
@@ -281,20 +281,10 @@ RESTARTS: dict[str, Callable[[float], str]] = {
 }
 
 
-def tried(trial: Callable[[float], str], share: float) -> tuple[str, str]:
-    """Whether the service held, and what was seen."""
-    try:
-        return "held", trial(share)
-    except NotTriedError as reason:
-        return "not tried", str(reason)
-    except AssertionError as error:
-        return "FAILED", " ".join(str(error).split())[:300]
-
-
 def restarts(share: float) -> str:
     """Every trial once."""
     started = time.perf_counter()
-    rows = [[name, *tried(trial, share)] for name, trial in RESTARTS.items()]
+    rows = [[name, *reporting.tried(partial(trial, share))] for name, trial in RESTARTS.items()]
     return f"{markdown(('what happens', 'it', 'what was seen'), rows, 3)}\n\n{reporting.took(started)}"
 
 

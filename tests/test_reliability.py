@@ -192,7 +192,7 @@ def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Pa
             ):
                 sweep.solve("full", many, many)
             assert faults.left(disk) == kept
-    except faults.NotTriedError as error:
+    except faults.reporting.NotTriedError as error:
         pytest.skip(str(error))
 
 

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import pytest
 
@@ -80,52 +81,56 @@ def test_no_key_is_logged_or_shown(serving, surrogate, case):
     assert {line.get("key") for line in fields_of(server.lines)} == {None, "alice", "bob"}
 
 
+@contextmanager
 def started(repository, surrogate):
     """A service whose standard output is read up to the line with its port, and no further."""
     command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
     process = subprocess.Popen(command, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    read = []
-    while not (found := re.search(rb"running on http://[^ ]+:(\d+) ", read[-1] if read else b"")):
-        read.append(process.stdout.readline())
-        assert read[-1], b"".join(read)
-    return process, int(found[1]), read
-
-
-def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case):
-    process, port, lines = started(repository, surrogate)
     try:
-        query = f"{SINGLE}?" + "&".join(f"{name}={value}" for name, value in case.items())
-
-        def ask(path, many):
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-            statuses = []
-            for _ in range(many):
-                connection.request("GET", path)
-                response = connection.getresponse()
-                response.read()
-                statuses.append(response.status)
-            connection.close()
-            return statuses
-
-        deadline = time.monotonic() + 180
-        while ask("/readyz", 1) != [200]:
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
-        # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
-        with ThreadPoolExecutor(4) as pool:
-            answered = [*pool.map(lambda _: ask(query, 3000), range(4)), *pool.map(lambda _: ask("/x", 500), range(4))]
-        assert answered == 4 * [3000 * [200]] + 4 * [500 * [404]]
-        reader = threading.Thread(target=lambda: lines.extend(process.stdout))
-        reader.start()
-        assert ask("/y", 1) == [404]
+        read = []
+        while not (found := re.search(rb"running on http://[^ ]+:(\d+) ", read[-1] if read else b"")):
+            read.append(process.stdout.readline())
+            assert read[-1], b"".join(read)
+        yield process, int(found[1]), read
         process.terminate()
         assert process.wait(60) == 0
-        reader.join(60)
     finally:
         process.kill()
         process.wait()
         process.stdout.close()
+
+
+def statuses(port, path, many=1):
+    """Answers to the same question on one connection."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    found = []
+    for _ in range(many):
+        connection.request("GET", path)
+        response = connection.getresponse()
+        response.read()
+        found.append(response.status)
+    connection.close()
+    return found
+
+
+def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case):
+    query = f"{SINGLE}?" + "&".join(f"{name}={value}" for name, value in case.items())
+    with started(repository, surrogate) as (process, port, lines):
+        deadline = time.monotonic() + 180
+        while statuses(port, "/readyz") != [200]:
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
+        with ThreadPoolExecutor(4) as pool:
+            answered = [pool.submit(statuses, port, *asked) for asked in 4 * [(query, 3000)] + 4 * [("/x", 500)]]
+        assert [one.result() for one in answered] == 4 * [3000 * [200]] + 4 * [500 * [404]]
+        reader = threading.Thread(target=lambda: lines.extend(process.stdout))
+        reader.start()
+        assert statuses(port, "/y") == [404]
+        process.terminate()
+        assert process.wait(60) == 0
+        reader.join(60)
     found = fields_of(lines)
     (dropped,) = {line["logger"] for line in found if "were dropped" in line["message"]}
     assert dropped == "service.logs"
@@ -136,32 +141,12 @@ def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case)
 
 
 def test_a_log_reader_that_stays_stalled_does_not_prevent_the_end(repository, surrogate):
-    process, port, _ = started(repository, surrogate)
-    try:
-        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-        for _ in range(2000):
-            connection.request("GET", "/nowhere")
-            connection.getresponse().read()
-        connection.close()
-        process.terminate()
-        assert process.wait(60) == 0
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
+    with started(repository, surrogate) as (_, port, _):
+        assert statuses(port, "/nowhere", 2000) == 2000 * [404]
 
 
 def test_a_log_reader_that_leaves_does_not_end_the_service(repository, surrogate):
-    process, port, _ = started(repository, surrogate)
-    try:
+    with started(repository, surrogate) as (process, port, _):
         process.stdout.close()
         for _ in range(20):
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-            connection.request("GET", "/nowhere")
-            assert connection.getresponse().status == 404
-            connection.close()
-        process.terminate()
-        assert process.wait(60) == 0
-    finally:
-        process.kill()
-        process.wait()
+            assert statuses(port, "/nowhere") == [404]
