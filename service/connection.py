@@ -29,6 +29,7 @@ _UNREAD = 64 * 1024  # bytes of a body that the application has not taken yet
 _TOGETHER = 64 * 1024  # bytes of a body that are copied behind the head: one write to the socket instead of two
 _LINGER_S = 5.0  # how long the rest of an unwanted body is read, so that the caller sees the answer and no reset,
 _LINGER = 32 * 1024 * 1024  # and how much of it
+_LAST_S = 0.25  # how long a stopping service still takes a request on a connection that is open
 _STATUS = {status.value: f"HTTP/1.1 {status.value} {status.phrase}\r\n".encode() for status in HTTPStatus}
 _END = b"\r\n"
 _log = logging.getLogger("mumacro.error")
@@ -176,6 +177,7 @@ class Connection(asyncio.Protocol):
         self._url, self._headers, self._expects = b"", list[tuple[bytes, bytes]](), False
         self._idle_bytes = 0  # since the last head, or piece of a body, was complete
         self._moved = False
+        self._stopping = False
         self._deaf = False  # whether what comes is thrown away
         self._paused = False
         self.stalled: asyncio.Event | None = None  # while the caller does not read
@@ -242,11 +244,20 @@ class Connection(asyncio.Protocol):
             self._unwatch()
 
     def shutdown(self) -> None:
-        """Answer what has been asked, then close; uvicorn calls it."""
-        if self._now is None or self._now.answered:
-            self._transport.close()
+        """Answer what has been asked and what is on its way, then close; uvicorn calls it."""
+        self._stopping = True
+        if self._is_idle:
+            self._loop.call_later(_LAST_S, self._close_unused)
         else:
             self._last().keep = False
+
+    @property
+    def _is_idle(self) -> bool:
+        return self._now is None or self._now.answered
+
+    def _close_unused(self) -> None:
+        if self._is_idle:
+            self._transport.close()
 
     def data_received(self, data: bytes) -> None:
         """Parse what belongs to the request that is being answered, or begins one; hold the rest."""
@@ -342,7 +353,7 @@ class Connection(asyncio.Protocol):
             "headers": self._headers,
             "state": self._app_state.copy(),
         }
-        keep = version != "1.0" and parser.should_keep_alive()
+        keep = version != "1.0" and parser.should_keep_alive() and not self._stopping
         self._coming = exchange = _Exchange(self, scope, keep, self._expects)
         if self._now is None:
             self._begin(exchange)

@@ -228,7 +228,7 @@ class AccessLog:
         """Write the line of one finished request; ``quiet`` requests (successful probes) are logged at ``debug``."""
         if client is not None:
             client = client[:_MOST_SHOWN]
-        if self._put is not None and not quiet and status == 200 and path in _KNOWN and method in _METHODS:
+        if self._put is not None and not quiet and path in _KNOWN and method in _METHODS:
             self._put((time.time(), identity, self._texts[method, path, status], seconds, client, key))
             return
         level = logging.DEBUG if quiet else logging.INFO

@@ -87,8 +87,8 @@ def test_a_client_that_ends_within_a_body_is_disconnected_at_once(raw, path, bef
     assert received.count(b" 200 ") == (1 if before else 0)
 
 
-def served(app, request):
-    """What the connection answers where the application is this one."""
+def served(app, request, *, stopping=False):
+    """What the connection answers where the application is this one, perhaps after the server has begun to stop."""
 
     async def talk():
         state = SimpleNamespace(connections=set(), tasks=set(), total_requests=0, default_headers=[(b"date", b"now")])
@@ -98,6 +98,10 @@ def served(app, request):
         loop = asyncio.get_running_loop()
         server = await loop.create_server(lambda: Connection(config, state, {}), "127.0.0.1", 0)
         reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+        if stopping:
+            while not state.connections:
+                await asyncio.sleep(0.0)
+            next(iter(state.connections)).shutdown()
         writer.write(request)
         received = await asyncio.wait_for(reader.read(), 10)
         writer.close()
@@ -112,12 +116,19 @@ def served(app, request):
 
 
 def test_an_answer_without_fields_is_whole():
-    async def empty(_scope, _receive, send):
-        await send({"type": "http.response.start", "status": 204, "headers": []})
-        await send({"type": "http.response.body"})
-
     answer = b"HTTP/1.1 204 No Content\r\ndate: now\r\n"
     assert served(empty, GET + LAST) == answer + b"\r\n" + answer + b"connection: close\r\n\r\n"
+
+
+async def empty(_scope, _receive, send):
+    await send({"type": "http.response.start", "status": 204, "headers": []})
+    await send({"type": "http.response.body"})
+
+
+def test_a_request_that_was_on_its_way_when_the_server_stopped_is_answered():
+    answer = b"HTTP/1.1 204 No Content\r\ndate: now\r\nconnection: close\r\n\r\n"
+    assert served(empty, GET, stopping=True) == answer
+    assert served(empty, b"", stopping=True) == b""
 
 
 @pytest.mark.parametrize("behind", [b"", GET])

@@ -6,11 +6,12 @@ typed.  Answers are sent piece by piece, no faster than the client reads them.
 
 import asyncio
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
+from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
@@ -29,7 +30,7 @@ from ..metrics import Metrics
 from ..openapi import batch_operation, problems
 from ..quantities import cost_of
 from ..schemas import BatchQuery, Options
-from ..tables import LoadedTable, Tables, TablesDep, signature
+from ..tables import LoadedTable, Tables, TablesDep, signature, tables_of
 from . import once_each
 
 __all__ = ["Batches", "router"]
@@ -40,6 +41,8 @@ _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are taken
 _LINES = 256 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, for the time of a plain case: what reading it costs
+_NO_QUERY = BatchQuery()
+_FORMS: dict[str, Format | None] = {}  # path -> the form that it takes; None: any
 
 
 class Batches:
@@ -347,8 +350,25 @@ def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
         yield b"".join(gathered)
 
 
+class _Route(APIRoute):
+    """Solves parameters only where there is a query: that takes as long as a small batch."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The usual handler, or none."""
+        usual, chosen = super().get_route_handler(), _FORMS[self.path]
+
+        async def answer(request: Request) -> Response:
+            if request.scope["query_string"]:
+                return await usual(request)
+            tables_of(request)
+            return BatchResponse(request, request.app.state.batches, chosen, _NO_QUERY)
+
+        return answer
+
+
 def _add(path: str, chosen: Format | None) -> None:
     accepts(path, BatchQuery.model_fields)
+    _FORMS[path] = chosen
 
     async def post_batch(query: Annotated[BatchQuery, Query()], request: Request, _tables: TablesDep) -> Response:
         """Answer in the form that was asked in, order kept.  A bad case has the result null and an entry in ``errors``.
@@ -362,7 +382,7 @@ def _add(path: str, chosen: Format | None) -> None:
         path, post_batch, methods=["POST"],
         operation_id="post_mu_macro_batch" + (f"_{chosen.name}" if chosen else ""),
         summary="Macroscopic friction of many cases" + (f", as {chosen.name}" if chosen else ""),
-        response_class=Response, dependencies=[Depends(once_each)],
+        response_class=Response, route_class_override=_Route, dependencies=[Depends(once_each)],
         responses={200: batch_operation(forms)["answer"], **problems(400, 401, 408, 413, 415, 422, 503)},
         openapi_extra={"requestBody": batch_operation(forms)["body"]},
     )  # fmt: skip
