@@ -57,7 +57,7 @@ ANOTHER = {
     "numbers of 1.7e308, checksum right", "random numbers of 1e100, checksum right",
     "amplitudes of 1e300, checksum right", "errors of 1e308, checksum right",
 }  # fmt: skip
-HARMLESS = {"a group that holds itself", "3,000 groups, one in the other"}
+HARMLESS = {"a group that contains itself", "3,000 nested groups"}
 
 
 @pytest.fixture(scope="module")

@@ -169,7 +169,7 @@ def test_unfinished_bodies_take_little_memory(watched):
         raw.close()
 
 
-def test_idle_streams_hold_little(watched):
+def test_idle_streams_take_little_memory(watched):
     head = f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: application/x-ndjson\r\nContent-Length: 1\r\n\r\n"
     raws = [connect(watched) for _ in range(300)]
     for raw in raws:
