@@ -1,4 +1,4 @@
-"""The scripts behind docs/benchmarks.md: they run, their tables hold what they promise, and the page is theirs."""
+"""The scripts behind docs/benchmarks.md: they run, their tables are right, and the page contains them."""
 
 import re
 import subprocess
@@ -22,7 +22,7 @@ Row = dict[str, str]
 
 
 def run(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """One script of benchmarks/, in a process of its own, from the root."""
+    """One script of benchmarks/, in a separate process, from the root."""
     command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *arguments]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
 
@@ -49,7 +49,7 @@ def number(cell: str) -> float:
 
 @pytest.fixture(scope="module")
 def printed() -> str:
-    """What a quick comparison prints."""
+    """The output of a quick comparison."""
     done = run("speed_against_error", "--quick", "--rounds", "1")
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -109,7 +109,7 @@ def test_errors_of_the_other_quantities_lie_below_their_largest_bound(speed: lis
         assert row["max bound"] == "-" or number(row["max error"]) <= number(row["max bound"])
 
 
-def test_a_peer_that_is_not_there_is_named(printed: str, speed: list[list[Row]]) -> None:
+def test_a_peer_that_is_not_installed_is_named(printed: str, speed: list[list[Row]]) -> None:
     names = [row["what answers"] for row in speed[0]]
     for package in ("CoolProp", "baobzi", "interpolation"):
         answered = any(name.startswith(package) for name in names)
