@@ -1,7 +1,7 @@
-"""How good the closed forms are that ``/v1/law`` puts beside the table:  python benchmarks/approximations.py [TABLE]
+"""Accuracy of the closed forms in a response of ``/v1/law``:  python benchmarks/approximations.py [TABLE]
 
-Prints the largest relative error of the formulas for the border, with the number that fits the blend best, and the
-largest error of each approximation of mu_macro/mu0 over the cases it is given for.
+Prints the largest relative error of the formulas for the border, with the best parameter of the blend, and the
+largest error of each approximation of mu_macro/mu0 over its range.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ RANGES = ((1e-4, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 10.0), (10.0, 1e3), (1e3, 1
 
 
 def border(surrogate: Surrogate) -> str:
-    """Largest relative errors of the border's formulas, by range of y~; of each where a law gives it."""
+    """Largest relative errors of the border's formulas, by range of y~, each within its range in a law."""
     names = [name for name in BORDERS if name != "exact"]
     rows = []
     for low, high in (*RANGES, (1e-4, 1e6)):
@@ -35,7 +35,7 @@ def border(surrogate: Surrogate) -> str:
 
 
 def best_blend(surrogate: Surrogate) -> tuple[float, float]:
-    """The number that makes the blend's largest relative error smallest, and that error."""
+    """The parameter of the blend with the smallest largest relative error, and that error."""
     y = np.geomspace(1e-4, 1e8, 4001)
     exact = surrogate.v_tilde_crit(y)
     c = (closed_forms.BORDER_CONSTANT / 4.0) ** (2.0 / 3.0)
@@ -50,7 +50,7 @@ def best_blend(surrogate: Surrogate) -> tuple[float, float]:
 
 
 def ratios(surrogate: Surrogate) -> str:
-    """Absolute errors of mu_macro/mu0 by regime and, of the large ones, where they are."""
+    """Absolute errors of mu_macro/mu0 by regime, and the positions of the large ones."""
     v = np.geomspace(1e-6, 1e3, 181)
     worst: dict[tuple[str, str], tuple[float, float, float]] = {}
     for y in np.geomspace(1e-2, 1e3, 101).tolist():

@@ -1,8 +1,8 @@
-"""What a table costs: solves, seconds, bytes and verified error for every tolerance, beside plain grids.
+"""Cost of a table: solves, seconds, bytes and verified error for every tolerance, compared with plain grids.
 
     python benchmarks/build_cost.py [--workers 2] [--quick] [--write]
 
-Tables are built into a temporary folder and thrown away.  ``--write`` puts the table and the plot into docs/.
+Tables are built in a temporary folder and deleted.  ``--write`` writes the table and the plot to docs/.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Built:
-    """One table: its price and its verified error."""
+    """One table: its cost and its verified error."""
 
     tolerance: float
     nodes: int
@@ -72,7 +72,7 @@ class Plain:
 
 
 def build(tolerance: float, workers: int, folder: Path) -> Built:
-    """Build one table from nothing and measure it."""
+    """Build one table from scratch and measure it."""
     names = {chart.name for chart in charts.CHARTS}
     nodes = 0
     path = folder / f"{tolerance:.0e}.nc"
@@ -108,7 +108,7 @@ def plain(sizes: tuple[int, ...], points: int) -> list[Plain]:
 
 
 def plot(tables: list[Built], grids: list[Plain], path: Path) -> None:
-    """Solves and bytes against the verified error, ours and plain grids."""
+    """Solves and bytes against the verified error, for these tables and plain grids."""
     plt.rcParams.update({"font.size": 10.5, "axes.edgecolor": INK, "axes.labelcolor": INK})
     figure, panels = plt.subplots(1, 2, figsize=(9.5, 4.3), sharex=True)
     error, grid_error = [t.max_abs for t in tables], [g.max_abs for g in grids]
@@ -144,7 +144,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put table and plot into docs/")
     given = parser.parse_args()
     if given.quick and given.write:
-        parser.error("--quick measures nothing worth writing down")
+        parser.error("--quick cannot be combined with --write")
     if given.workers < 1:
         parser.error(f"--workers must be at least 1, got {given.workers}")
     tables = []

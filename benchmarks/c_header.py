@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""mumacro.h beside the numba kernels: nanoseconds a point and distance in units of the last place, in one run.
+"""mumacro.h compared with the numba kernels: nanoseconds a point and distance in units of the last place, in one run.
 
     python benchmarks/c_header.py              print the tables of docs/c.md
     python benchmarks/c_header.py --write      write them into the page
-    python benchmarks/c_header.py --quick      fewer points, one table of numbers, for a look
+    python benchmarks/c_header.py --quick      fewer points, one lookup table
 
 Points are spread evenly in ln v~ and ln y~ over 1e-4 to 1e6 and 1e-3 to 1e7, in random order.  Distances are measured
 on them and as many more around the border of continuous sliding and the corner; and once more without those within 1e-8
-of the border, where rounding decides on the side and enters by its root.
+of the border, where rounding decides the side and the error is the root of a rounding error.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ FUSED = ("-O3", "-std=c99", "-march=native", "-ffp-contract=fast")
 
 @kernel(beside=Path(__file__).parent)
 def one_by_one(v: Array, y: Array, coef: Array, blocks: Array, border: Array, pieces: Array, out: Array) -> None:
-    """The scalar kernels in a compiled loop, which is what the header is."""
+    """The scalar kernels in a compiled loop, equivalent to the header."""
     for i in range(v.size):
         out[i], _, source = common_ratio(v[i], y[i], coef, blocks, border, pieces)
         if source in (CORNER, FAST, OTHER):
@@ -77,7 +77,7 @@ def points(n: int) -> tuple[Array, Array]:
 
 
 def hard_points(surrogate: Surrogate, n: int) -> tuple[Array, Array]:
-    """Around the border, down to the last digit, and around the corner y~ = 1, v~ = 0."""
+    """Around the border, to the last digit, and around the corner y~ = 1, v~ = 0."""
     rng = np.random.default_rng(12)
     y = 10.0 ** np.where(rng.random(n) < 0.5, rng.uniform(-0.3, 0.3, n), rng.uniform(-6.0, 9.0, n))
     crit = np.asarray(surrogate.v_tilde_crit(y))

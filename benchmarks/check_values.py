@@ -1,9 +1,9 @@
-"""Check values for ports and installations: tests/data/check_values.csv, made of quadruple-precision points.
+"""Check values for ports and installations: tests/data/check_values.csv, from quadruple-precision points.
 
     python benchmarks/check_values.py            prints the file
     python benchmarks/check_values.py --write    writes it
 
-Values come from tests/data/points.csv and border.csv, which another solver made, and from closed forms in 50 digits;
+Values come from tests/data/points.csv and border.csv, computed by another solver, and from closed forms in 50 digits;
 not from this project's own solver or tables.  docs/check-values.md describes the columns.
 """
 
@@ -21,7 +21,7 @@ from mpmath import agm, mp, mpf, sqrt
 DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
 FILE = DATA / "check_values.csv"
 COLUMNS = ("quantity", "where", "v_tilde", "y_tilde", "mu0", "Fz", "k", "y0", "omega", "v0", "value", "tolerance")
-A_CLASS = 6  # of reference points of each class
+A_CLASS = 6  # reference points of each class
 # powers of two: l0 = mu0 Fz / k = 2^-19 m and l0 omega = 2^-2 m/s, so that y0 and v0 give the groups back exactly
 MU0, FZ, K, OMEGA = 0.25, 8.0, 2.0**20, 2.0**17
 L0 = MU0 * FZ / K
@@ -69,7 +69,7 @@ def rows() -> Iterator[dict[str, Any]]:
 
 
 def closed_forms() -> Iterator[dict[str, Any]]:
-    """Limits that hold exactly: nothing moves across, nothing is dragged, rigid contact."""
+    """Limits that hold exactly: no oscillation, no drive, rigid contact."""
     mp.dps = 50
     usual = {"mu0": MU0, "Fz": FZ, "k": K, "y0": L0 / 2, "omega": OMEGA, "v0": L0 * OMEGA / 8}
     for where, change in (("no amplitude", {"y0": 0.0}), ("no oscillation", {"omega": 0.0})):

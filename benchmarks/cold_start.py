@@ -1,6 +1,6 @@
-"""What a first answer costs: with nothing compiled yet, and in every later process.
+"""Time to the first answer: before the kernels are compiled, and in later processes.
 
-Every line is a process of its own, from its start to its end (the service: to its first ready answer).  "empty" has an
+Every row is a separate process, timed from start to end (the service: to its first ready response).  "empty" has an
 empty folder of kernels, as after an installation; "kept" is the same process again.
 """
 
@@ -52,7 +52,7 @@ def seconds_of(arguments: list[str], environment: dict[str, str]) -> float:
 
 
 def seconds_until_ready(environment: dict[str, str]) -> float:
-    """From the start of the service to its first ready answer."""
+    """From the start of the service to its first ready response."""
     port = free_port()
     started = time.perf_counter()
     process = subprocess.Popen(
@@ -73,7 +73,7 @@ def seconds_until_ready(environment: dict[str, str]) -> float:
 
 
 def works() -> dict[str, Callable[[dict[str, str]], float]]:
-    """What is timed."""
+    """The timed processes."""
     arguments = {name: ["-c", script] for name, script in SCRIPTS.items()} | COMMANDS
     timed: dict[str, Callable[[dict[str, str]], float]] = {
         name: (lambda environment, words=words: seconds_of(words, environment)) for name, words in arguments.items()
@@ -89,7 +89,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     if options.quick and options.write:
-        parser.error("--quick measures nothing worth writing down")
+        parser.error("--quick cannot be combined with --write")
     timed = dict(list(works().items())[2:3]) if options.quick else works()
     rows = []
     for name, work in timed.items():

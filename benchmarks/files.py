@@ -1,9 +1,9 @@
-"""Rows a second of ``mumacro eval`` on one core, by format, beside the cost of reading and writing alone.
+"""Rows a second of ``mumacro eval`` on one core, by format, compared with reading and writing alone.
 
     python benchmarks/files.py [--rows 4000000]
 
-The floor copies the same Parquet file with the same columns added as constants: read, write, nothing computed.  Figures
-are processor time, so that other work on the machine counts little; ratios hold better than rates.
+"floor" copies the same Parquet file with the same columns added as constants: read, write, no computation.  Times
+are processor time, so that other work on the machine has little effect; ratios are more reproducible than rates.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def cases(n: int) -> pa.Table:
 
 
 def floor(source: Path, out: Path) -> None:
-    """Read and write, with as many bytes as the answers take."""
+    """Read and write, with the same number of bytes as the answers."""
     with pq.ParquetFile(source, pre_buffer=False) as file:
         schema = pa.schema([*file.schema_arrow, *added_fields()])
         noise = np.random.default_rng(0).random(2**19)
@@ -58,7 +58,7 @@ def main() -> None:
     pa.set_io_thread_count(1)
     surrogate = Surrogate.open(next(path for path in bundled_tables() if "1e-10" in path.name))
     table = cases(rows)
-    answer(table.slice(0, 9).to_batches()[0], surrogate)  # kernels are loaded or compiled before anything is timed
+    answer(table.slice(0, 9).to_batches()[0], surrogate)  # kernels are loaded or compiled before timing
     print(f"{'from':8} {'to':8} {'M rows/s':>9}")
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "cases.parquet"

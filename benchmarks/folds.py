@@ -1,8 +1,8 @@
 """Where mu_macro folds as a function of k, Fz or mu0:  python benchmarks/folds.py [TABLE]
 
-With r = y0 omega / v0 constant, y~ = r v~ grows with k and with 1/Fz and 1/mu0.  Prints the r at which the fold is
-born, where minimum and maximum lie for larger r, whether mu0 folds (mu~ steeper in y~ than y~ itself), and the y~ where
-such a ray is deepest in stick-slip.
+With r = y0 omega / v0 constant, y~ = r v~ grows with k and with 1/Fz and 1/mu0.  Prints the r at which the fold
+first appears, the positions of minimum and maximum for larger r, whether mu0 folds (mu~ steeper in y~ than y~ itself),
+and the y~ where such a ray is farthest inside stick-slip.
 """
 
 import sys
@@ -17,7 +17,7 @@ y = np.geomspace(1e-6, 1e18, 240_001)
 
 
 def turning_points(surrogate: Surrogate, r: float) -> list[tuple[float, float]]:
-    """(y~, mu~) of the minima and maxima, where the slope with y~ changes its sign by more than rounding."""
+    """(y~, mu~) of the minima and maxima, where the slope along y~ changes its sign by more than rounding."""
     mu = surrogate.mu_ratio(y / r, y)
     slope = np.diff(np.log(mu))
     slope[np.abs(slope) < 1e-12] = -1e-300
@@ -32,7 +32,7 @@ def main() -> None:
     for _ in range(24):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if turning_points(surrogate, middle) else (middle, high)
-    print(f"the fold is born at r = {high:.4f}\n")
+    print(f"the fold first appears at r = {high:.4f}\n")
     print("| r | minimum at y~ | mu~ | maximum at y~ | mu~ | y~ / r^2 | largest d ln mu~ / d ln y~ |")
     print("|---|---|---|---|---|---|---|")
     for r in (9.75, 10.0, 30.0, 100.0, 1e3, 1e4, 1e6, 1e8):

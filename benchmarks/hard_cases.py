@@ -1,4 +1,4 @@
-"""Every number of docs/hard-cases.md: what straightforward code gets wrong, and what is done instead.
+"""Every number of docs/hard-cases.md: errors of straightforward code, and the methods used instead.
 
     python benchmarks/hard_cases.py [--write]
 
@@ -64,7 +64,7 @@ def worst(case: str) -> str:
 
 
 def _lam_samples(v: float, y: float, n: int) -> tuple[Array, float]:
-    """lam at ``n`` + 1 even instants of half a period of the continuous orbit, and its smallest value between them."""
+    """lam at ``n`` + 1 equidistant times of half a period of the continuous orbit, and its smallest value."""
     w, out, _, _ = workspace()
     if continuous(v, y, w, out) != OK:
         raise ArithmeticError(f"no continuous orbit at v~ = {v!r}, y~ = {y!r}")
@@ -95,7 +95,7 @@ def grazing() -> str:
 
 
 def surplus() -> str:
-    """What the poorly known end of slip would cost without taking the surplus out."""
+    """The error from the poorly known end of slip if the surplus is not removed."""
     w, out, orbit, _ = workspace()
     lost = kept = spread = 0.0
     count = 0
@@ -137,7 +137,7 @@ def double_root() -> str:
         ours = stick_excess(v, y, y - 1.0, x0, 0, s0, s0 + d - math.pi, d) * d * d
         with mpmath.workdps(60):
             th, dd = mpmath.mpf(x0), mpmath.mpf(d)
-            # the onset itself: lam = 0 ties sigma0 to th0
+            # at the onset lam = 0 determines sigma0 from th0
             at = mpmath.asin(mpmath.mpf(v) * mpmath.cos(th) / (mpmath.mpf(y) * mpmath.sin(th)))
             a = mpmath.cos(th) + v * dd
             b = mpmath.sin(th) + y * (mpmath.cos(at + dd) - mpmath.cos(at))
@@ -151,7 +151,7 @@ def double_root() -> str:
 
 
 def creep() -> str:
-    """Cycles that marching needs as v~ falls, and what is wrong when two cycles agree."""
+    """Cycles that marching needs as v~ falls, and the remaining error when two cycles agree."""
     rows = []
     for v, y in ((1.0, 0.1), (0.1, 0.1), (0.01, 0.1), (0.01, 0.5), (0.001, 0.5)):
         progress(f"marching at v~ = {v:g}, y~ = {y:g}")
@@ -258,7 +258,7 @@ def cusp() -> str:
 
 
 def small_amplitude() -> str:
-    """1 - mu~ where mu~ is all but 1."""
+    """1 - mu~ where mu~ is almost 1."""
     v = 2.0
     rows = []
     for y in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
@@ -273,7 +273,7 @@ def small_amplitude() -> str:
 
 
 def short_stick() -> str:
-    """The instant at which slip starts, counted from the far turn and from the near one."""
+    """The time at which slip starts, measured from the far turn and from the near one."""
     w, out, orbit, _ = workspace()
     rows = []
     for y in (1e4, 1e6, 1e8, 1e10, 1e12):
@@ -287,7 +287,7 @@ def short_stick() -> str:
         ux, uy = cth + v * d, 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth
         x, chart = (-math.asin(min(ux, 1.0)), 1) if uy > 0.0 else (math.atan2(uy, ux), 0)
         slid = []
-        for sigma in (s0 + d, s1 + math.pi):  # s1 = s0 + d - pi counts from the far turn and is rounded there
+        for sigma in (s0 + d, s1 + math.pi):  # s1 = s0 + d - pi is measured from the far turn and rounded there
             slip(v, y, sigma, -1, x, chart, HALF, True, w, out)
             slid.append(float(out[SUM_UX]))
         layer = (full.mu_ratio - float(closed_forms.outer(y / v))) * y / v
@@ -355,7 +355,7 @@ def overflow() -> str:
 
 
 def denormals() -> str:
-    """Amplitudes whose square is no normal number any more."""
+    """Amplitudes whose square is denormal."""
     rows = []
     h = solve(0.3e-12, 1e-6)
     w, out, orbit, _ = workspace()
@@ -378,7 +378,7 @@ def denormals() -> str:
 
 
 def _secant(v: float, y: float, kind: int, chart: int, z: float, rule: str, small: float) -> float:
-    """The section's unknown by a plain secant iteration from ``z``; NaN where the iteration leaves the section."""
+    """The section's unknown by a plain secant iteration from ``z``; NaN if the iteration leaves the section."""
     w, out, orbit, _ = workspace()
     z_old, f_old, before = math.nan, math.inf, math.inf
     for _ in range(60):

@@ -1,14 +1,14 @@
-"""What the inverse question costs:  python benchmarks/inverse.py [TABLE] [--rounds N] [--quick] [--write]
+"""Cost of the inverse problem:  python benchmarks/inverse.py [TABLE] [--rounds N] [--quick] [--write]
 
 The same roots by four methods, all on the same surrogate, in processor time:
 
 * ``solve_for``: sampled once, then bracketed Newton steps with the gradient, all targets at once; every root with the
-  interval that the error bound leaves it;
-* bisection of the bits of the input, all targets at once: what ``solve_for`` did before, with its intervals;
-* ``scipy.optimize.brentq``, target by target, within one decade on either side of the root; the root alone;
-* the same with ``scipy.optimize.newton`` and the gradient, from one percent beside the root.
+  interval that follows from the error bound;
+* bisection of the bits of the input, all targets at once: the earlier method of ``solve_for``, with its intervals;
+* ``scipy.optimize.brentq``, target by target, within one decade on either side of the root; roots only;
+* the same with ``scipy.optimize.newton`` and the gradient, starting one percent from the root.
 
-``--write`` puts the table into docs/benchmarks.md.
+``--write`` writes the table to docs/benchmarks.md.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ COUNTS = (1, 100, 10_000)
 
 
 def by_bits(surrogate: Surrogate, unknown: str, targets: NDArray[np.float64], rising: bool) -> NDArray[np.float64]:
-    """Root, lower and upper end (3, n) by bisection of the bits, as ``solve_for`` once did for v0, y0 and omega."""
+    """Root, lower and upper end (3, n) by bisection of bits, the old method of ``solve_for`` for v0, y0 and omega."""
     sweep = Sweep(surrogate, {name: value for name, value in CASE.items() if name != unknown}, unknown)
     sign = 1.0 if rising else -1.0
     low, high = np.zeros(targets.size), np.full(targets.size, np.finfo(float).max)
@@ -81,7 +81,7 @@ def rows(surrogate: Surrogate, rounds: int, counts: tuple[int, ...]) -> tuple[li
         for count in counts:
             targets = middle * np.linspace(0.99, 1.01, count) if count > 1 else np.array([middle])
             work = {"newton": lambda u=unknown, t=targets, c=known: solve_for(surrogate, u, t, c)}
-            if unknown != "k":  # k may fold, which the old method found by sampling too; only the roots are compared
+            if unknown != "k":  # mu_macro may fold along k; the old method also sampled it; only the roots are compared
                 work["bits"] = lambda u=unknown, t=targets, r=rising: by_bits(surrogate, u, t, r)
             if count < COUNTS[-1]:
                 work["brentq"] = lambda u=unknown, t=targets: by_scipy(surrogate, u, t, slope=False)

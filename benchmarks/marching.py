@@ -1,7 +1,7 @@
-"""What people do today: integrate the equations of motion with scipy and wait until two cycles agree.
+"""The usual method: integrate the equations of motion with scipy until two cycles agree.
 
-Stick and slip are phases of :func:`scipy.integrate.solve_ivp`, their ends are its events, and the average of u_x is an
-unknown.  A disturbance of the cycle decays with the slip path alone, by exp(-2 pi v~) a cycle in continuous sliding, so
+Stick and slip are phases of :func:`scipy.integrate.solve_ivp`, their ends are events, and the average of u_x is an
+unknown.  A disturbance of the cycle decays with the slip path, by exp(-2 pi v~) a cycle in continuous sliding, so
 the cost grows as v~ falls; for the same reason two cycles agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
@@ -31,8 +31,8 @@ class Marched:
 def march(v: float, y: float, max_step: float = math.inf) -> Marched:
     """Steady mu~ at v~ = ``v``, y~ = ``y`` by marching whole cycles from an unloaded spring (eqs. (9)-(12), (15)).
 
-    Gives up after 20 + 6/v~ cycles, several times what the decay exp(-2 pi v~) a cycle asks for.  That happens beside
-    the border, where steps of any length jump over short windows of stick; ``max_step`` = 0.1 rad cures it for 2 to 4
+    Gives up after 20 + 6/v~ cycles, several times the number for the decay exp(-2 pi v~) a cycle.  That happens beside
+    the border, where steps of any length jump over short windows of stick; ``max_step`` = 0.1 rad avoids it for 2 to 4
     times the cost.
     """
 

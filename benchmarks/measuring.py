@@ -62,7 +62,7 @@ def _version(package: str) -> str | None:
 
 
 def machine(*packages: str) -> str:
-    """One line: processor, cores, system, Python, the versions that matter, and how busy the machine was."""
+    """One line: processor, cores, system, Python, the relevant versions, and the load of the machine."""
     parts = [processor(), f"{os.cpu_count()} cores", f"{platform.system()} {platform.machine()}"]
     parts.append(f"Python {platform.python_version()}")
     parts += [text for text in map(_version, ("numpy", "numba", *packages)) if text]
@@ -72,32 +72,32 @@ def machine(*packages: str) -> str:
 
 
 def progress(text: str) -> None:
-    """Say on stderr what goes on; stdout is for the tables alone."""
+    """Report progress on stderr; stdout is for the tables only."""
     print(text, file=sys.stderr, flush=True)
 
 
 @dataclass(frozen=True)
 class Timed:
-    """Seconds of the best round of each function, by which clock, and the share of wall clock that this process had."""
+    """Seconds of the best round of each function, the clock, and the share of wall-clock time on a processor."""
 
     best: dict[str, float]
     share: float
     clock: str
 
     def note(self) -> str:
-        """One sentence about the clock and the neighbours."""
+        """One sentence about the clock and other load."""
         what = "wall clock" if self.clock == "wall" else "processor time"
         return f"Times are {what}; the process had a processor for {100.0 * self.share:.0f} % of the time it was timed."
 
 
-#: processor time is for busy machines; it adds up threads, so it is for what runs on one
+#: processor time is for busy machines; it sums over threads, so use it for single-threaded code
 CLOCKS: dict[str, Callable[[], float]] = {"wall": perf_counter, "processor": process_time}
 
 
 def best_of(rounds: int, work: Mapping[str, Callable[[], object]], clock: str = "wall") -> Timed:
-    """Time the best of ``rounds`` calls of each function, after one call that does not count.
+    """Time the best of ``rounds`` calls of each function, after one untimed call.
 
-    The rounds are interleaved, so that a busy neighbour slows everybody and not one.
+    The rounds are interleaved, so that other load slows all functions equally.
     """
     for call in work.values():
         call()
@@ -114,7 +114,7 @@ def best_of(rounds: int, work: Mapping[str, Callable[[], object]], clock: str = 
 
 
 def free_port() -> int:
-    """A port that nobody has now."""
+    """An unused port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -146,7 +146,7 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns:
 
 
 def _parts(name: str, path: Path) -> tuple[str, str, str]:
-    """What stands before, between and behind the markers of ``name``, the markers outside."""
+    """The text before, between and after the markers of ``name``; the markers are in the outer parts."""
     page = path.read_text(encoding="utf-8")
     begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
     if page.count(begin) != 1 or page.count(end) != 1:
@@ -157,7 +157,7 @@ def _parts(name: str, path: Path) -> tuple[str, str, str]:
 
 
 def read_section(name: str, path: Path = PAGE) -> str:
-    """What stands between the markers of ``name`` on a page, docs/benchmarks.md unless told.
+    """The text between the markers of ``name`` on a page, by default docs/benchmarks.md.
 
     Raises
     ------
@@ -170,5 +170,5 @@ def read_section(name: str, path: Path = PAGE) -> str:
 def write_section(name: str, text: str, path: Path = PAGE) -> None:
     """Replace what :func:`read_section` reads; raises the same."""
     before, _, after = _parts(name, path)
-    lines = text.strip("\n")  # and no more: a first line may be indented
+    lines = text.strip("\n")  # newlines only: a first line may be indented
     path.write_text(f"{before}\n{lines}\n\n{after}", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The numbers of docs/model.md: how fast each chart converges, and how far each limit holds.
+"""The numbers of docs/model.md: convergence of each chart, and range of each limit.
 
     python benchmarks/model_facts.py [--write]
 
@@ -40,7 +40,7 @@ def g(x: float) -> str:
 
 
 def _block_error(index: int, n: int, s: Surrogate, sweep: Sweep) -> float:
-    """Largest error of the n x n interpolant of what the block tabulates, on random points of its rectangle."""
+    """Largest error of the n x n interpolant of the block's tabulated function, on random points of its rectangle."""
     chart = CHARTS[index]
     kind = "continuous" if chart.regime == CONTINUOUS else "full"
 
@@ -73,7 +73,7 @@ def blocks() -> str:
 
 
 def limits() -> str:
-    """The border against its limits."""
+    """The border compared with its limits."""
     rows = []
     for y in (1e-3, 1e-2, 0.1, 0.3, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5):
         crit, mu = border(y)
@@ -96,19 +96,19 @@ def outer() -> str:
         here, _, source = s.ratio_with_bound(np.array([v]), np.array([y]))
         cells = [f"{v:g}", f"{y:g}", SOURCES[int(source[0])]]
         rows.append([*cells, *(g(abs(x - mu)) for x in (first, both, float(here[0])))])
-    header = ("v~", "y~", "who answers", "eq. (35)", "with the second term", "the answer")
+    header = ("v~", "y~", "source", "eq. (35)", "with the second term", "surrogate")
     return f"Absolute errors against the solver:\n\n{markdown(header, rows, 3)}"
 
 
 def _turn(kappa: float) -> tuple[float, float]:
-    """The turn of eq. (25) in s = (tau - pi/2) sqrt(y~): integral of u_x less its slow value, least slip speed."""
+    """The turn of eq. (25) in s = (tau - pi/2) sqrt(y~): integral of u_x minus its slow value, smallest slip speed."""
     far = 60.0 + 30.0 * kappa
 
     def rates(s: float, state: Array) -> list[float]:
         theta = state[0]
         return [-kappa * math.sin(theta) - s * math.cos(theta), math.cos(theta) - kappa / math.hypot(kappa, s)]
 
-    # the slow angle and its first correction, from where the start is forgotten at once
+    # the slow angle and its first correction, from a point where the start value decays at once
     start = math.atan2(far, kappa) + kappa / math.hypot(kappa, far) ** 3
     run = solve_ivp(rates, (-far, far), [start, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
     s = np.linspace(0.0, 4.0, 40_001)
@@ -117,7 +117,7 @@ def _turn(kappa: float) -> tuple[float, float]:
 
 
 def layer() -> str:
-    """What is left beyond the outer solution at large y~, and how it depends on 1/y~."""
+    """The remainder after the outer solution at large y~, and its dependence on 1/y~."""
     rows = []
     for kappa in (0.1, 0.3, 0.47, 1.0, 3.0, 10.0):
         found = []
@@ -149,7 +149,7 @@ def _creep_factor(y: float) -> float:
     pushed = quad(lambda s: math.exp(path(s) - total), stick, math.pi, epsabs=1e-13)[0]
     start = (math.exp(-total) * stick + pushed) / -math.expm1(-total)
     sliding = quad(lambda s: (start + stick) * math.exp(-path(s)), stick, math.pi, epsabs=1e-13)[0]
-    # the part driven since slip began: the integrals exchanged
+    # the part driven since slip began, with exchanged integrals
     driven = quad(
         lambda s: quad(lambda t: math.exp(path(s) - path(t)), s, math.pi, epsabs=1e-12)[0], stick, math.pi, epsabs=1e-11
     )[0]
@@ -161,14 +161,14 @@ def creep() -> str:
     rows = []
     for y in (0.1, 0.5, 0.9):
         slopes = [(solve(v, y).mu_ratio - float(closed_forms.static_limit(y))) / v for v in (4e-8, 1e-8)]
-        measured = 2.0 * slopes[1] - slopes[0]  # free of the next term, which goes with sqrt(v~)
+        measured = 2.0 * slopes[1] - slopes[0]  # without the next term, which is proportional to sqrt(v~)
         rows.append([f"{y:g}", f"{math.pi / (2.0 * (1.0 - y * y)):.6f}", f"{measured:.4f}"])
     rows += [[f"{y:g}", f"{_creep_factor(y):.6f}", f"{solve(1e-13, y).mu_ratio / 1e-13:.4f}"] for y in (1.1, 2.0, 10.0)]
     return markdown(("y~", "slope derived", "slope solved"), rows, 0)
 
 
 def contact() -> str:
-    """How stick-slip meets the continuous orbit, which goes on below the border."""
+    """How stick-slip approaches the continuous orbit, continued below the border."""
     y = 1.0
     crit = border(y)[0]
     rows = []
@@ -194,7 +194,7 @@ def contact() -> str:
 
 
 def next_terms() -> str:
-    """Eqs. (31) and (35) with one term more, and E."""
+    """Eqs. (31) and (35) with one more term, and E."""
     rows = []
     for v in (0.1, 0.5, 1.0, 3.0):
         y = 0.1

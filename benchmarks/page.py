@@ -1,7 +1,7 @@
-"""Picture of the page for the documents: a service of its own, a headless Chromium, one screenshot.
+"""Screenshot of the page for the documents, with a separate service and a headless Chromium.
 
-``python benchmarks/page.py --write`` renews docs/img/page.png; ``--all DIR`` takes the page and /docs at three widths,
-in the light and in the dark, for looking at them.  Needs Chromium with its ChromeDriver and the PyPI package selenium.
+``python benchmarks/page.py --write`` replaces docs/img/page.png; ``--all DIR`` shows the page and /docs at three
+widths, in the light and dark schemes.  Needs Chromium with its ChromeDriver and the PyPI package selenium.
 """
 
 import argparse
@@ -26,7 +26,7 @@ READY_S = 300.0  # a first start compiles the kernels
 
 @contextmanager
 def serving() -> Iterator[str]:
-    """The address of a service of one's own."""
+    """The address of a separate service."""
     command = [sys.executable, "-m", "service", "--port", "0"]
     with tempfile.TemporaryFile("w+") as log:
         process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)
@@ -62,7 +62,7 @@ def picture(page: Any) -> bytes:
 
 
 def everything(opened: Any, folder: Path) -> None:
-    """The page and /docs at every width, in the light and in the dark."""
+    """The page and /docs at every width, in the light and dark schemes."""
     folder.mkdir(parents=True, exist_ok=True)
     for width, height in SIZES.items():
         for path, name in (("", "page"), ("docs", "docs")):
@@ -76,14 +76,14 @@ def everything(opened: Any, folder: Path) -> None:
 
 
 def main() -> None:
-    """Take the pictures."""
+    """Take the screenshots."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--write", action="store_true", help="renew docs/img/page.png")
+    parser.add_argument("--write", action="store_true", help="replace docs/img/page.png")
     parser.add_argument("--all", type=Path, metavar="DIR", help="every width, light and dark, into this folder")
     options = parser.parse_args()
     if not (options.write or options.all):
-        parser.error("say --write or --all DIR")
-    sys.path.insert(0, str(ROOT / "tests"))  # tests are no package
+        parser.error("give --write or --all DIR")
+    sys.path.insert(0, str(ROOT / "tests"))  # tests/ is not a package
     import browser as driven
 
     with serving() as url, tempfile.TemporaryDirectory() as profile:

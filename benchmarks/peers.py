@@ -1,7 +1,7 @@
-"""What else could answer: the interpolators people reach for, fed with the same solved values on plain log-log grids.
+"""Peers: common interpolators with the same solved values on plain log-log grids.
 
-Every contender takes v~ and y~ and pays for the two logarithms itself, as the table does.  Packages that are not
-installed are named in :data:`MISSING` with the command that installs them, and the comparison goes on without them.
+Every contender takes v~ and y~ and includes the time of the two logarithms, as the table does.  Packages that are not
+installed are named in :data:`MISSING` with the command that installs them, and the comparison continues without them.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
 
 SQUARE = (1e-3, 1e3)  # of v~ and of y~
-SPSOLVE_LIMIT = 256  # nodes a side; beyond, the sparse factorisation takes minutes and gigabytes
+SPSOLVE_LIMIT = 256  # nodes a side; with more, the sparse factorisation takes minutes and gigabytes
 MISSING: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
 class Contender:
-    """One way to get mu~: ``evaluate(v~, y~)``, where its data live (bytes), and the solves that they cost."""
+    """One method for mu~: ``evaluate(v~, y~)``, the size of its data (bytes), and the solves to build them."""
 
     name: str
     size: str
@@ -51,7 +51,7 @@ class Contender:
 
 
 def cache() -> Path:
-    """Folder outside the source tree for solved grids; its name changes with the solver's source."""
+    """Cache folder outside the source tree for solved grids; its name depends on the solver's source."""
     folder = Path(builder.__file__).parent
     digest = sha256(
         b"".join(
@@ -183,7 +183,7 @@ def on_grid(values: Array) -> Iterator[Contender]:
 
 
 def adaptive(order: int, tolerance: float) -> Contender | None:
-    """baobzi: a quadtree of Chebyshev patches that asks the solver itself where it needs more; kept in the cache."""
+    """baobzi: a quadtree of Chebyshev patches that calls the solver where it refines; kept in the cache."""
     baobzi = _optional("baobzi", "baobzi")
     if baobzi is None:
         return None
@@ -202,7 +202,7 @@ def adaptive(order: int, tolerance: float) -> Contender | None:
 
         low, high = math.log(SQUARE[0]), math.log(SQUARE[1])
         centre, half = np.full(2, 0.5 * (low + high)), np.full(2, 0.5 * (high - low))
-        baobzi.Baobzi(ask, 2, order, centre, half, tolerance).save(str(file))  # asked once; later runs read the file
+        baobzi.Baobzi(ask, 2, order, centre, half, tolerance).save(str(file))  # built once; later runs read the file
         count.write_text(str(solves))
     tree = baobzi.Baobzi(filename=str(file))
 
@@ -217,7 +217,7 @@ def adaptive(order: int, tolerance: float) -> Contender | None:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What a well-known table of another discipline takes: ns a point, and its relative error on its own function."""
+    """Speed of a well-known table of another field: ns a point, and its relative error on its own function."""
 
     name: str
     ns: float

@@ -1,4 +1,4 @@
-"""The plot of speed against error: ours on the left, in red; everything else where it falls."""
+"""The plot of speed against error: these tables in red, the peers in other colours."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LABELS = {
 
 
 class RowLike(Protocol):
-    """What the plot needs of a row."""
+    """The fields of a row used in the plot."""
 
     @property
     def kind(self) -> str: ...

@@ -2,10 +2,10 @@
 
     python benchmarks/scale.py [--largest 1e8] [--write]
 
-Every case is made, answered and reduced (mean, extremes, a histogram) where it arises; nothing is stored.  The last
-table builds one lookup table with threads and with two worker processes, for docs/decisions/0019.  A worker's start is
-not timed, its kernels are loaded before.  Processor time is that of all processes together; the cost model is made from
-it, since other work on the machine counts little there.
+Every chunk of cases is generated, evaluated and reduced (mean, extremes, a histogram); no case is stored.  The last
+table builds one lookup table with threads and with two worker processes, for docs/decisions/0019.  Starting a worker is
+not timed; its kernels are loaded before.  Processor time is the sum over all processes; the cost model is fitted to
+it, since other work on the machine has little effect on it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Reduced = tuple[float, float, float, int]
 
 
 def design(n: int) -> Any:
-    """``n`` cases of six inputs, all of which vary over decades."""
+    """``n`` cases of six inputs, all varying over decades."""
 
     def over(low: float, high: float) -> Callable[[Any], Any]:
         return lambda u: np.exp(np.log(low) + np.log(high / low) * u)
@@ -51,7 +51,7 @@ def design(n: int) -> Any:
 
 
 def lazy(surrogate: Surrogate, n: int) -> Reduced:
-    """Made, answered and reduced by Dask's current scheduler, chunk by chunk."""
+    """Generate, evaluate and reduce with Dask's current scheduler, chunk by chunk."""
     import dask.array as da
 
     ratio = surrogate.evaluate(design(n)).mu_ratio.data
@@ -61,7 +61,7 @@ def lazy(surrogate: Surrogate, n: int) -> Reduced:
 
 
 def stages(surrogate: Surrogate, n: int) -> dict[str, float]:
-    """Processor nanoseconds a case on one thread: to make the inputs, and to answer them."""
+    """Processor nanoseconds a case on one thread: to generate the inputs, and to evaluate them."""
     cases = design(n)
     spent = {}
     started = process_time()
@@ -101,7 +101,7 @@ def _load(surrogate: Surrogate) -> None:
 
 
 class DaskSweep(Sweep):
-    """A sweep whose chunks are solved by workers of Dask: what other physics, with longer solves, would take."""
+    """A sweep whose chunks are solved by workers of Dask: as needed for models with longer solves."""
 
     def __init__(self, client: Any) -> None:
         super().__init__()
@@ -124,11 +124,11 @@ def built(sweep: Sweep, tolerance: float) -> tuple[float, int, str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--largest", type=float, default=1e8, help="cases of the largest run")
-    parser.add_argument("--quick", action="store_true", help="few cases; measures nothing")
+    parser.add_argument("--quick", action="store_true", help="few cases, not a measurement")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/scale.md")
     given = parser.parse_args()
     if given.quick and given.write:
-        parser.error("--quick measures nothing worth writing down")
+        parser.error("--quick cannot be combined with --write")
     sizes = [10**e for e in range(6, 12) if 10**e <= given.largest] if not given.quick else [10_000, 100_000]
     surrogate = Surrogate.open(1e-10)
     _load(surrogate)
@@ -168,7 +168,7 @@ def main() -> None:
             if n == 2:
                 builds[name] = built(DaskSweep(client), tolerance)
     if any(len(answers) != 1 for answers in found.values()):
-        raise SystemExit(f"error: not everybody found the same: {found}")
+        raise SystemExit(f"error: results differ: {found}")
     text = report(sizes, seconds, busy, memory, parts, builds, tolerance)
     print(text)
     if given.write:
@@ -200,7 +200,7 @@ def report(
         ["chunks of 2^20 cases", f"{quantity(PLAN / 2**20)}"],
         ["mu_macro alone, if it were stored as doubles", f"{quantity(stored)} TB"],
         ["the six inputs beside it", f"{quantity(6 * stored)} TB"],
-        ["what the reductions leave, 1000 bins", "10 kB"],
+        ["result of the reductions, 1000 bins", "10 kB"],
     ]
     local, remote = builds[f"{processors()} threads"], builds["2 worker processes"]
     built_rows = [[name, quantity(t), f"{solves:,}", digest] for name, (t, solves, digest) in builds.items()]
@@ -210,23 +210,23 @@ def report(
             "Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes and a "
             "histogram in one pass, in chunks of 2^20. Wall clock, once each; efficiency is against one thread, for "
             "each core used; processor time is that of all processes; memory is that of the largest process so far.",
-            markdown(["who", "cases", "seconds", "M cases/s", "efficiency", "processor ns a case", "peak MB"], rows, 2),
+            markdown(["run", "cases", "seconds", "M cases/s", "efficiency", "processor ns a case", "peak MB"], rows, 2),
             f"Cost model, least squares of the processor time of two worker processes: {quantity(fixed)} s + "
             f"{quantity(1e9 * each)} ns a case; the two reach {share:.2f} of twice the rate of one thread. Between "
-            "processes travel the reduced numbers alone, 8 kB a chunk for the histogram.",
+            "processes only the reduced numbers are sent, 8 kB a chunk for the histogram.",
             f"Of the processor time on one thread, making the six inputs is {quantity(parts['make'])} ns a case, "
             f"answering {quantity(parts['answer'])} ns; the rest is the reductions and Dask.",
-            f"For {PLAN:.0e} cases it says:",
+            f"For {PLAN:.0e} cases the model gives:",
             markdown(["what", "how much"], plan, 1),
             f"A lookup table of {tolerance:.0e} built by threads and through Dask on the same {processors()} cores, "
             f"{'the same data' if local[2] == remote[2] else 'OTHER data'}; time ratio {remote[0] / local[0]:.2f}:",
-            markdown(["who solves", "seconds", "solves", "digest"], built_rows, 1),
+            markdown(["run", "seconds", "solves", "digest"], built_rows, 1),
         ]
     )
 
 
 def fit(sizes: list[int], times: dict[int, float]) -> tuple[float, float]:
-    """Seconds before the first case, and seconds a case, weighted so that every size counts alike."""
+    """Seconds before the first case, and seconds a case, weighted so that every size has equal weight."""
     n = np.array(sizes, float)
     t = np.array([times[size] for size in sizes])
     matrix = np.stack([1.0 / t, n / t], axis=1)

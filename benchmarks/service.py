@@ -1,12 +1,12 @@
-"""What a question over HTTP costs: processor time of the server, ours beside others.
+"""Cost of a request over HTTP: processor time of this server and of others.
 
     python benchmarks/service.py                                 prints the tables, takes about ten minutes
-    python benchmarks/service.py --write                         and puts them, with the plot, into docs/
-    python benchmarks/service.py --only waiting start            some of the parts that need no other
-    python benchmarks/service.py --peers /path/to/other/python   an interpreter that has umbridge or mlserver
+    python benchmarks/service.py --write                         and writes them, with the plot, to docs/
+    python benchmarks/service.py --only waiting start            some of the independent parts
+    python benchmarks/service.py --peers /path/to/other/python   an interpreter with umbridge or mlserver
 
-Needs ``wrk``, ``curl``, ``nginx``, Linux, and two processors: the servers get one, who asks the other.  Servers run
-side by side and are asked in turn, so that a busy neighbour slows all of them; of the rounds the median counts.
+Needs ``wrk``, ``curl``, ``nginx``, Linux, and two processors: one for the servers, one for the clients.  Servers run
+in parallel and get requests in turn, so that other load slows all of them; figures are medians of the rounds.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-# Before this folder, where this file would pass for the package of its name.
+# Before this folder, where this file has the name of the package.
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
@@ -47,23 +47,23 @@ from service.tables import LoadedTable
 
 CHOICES = ("includes", "waiting", "streams", "once", "start", "replicas", "advice")
 PAGE = ROOT / "docs" / "service.md"
-PLACES = {"over-http": ROOT / "README.md"}  # all else is on the page
+PLACES = {"over-http": ROOT / "README.md"}  # all others are on the page
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SERVER_CORE, CLIENT_CORE = 0, 1
 BATCH = "/v1/mu-macro/batch"
-MANY_FROM = 1_000  # cases up to which many callers are needed to keep a server busy
+MANY_FROM = 1_000  # cases up to which many clients are needed to keep a server busy
 SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
-ENOUGH_S = 0.6  # processor time that a figure should rest on: the clock ticks in hundredths
+ENOUGH_S = 0.6  # smallest processor time for a figure: the clock ticks in hundredths
 KINDS = {
     "columns": "application/json",
     "rows": "application/json",
     "lines": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
 }
-AT_ONCE = (1, 4, 8)  # the last: as many as are answered at a time
-INCLUDED = tuple(name for name in QUANTITIES if name != "std")  # which asks for deviations, too
-WAITED_FOR = 5  # batches that short requests are asked beside
+AT_ONCE = (1, 4, 8)  # the last: as many as are answered in parallel
+INCLUDED = tuple(name for name in QUANTITIES if name != "std")  # which needs deviations, too
+WAITED_FOR = 5  # batches during which short requests are sent
 LABELS = {
     "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
 }  # fmt: skip
@@ -93,12 +93,12 @@ class Server:
         raise ValueError(key)
 
     def forget_peak(self) -> float:
-        """Let the peak (VmHWM) be what is resident now, and return that [MB]."""
+        """Reset the peak (VmHWM) to the resident memory, and return that [MB]."""
         Path(f"/proc/{self.process.pid}/clear_refs").write_text("5")
         return self.memory("VmHWM")
 
     def ask(self, method: str, path: str, body: bytes = b"", kind: str = "application/json") -> tuple[int, bytes]:
-        """One exchange on a new connection; sends and reads at the same time, as a stream wants it."""
+        """One exchange on a new connection; sends and reads at the same time, as needed for a stream."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=120) as raw:
             head = f"{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
             sender = threading.Thread(target=raw.sendall, args=(head.encode() + body,))
@@ -111,14 +111,14 @@ class Server:
 
 
 class Caller:
-    """A connection that is kept, as clients who ask often do."""
+    """A kept connection, as used by clients with many requests."""
 
     def __init__(self, port: int) -> None:
         self._raw = socket.create_connection(("127.0.0.1", port), timeout=120)
         self._raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def ask(self, path: str, body: bytes, kind: str) -> int:
-        """POST; sends and reads at the same time, as a stream wants it.  Return the status."""
+        """POST; sends and reads at the same time, as needed for a stream.  Return the status."""
         head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
         sender = threading.Thread(target=self._raw.sendall, args=(head.encode() + body,))
         sender.start()
@@ -143,7 +143,7 @@ def running(name: str, command: Sequence[str], port: int, path: str) -> Iterator
             deadline = time.monotonic() + 120
             while True:
                 with suppress(OSError):
-                    if server.ask("GET", path)[0] != 503:  # that one listens and is not ready yet
+                    if server.ask("GET", path)[0] != 503:  # the port is open but the service is not ready
                         break
                 if process.poll() is not None or time.monotonic() > deadline:
                     log.seek(0)
@@ -161,7 +161,7 @@ def running(name: str, command: Sequence[str], port: int, path: str) -> Iterator
 
 
 def ours() -> Any:
-    """Our service on one worker, with logs and counters on, as it comes."""
+    """This service with one worker and default settings, with logs and counters."""
     port = free_port()
     command = [sys.executable, "-m", "service", "--port", str(port), "--tables", str(TABLE)]
     return running("mumacro", command, port, "/readyz")
@@ -194,14 +194,14 @@ end
 
 @dataclass
 class Question:
-    """A kind of request, in some varieties of it."""
+    """A kind of request, with some variants."""
 
     method: str
     paths: list[str]
     bodies: list[str]
 
     def script(self, folder: Path) -> Path:
-        """The question as wrk wants it."""
+        """The request as a script for wrk."""
         quote = json.dumps
         text = _SCRIPT % (", ".join(map(quote, self.paths)), ", ".join(map(quote, self.bodies)), self.method)
         path = folder / f"{abs(hash(text))}.lua"
@@ -244,7 +244,7 @@ def mlserver_question() -> Question:
 
 
 def load(server: Server, script: Path, seconds: int, connections: int = 16) -> tuple[float, float]:
-    """Processor time [us] a request, and requests a second, under connections that never pause."""
+    """Processor time [us] a request, and requests a second, with connections that send without pause."""
     before = server.cpu()
     command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "-s", str(script)]
     done = subprocess.run(
@@ -259,7 +259,7 @@ def load(server: Server, script: Path, seconds: int, connections: int = 16) -> t
 
 
 def measure_single(peers: dict[str, str], rounds: int, seconds: int, folder: Path) -> dict[str, tuple[float, float]]:
-    """Median processor time [us] and rate for every server and kind of question."""
+    """Median processor time [us] and rate for every server and kind of request."""
     asked: dict[str, list[tuple[str, Question]]] = {
         "mumacro": [("POST", post()), ("GET", get())],
         "raw": [("POST", post()), ("GET", get())],
@@ -299,7 +299,7 @@ def _all(contexts: list[Any]) -> Iterator[list[Server]]:
 
 
 def columns(n: int) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
-    """n random cases, every input different in every one, all digits used."""
+    """n random cases, all inputs different in every case, with all digits."""
     rng = np.random.default_rng(n)
     return {
         "mu0": rng.uniform(0.1, 0.9, n),
@@ -312,7 +312,7 @@ def columns(n: int) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
 
 
 def body_of(form: str, n: int) -> bytes:
-    """n cases on the wire."""
+    """n cases as sent over HTTP."""
     table = columns(n)
     if form == "columns":
         return orjson.dumps(table, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -333,7 +333,7 @@ def body_of(form: str, n: int) -> bytes:
 
 
 def measure_batches(rounds: int, folder: Path) -> dict[str, dict[int, float]]:
-    """Million cases a second of processor time by form and size; small ones on connections that never pause."""
+    """Million cases a second of processor time by form and size; small ones with clients that send without pause."""
     rates: dict[str, dict[int, float]] = {form: {} for form in (*KINDS, "fastapi")}
     with ours() as server, peer("fastapi") as plain:
         for n in SIZES:
@@ -356,13 +356,13 @@ wrk.path = "%s"
 
 def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: Path) -> float:
     if n <= MANY_FROM:
-        # one caller who waits for each answer would have the server fall asleep and wake up in between
+        # with one client that waits for each response the server would sleep and wake up in between
         (folder / "body").write_bytes(body)
         script = folder / "body.lua"
         script.write_text(_FILE_SCRIPT % (json.dumps(str(folder / "body")), kind, BATCH))
         found = []
         for _ in range(rounds):
-            time.sleep(0.5)  # until what the callers before left unread has given its place back
+            time.sleep(0.5)  # until batches that earlier clients left unread are released
             found.append(n / load(server, script, 1, AT_ONCE[-1])[0])
         return statistics.median(found)
     path = BATCH
@@ -381,7 +381,7 @@ def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: P
 
 
 def parts(rounds: int) -> dict[str, float]:
-    """Million cases a second of the parts alone, in this process, one thread: parsing, evaluating, writing."""
+    """Million cases a second of the single steps, in this process, one thread: parsing, evaluating, writing."""
     n = 100_000
     table = LoadedTable.open(TABLE)
     bodies = {form: body_of(form, n) for form in ("columns", "rows")}
@@ -407,7 +407,7 @@ def parts(rounds: int) -> dict[str, float]:
 
 
 def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
-    """Ways from the text of a batch to six arrays, and two that stop at Python objects."""
+    """Methods from the text of a batch to six arrays, and two that stop at Python objects."""
     from pydantic import BaseModel, ConfigDict, TypeAdapter
 
     class Columns(BaseModel):
@@ -465,7 +465,7 @@ def readers(form: str, body: bytes, n: int) -> dict[str, Callable[[], object]]:
 
 
 def measure_includes(rounds: int, folder: Path) -> list[list[str]]:
-    """What each included name adds, to one case and to a case of a batch."""
+    """Added time for each included name, for one case and for a case of a batch."""
     std = {"mu0": 0.01, "v0": 1e-4}
     wanted: dict[str, dict[str, Any]] = {
         "nothing": {},
@@ -501,7 +501,7 @@ def measure_start(rounds: int) -> list[list[str]]:
             for form, body in bodies.items():
                 for _ in range(5):
                     server.ask("POST", BATCH, body, KINDS[form])
-                time.sleep(2.0)  # memory is handed back a second after the last
+                time.sleep(2.0)  # memory is released a second after the last
                 row.append(server.memory())
             found.append(row)
     middle = map(statistics.median, zip(*found, strict=True))
@@ -509,7 +509,7 @@ def measure_start(rounds: int) -> list[list[str]]:
 
 
 def measure_waiting() -> list[list[str]]:
-    """Waits for short requests while large batches run, beside those for a server that has nothing to do."""
+    """Waits for short requests while large batches run, compared with those of an idle server."""
     rows = []
     case = json.dumps(cases(1)[0]).encode()
     path = get().paths[0]
@@ -549,7 +549,7 @@ def _distribution(waits: list[float]) -> list[str]:
 
 
 def measure_at_once() -> list[list[str]]:
-    """Peak memory above the start while so many batches of 100,000 cases are asked for at once."""
+    """Peak memory above the start with this number of concurrent batches of 100,000 cases."""
     rows = []
     kinds = [(form, LABELS[form], BATCH) for form in ("columns", "rows", "arrow")]
     kinds.append(("rows", "JSON rows, all of `include` but `std`", f"{BATCH}?include={','.join(INCLUDED)}"))
@@ -581,7 +581,7 @@ def _note(statuses: list[int], server: Server, path: str, body: bytes, kind: str
 
 
 def _in_another_process(port: int, body: bytes, kind: str) -> None:
-    """Ask from another process: threads of one would wait for each other, not for the server."""
+    """Send from another process: threads of one process would wait for each other, not for the server."""
     with tempfile.NamedTemporaryFile() as file:
         file.write(body)
         file.flush()
@@ -633,10 +633,10 @@ def nginx(replicas: Sequence[Server], folder: Path) -> Any:
 
 
 def measure_replicas(rounds: int, seconds: int, folder: Path) -> str:
-    """Requests a second and processor time of one and two replicas, asked directly and through nginx.
+    """Requests a second and processor time of one and two replicas, directly and through nginx.
 
-    Replicas, proxy and caller share two processors, so requests a second cannot double here; how far they would grow
-    with a core for each process is told by the processor time of each.
+    Replicas, proxy and client share two processors, so requests a second cannot double here; the growth
+    with a core for each process follows from the processor time of each.
     """
     script, rows, cost = post().script(folder), [], {}
     with ours() as first, ours() as second:
@@ -645,7 +645,7 @@ def measure_replicas(rounds: int, seconds: int, folder: Path) -> str:
             os.sched_setaffinity(int(thread.name), {CLIENT_CORE})
         for server in (first, second):
             load(server, script, 1)
-        for label, replicas, proxied in (("one, asked directly", [first], False), ("one behind nginx", [first], True),
+        for label, replicas, proxied in (("one, direct", [first], False), ("one behind nginx", [first], True),
                                          ("two behind nginx", [first, second], True)):  # fmt: skip
             progress(label)
             with nginx(replicas, folder) if proxied else nullcontext(first) as asked:
@@ -690,7 +690,7 @@ print(one, (time.perf_counter() - ready) / 1e5)
 
 
 def measure_advice(rounds: int) -> str:
-    """What each way of asking costs the caller who waits, and from how many cases on the next one is faster."""
+    """Time for the client by each method, and the number of cases from which it is faster."""
     with ours() as server:
         case = json.dumps(cases(1)[0]).encode()
         caller = Caller(server.port)
@@ -729,10 +729,10 @@ def measure_advice(rounds: int) -> str:
     ways += [("library, a call a case", start, min(single)), ("library, arrays", start, min(array))]
     rows = []
     for name, fixed, each in ways:
-        # from how many cases on this way takes less time than one case at a time on a kept connection
+        # number of cases from which this method is faster than one case at a time on a kept connection
         against = "-" if kept <= each else f"{math.ceil(fixed / (kept - each)) or 1:,}"
         rows.append([name, quantity(1e3 * fixed), quantity(1e6 * each), against])
-    head = ["way", "once [ms]", "each case [us]", "faster than requests on a kept connection from [cases]"]
+    head = ["method", "once [ms]", "each case [us]", "faster than requests on a kept connection from [cases]"]
     return markdown(head, rows)
 
 
@@ -777,7 +777,7 @@ NAMES = {
 
 
 def overview(single: dict[str, tuple[float, float]], rates: dict[str, dict[int, float]]) -> str:
-    """What the README says."""
+    """The table of the README."""
     ours, floor, plain = (quantity(single[f"{name} POST"][0]) for name in ("mumacro", "raw", "fastapi"))
     rows = [["one case [us]", ours, plain, floor]]
     rows += [[f"{n} cases in JSON rows [us]", *(quantity(n / rates[name][n]) for name in ("rows", "fastapi")), "-"]
@@ -790,9 +790,9 @@ def overview(single: dict[str, tuple[float, float]], rates: dict[str, dict[int, 
 
 
 def others(options: argparse.Namespace, folder: Path) -> dict[str, Callable[[], str]]:
-    """The sections that are measured by themselves."""
+    """The sections that are measured separately."""
     spread = ("median", "99 %", "99.9 %", "longest")
-    waiting = ["[ms] beside batches of 1,000,000 as", "asked", *spread, *(f"idle server: {name}" for name in spread)]
+    waiting = ["[ms] beside batches of 1,000,000 as", "requests", *spread, *(f"idle server: {name}" for name in spread)]
     return {
         "includes": lambda: markdown(
             ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)

@@ -1,8 +1,8 @@
-"""The servers that ours is compared with: ``python benchmarks/service_peers.py NAME PORT``.
+"""The servers for comparison: ``python benchmarks/service_peers.py NAME PORT``.
 
-``raw``: ASGI and orjson and nothing else, no check at all: what the server below costs.  ``fastapi`` and
-``fastapi_sync``: models in and out, as its tutorial has it.  ``umbridge``: the Python server of UM-Bridge.
-``mlserver``: writes a model's folder and starts it.
+``raw``: ASGI and orjson only, without checks: the cost of the server underneath.  ``fastapi`` and
+``fastapi_sync``: models in and out, as in its tutorial.  ``umbridge``: the Python server of UM-Bridge.
+``mlserver``: writes a model's folder and starts MLServer.
 """
 
 import json
@@ -98,7 +98,7 @@ def _table() -> Path:
 
 
 def serve_umbridge(port: int) -> None:
-    """The server of UM-Bridge, around a constant: nothing but the protocol is measured."""
+    """The server of UM-Bridge, around a constant: only the protocol is measured."""
     import umbridge
 
     class Model(umbridge.Model):  # type: ignore[misc]
@@ -136,7 +136,7 @@ class Friction(MLModel):
 
 
 def serve_mlserver(port: int) -> None:
-    """MLServer, around a model that returns its first input: nothing but the protocol is measured."""
+    """MLServer, around a model that returns its first input: only the protocol is measured."""
     import tempfile
 
     folder = Path(tempfile.mkdtemp(prefix="mlserver-"))
@@ -159,7 +159,7 @@ def serve_mlserver(port: int) -> None:
 
 
 def main(name: str, port: int) -> None:
-    """Serve until somebody ends the process."""
+    """Serve until the process is stopped."""
     if name == "umbridge":
         serve_umbridge(port)
     elif name == "mlserver":

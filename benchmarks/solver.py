@@ -1,4 +1,4 @@
-"""The cost of one solve: the compiled solver by regime, its error, and what marching with scipy costs beside it.
+"""The cost of one solve: the compiled solver by regime, its error, and the cost of marching with scipy.
 
     python benchmarks/solver.py [--points 20000] [--quick] [--write]
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 SLOWING = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # v~ at which the cost of marching is shown
 SLOWING_Y = 0.1
 ALONE = 2000  # points a regime that are solved one by one, for the spread
-PEER_LOW = 0.01  # smallest v~ of the points that are marched, so that it ends
+PEER_LOW = 0.01  # smallest v~ of the marched points, so that marching ends
 
 
 def points(n: int, seed: int, low: float = 1e-3) -> Array:
@@ -49,7 +49,7 @@ def _alone(point: Array, now: Callable[[], float]) -> float:
 
 
 def by_regime(n: int, rounds: int, clock: str) -> tuple[str, str]:
-    """Mean time a solve, all together and split by regime; and a sentence about the neighbours."""
+    """Mean time a solve, all together and split by regime; and a sentence about other load."""
     drawn = points(n, seed=1)
     crit = solve_chunk("border", drawn)[:, 1]
     slipping = drawn[:, 0] >= crit
@@ -96,7 +96,7 @@ def _pair(v: float, y: float, now: Callable[[], float]) -> tuple[float, float, f
 
 
 def against_marching(n: int, now: Callable[[], float]) -> str:
-    """The same points by both: time and error, split by whether the marching ever agreed with itself."""
+    """The same points by both: time and error, split by whether two marched cycles agreed."""
     drawn = points(n, seed=2, low=PEER_LOW)
     found = [_pair(v, y, now) for v, y, _ in drawn]
     slow, error, quick, mu, _, agreed = (np.array(column) for column in zip(*found, strict=True))
@@ -112,7 +112,7 @@ def against_marching(n: int, now: Callable[[], float]) -> str:
             *(quantity(1e6 * x) for x in (quick[ok].mean(), quick[ok].max())), "reference", "reference",
         ],
     ]  # fmt: skip
-    text = markdown(("who", "mean, microseconds", "slowest, microseconds", "max abs error", "max rel error"), rows)
+    text = markdown(("method", "mean, microseconds", "slowest, microseconds", "max abs error", "max rel error"), rows)
     text += f"\n\nRatio of the mean times: {quantity(float(slow[ok].mean() / quick[ok].mean()))}."
     if not ok.all():
         text += (
@@ -145,7 +145,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
     given = parser.parse_args()
     if given.quick and given.write:
-        parser.error("--quick measures nothing worth writing down")
+        parser.error("--quick cannot be combined with --write")
     n = given.points or (500 if given.quick else 20_000)
     if n < 100:
         parser.error(f"--points must be at least 100, got {n}")
@@ -165,8 +165,8 @@ def main() -> None:
             "Beside marching with scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and "
             f"of slip, until two cycles agree to 1e-9), at points with v~ >= {PEER_LOW:g}:",
             against_marching(3 if given.quick else 40, now),
-            f"Marching costs more as v~ falls, and cycles that agree to 1e-9 say less; here y~ = {SLOWING_Y:g}, where "
-            f"v~crit = {quantity(float(crit))}:",
+            f"Marching costs more as v~ falls, and agreement of two cycles to 1e-9 means less; here "
+            f"y~ = {SLOWING_Y:g}, where v~crit = {quantity(float(crit))}:",
             slowing(SLOWING[:2] if given.quick else SLOWING, now),
         ]
     )

@@ -1,4 +1,4 @@
-"""Speed against error: the committed tables, and everything else that could answer, on the same points in one run.
+"""Speed against error: the committed tables and their peers, on the same points in one run.
 
     python benchmarks/speed_against_error.py [--points 1000000] [--quick] [--write]
 
@@ -37,16 +37,16 @@ from mumacro.inverse import solve_for
 Array = NDArray[np.float64]
 OURS, PEER, EXACT = "ours", "peer", "exact"
 CORES = os.cpu_count() or 1
-TRIAL = 2000  # points of the trial that decides how many one round takes
-BUDGET = 2.0  # seconds that one round may take one contender; slower ones are timed on fewer points
+TRIAL = 2000  # points of the trial that determines the points of one round
+BUDGET = 2.0  # seconds allowed for one round of one contender; slower ones are timed on fewer points
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
 FULL_TREES, QUICK_TREES = ((6, 1e-3), (8, 1e-4), (8, 1e-5), (8, 1e-6), (8, 1e-7), (12, 1e-8)), ((6, 1e-2),)
-HEADER = ("what answers", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
+HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table; times in ns a point, errors of mu~ [-], NaN where it makes no sense."""
+    """One line of the table; times in ns a point, errors of mu~ [-], NaN if not applicable."""
 
     kind: str
     name: str
@@ -95,7 +95,7 @@ def reference_error() -> tuple[float, float, float]:
 
 
 def marching_row(points: int) -> Row:
-    """solve_ivp on a few points, v~ >= 0.01 so that it ends."""
+    """solve_ivp on a few points, v~ >= 0.01 so that marching ends."""
     v, y = draw(points, seed=4, low=0.01)
     got: list[float] = []
     seconds = timeit.timeit(lambda: got.extend(march(a, b).mu_ratio for a, b in zip(v, y, strict=True)), number=1)
@@ -105,7 +105,7 @@ def marching_row(points: int) -> Row:
 
 
 def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
-    """Everything that is timed on the large set of points, ours first."""
+    """All methods timed on the large set of points, the tables first."""
     found = []
     for s in tables():
         solves = int(s.table.attributes["n_solves"])
@@ -123,14 +123,14 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
 
 
 def affordable(contender: Contender, v: Array, y: Array) -> int:
-    """How many of the points one round may take, from a short trial; the first call compiles."""
+    """The number of points for one round, from a short trial; the first call compiles."""
     contender.evaluate(v[:TRIAL], y[:TRIAL])
     seconds = min(timeit.repeat(partial(contender.evaluate, v[:TRIAL], y[:TRIAL]), number=1, repeat=3))
     return int(min(v.size, max(TRIAL, BUDGET * TRIAL / seconds)))
 
 
 def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row], str]:
-    """All rows: the tables, the peers, the formula, the solvers; and a sentence about the neighbours."""
+    """All rows: the tables, the peers, the formula, the solvers; and a sentence about other load."""
     v, y = draw(points, seed=1)
     v_true, y_true = draw(2_000 if quick else 100_000, seed=2)
     with Sweep(1, checkpoint=peers.cache()) as sweep:
@@ -263,7 +263,7 @@ def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
 
 
 def verdict(rows: list[Row]) -> str:
-    """Which peers beat the tables, said plainly; one thread against one thread."""
+    """The peers that beat the tables; one thread against one thread."""
     ours = [r for r in rows if r.kind == OURS and "threads" not in r.size]
     theirs = [r for r in rows if r.kind == PEER]
 
@@ -293,7 +293,7 @@ def verdict(rows: list[Row]) -> str:
 
 
 def headline(rows: list[Row], points: int) -> str:
-    """The section of the README: the tables, each above the fastest peer that errs no more, else the closest peer."""
+    """The section of the README: the tables, each above the fastest peer with no larger error, or the closest peer."""
     lines = []
     for table in (r for r in rows if r.kind == OURS and "threads" not in r.size):
         theirs = [p for p in rows if p.kind == PEER]
@@ -307,7 +307,7 @@ def headline(rows: list[Row], points: int) -> str:
     return "\n\n".join(
         [
             f"{points:,} random points over v~, y~ in [1e-3, 1e3] on one thread; {measuring.processor()}:",
-            markdown(("what answers", "ns/point", "max abs error of mu~", "solves to build"), lines),
+            markdown(("method", "ns/point", "max abs error of mu~", "solves to build"), lines),
         ]
     )
 
@@ -318,9 +318,9 @@ def report(rows: list[Row], note: str, extra: list[str], points: int, rounds: in
     return "\n\n".join(
         [
             measuring.machine("scipy", "xarray", "baobzi", "CoolProp", "interpolation"),
-            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread unless the line says more; "
+            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread unless the row states more; "
             f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves, those of the direct "
-            "solve against quadruple precision. Bytes are those walked through in memory.",
+            "solve against quadruple precision. Bytes are those of the data in memory.",
             markdown(HEADER, [r.cells() for r in rows], 2),
             "Where a peer wins, and by how much (ns a point and error in brackets):",
             verdict(rows),
@@ -340,7 +340,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put tables and plot into docs/")
     given = parser.parse_args()
     if given.quick and given.write:
-        parser.error("--quick measures nothing worth writing down")
+        parser.error("--quick cannot be combined with --write")
     points = given.points or (20_000 if given.quick else 1_000_000)
     if points < 10_000:
         parser.error(f"--points must be at least 10,000, got {points}")

@@ -1,4 +1,4 @@
-"""The picture of what is tabulated: mu~ over speed and amplitude, with the border of continuous sliding.
+"""The picture of the tabulated function: mu~ over speed and amplitude, with the border of continuous sliding.
 
 python benchmarks/surface.py [--table tables/mumacro-1e-10.nc] [--out docs/img/surface.png]
 """
@@ -21,7 +21,7 @@ import matplotlib.pyplot as plt
 from matplotlib.colors import LinearSegmentedColormap
 
 LEVELS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999)
-# where the label of each level stands: on the line v~ y~ = this
+# position of the label of each level: on the line v~ y~ = this
 LABELS = {0.001: 3.0, 0.003: 3.0, 0.01: 3.0, 0.03: 3.0, 0.1: 100.0, 0.2: 900.0, 0.4: 1500.0, 0.6: 250.0,
           0.8: 1500.0, 0.9: 200.0, 0.95: 30.0, 0.98: 300.0, 0.99: 30.0, 0.999: 3.0}  # fmt: skip
 INK, RED = "#222222", "#c1272d"

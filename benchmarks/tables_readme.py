@@ -1,10 +1,10 @@
-"""What the committed tables hold and cost: the table in tables/README.md.
+"""Contents and cost of the committed tables: the table in tables/README.md.
 
     python benchmarks/tables_readme.py [--build] [--workers 2] [--write]
 
-Prints; ``--write`` replaces what stands between the markers.  ``--build`` builds each table anew into a temporary
-folder, times it and compares the checksum of what comes out with the committed one; without it those columns are kept
-from the page, as long as the committed table is still the one that they were measured for.
+Prints; ``--write`` replaces the text between the markers.  ``--build`` rebuilds each table in a temporary
+folder, times it and compares its checksum with the committed one; without it those columns are kept
+from the page, as long as they were measured for the committed table.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "c
 
 @dataclass(frozen=True)
 class Built:
-    """What a build from nothing cost, as text, and whether it gave the committed numbers."""
+    """Cost of a build from scratch, as text, and whether it gave the committed numbers."""
 
     seconds: str = "-"
     processor: str = "-"
@@ -59,7 +59,7 @@ def command(tolerance: float, out: str, workers: int | None = None) -> list[str]
 
 
 def build(table: Surrogate, workers: int) -> Built:
-    """Build ``table`` again, by the command that a user types, and throw it away."""
+    """Build ``table`` again, with the user's command, and delete it."""
     progress(f"building {table.id}")
     with tempfile.TemporaryDirectory() as folder:
         before, start = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
@@ -74,7 +74,7 @@ def build(table: Surrogate, workers: int) -> Built:
 
 
 def kept(page: str, checksum: str) -> Built:
-    """The measured columns of the line with that checksum, if there is one."""
+    """The measured columns of the row with that checksum, if there is one."""
     found = re.search(rf"^\|[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|\s*`{checksum}`\s*\|$", page, re.MULTILINE)
     return Built(*(cell.strip() for cell in found.groups())) if found else Built()
 

@@ -3,7 +3,7 @@
     python benchmarks/validation.py [--only SECTION] [--write]
 
 ``--write`` replaces the sections between the markers of the page.  A deviation is formula/exact - 1 unless the section
-says otherwise; exact is the solver, or the 1e-12 table where thousands of points are needed.
+states otherwise; exact is the solver, or the 1e-12 table where thousands of points are needed.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def model() -> str:
     marched = [(0.3, 0.2), (0.05, 0.4), (0.2, 0.9), (0.1, 1.5), (0.8, 1.0), (0.5, 6.0), (2.0, 6.0)]
     worst = max(abs(march(v, y, 0.1).mu_ratio - solve(v, y).mu_ratio) for v, y in marched)
     rows.append(["eqs. (9)-(12) marched by scipy, rtol 1e-9", str(len(marched)), quantity(worst)])
-    return markdown(["witness", "points", "largest difference of mu~"], rows)
+    return markdown(["reference", "points", "largest difference of mu~"], rows)
 
 
 @cache
@@ -125,7 +125,7 @@ def angles() -> str:
 
 
 def static() -> str:
-    """Eq. (16): how far up in v~/v~crit it holds."""
+    """Eq. (16): its range in v~/v~crit."""
     rows = []
     x = np.geomspace(1e-6, 1.0, 6001)
     for y in (0.1, 0.3, 0.5, 0.7, 0.9):
@@ -179,7 +179,7 @@ def constants() -> str:
     small = 1e-2
     second = (1.0 - 2.0 * border(small)[0] / small**2) / small**2
     fourth = [(border(y)[1] - 1.0 + 0.25 * y * y) / y**4 for y in (0.1, 0.2)]
-    quarter = (4.0 * fourth[0] - fourth[1]) / 3.0  # free of the next term
+    quarter = (4.0 * fourth[0] - fourth[1]) / 3.0  # without the next term
     blend = np.abs(closed_forms.border_27(AMPLITUDES) / table().v_tilde_crit(AMPLITUDES) - 1.0)
     at = int(np.argmax(blend))
     x = np.linspace(0.0, 1.0, 100_001)
@@ -241,7 +241,7 @@ def master_curve() -> str:
 
 
 def collapse() -> str:
-    """Fig. 9: how far the exact curves lie apart, and what happens beyond the border."""
+    """Fig. 9: the spread of the exact curves, and their course beyond the border."""
     x = np.linspace(0.0, 1.0, 2001)
     curves = np.array([rise(float(y), x) for y in np.arange(1, 10) * 0.1])
     rows = []
@@ -252,7 +252,7 @@ def collapse() -> str:
 
 
 def plateau() -> str:
-    """What the slow change beyond the border amounts to."""
+    """The size of the slow change beyond the border."""
     rows = []
     for y in (0.1, 0.3, 0.5, 0.7, 0.9):
         crit = float(table().v_tilde_crit(y))
@@ -341,7 +341,7 @@ def _first(x: Array, miss: Array, level: float) -> str:
 
 
 def summary() -> str:
-    """Sec. 7: the order of use: (38), (39), (40), (28) below y~ = 1, (37) above."""
+    """Sec. 7, the order of use: (38), (39), (40), (28) below y~ = 1, (37) above."""
     rows = []
     for y in (0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 2.0, 8.0, 80.0):
         crit = float(table().v_tilde_crit(y))

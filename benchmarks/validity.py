@@ -1,4 +1,4 @@
-"""The numbers of docs/validity.md: what leaving out partial slip, inertia and rate costs, and where rigs lie.
+"""The numbers of docs/validity.md: effects of neglected partial slip, inertia and rate; typical contacts on the map.
 
 python benchmarks/validity.py [--write]
 """
@@ -41,7 +41,7 @@ def partial_slip() -> str:
 
 
 def inertia() -> str:
-    """Amplitude at the contact over the imposed one, by frequency over the natural one of mass on spring."""
+    """Amplitude at the contact over the imposed one, by frequency over the natural frequency of a mass on a spring."""
     rows = [[f"{ratio:g}", f"{1.0 / (1.0 - ratio * ratio):.4f}"] for ratio in (0.05, 0.1, 0.2, 0.3, 0.5)]
     return markdown(("omega / omega_n", "amplitude at the contact over the imposed one"), rows, 0)
 
@@ -69,7 +69,7 @@ def contacts() -> Iterator[tuple[str, Contact, dict[str, float]]]:
 
 
 def rigs() -> str:
-    """Where these contacts lie on the map."""
+    """The positions of these contacts on the map."""
     s = Surrogate.open(TABLE)
     rows = []
     for name, contact, case in contacts():

@@ -1,9 +1,9 @@
-"""Numbers never lie: what answers promise, over the full double range of every input.
+"""Properties of the answers, checked over the full double range of every input.
 
     python fuzz/answers.py [--only promises] [--share 0.01] [--write]
 
-Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size whose groups v~ and
-y~ lie where the table works; and a share of inputs at the ends of the range.
+Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size with groups v~ and
+y~ in the range of the table; and a share of inputs at the ends of the double range.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from mumacro.dimensional import FIELDS
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
-N = 1_000_000  # cases of a promise in the full run
+N = 1_000_000  # cases for each property in the full run
 ENDS = np.array([5e-324, 2.2250738585072014e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300, 1.7976931348623157e308])
 CPU = "x86-64-v2"  # without AVX, AVX-512 and fused multiply-add
 
 
 def any_bits(rng: np.random.Generator, n: int) -> Array:
-    """Positive finite doubles, every bit pattern as likely as the other; every tenth at an end of the range."""
+    """Positive finite doubles, all bit patterns equally likely; every tenth at an end of the range."""
     out = rng.integers(1, 0x7FF0000000000000, n, dtype=np.uint64).view(np.float64)
     ends = rng.random(n) < 0.1
     out[ends] = rng.choice(ENDS, int(ends.sum()))
@@ -69,7 +69,7 @@ def parts(total: int, share: float, size: int = 100_000) -> list[tuple[int, int]
 
 
 class Count:
-    """Cases tried, broken promises, and the largest of some measure."""
+    """Cases tried, cases without the property, and the largest of some measure."""
 
     def __init__(self) -> None:
         self.tried = self.broken = 0
@@ -82,7 +82,7 @@ class Count:
 
 
 def excess(one: Any, other: Any, change: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Where a change of mu_macro is larger than both bounds together, and how large it is in units of them.
+    """Where a change of mu_macro is larger than the sum of both bounds, and the change over that sum.
 
     Below 2.3e-308 doubles are 5e-324 apart: there both numbers, and their bounds, are rounded to a multiple of that.
     """
@@ -93,7 +93,7 @@ def excess(one: Any, other: Any, change: Array) -> tuple[NDArray[np.bool_], Arra
         return change > allowed, np.where(change > 0.0, change / np.where(allowed > 0.0, allowed, 5e-324), 0.0)
 
 
-# --- promises -----------------------------------------------------------------------------------------
+# --- properties ---------------------------------------------------------------------------------------
 
 
 def finite(table: Surrogate, share: float) -> Count:
@@ -108,7 +108,7 @@ def finite(table: Surrogate, share: float) -> Count:
 
 
 def monotone(table: Surrogate, share: float) -> Count:
-    """mu_macro never falls as v0 rises, nor rises as y0 or omega rise, by more than both bounds."""
+    """mu_macro does not fall as v0 rises, nor rise as y0 or omega rise, by more than both bounds."""
     count = Count()
     for n, seed in parts(N // 3, share):
         cases, rng = draw(n, seed), np.random.default_rng(seed + 1000)
@@ -118,7 +118,7 @@ def monotone(table: Surrogate, share: float) -> Count:
                 step = cases[name] * (1.0 + 10.0 ** rng.uniform(-16.0, 1.0, n))
                 step = np.minimum(np.maximum(step, np.nextafter(cases[name], np.inf)), 1.7976931348623157e308)
             other = table.evaluate({**cases, name: step})
-            # omega = 0 is no oscillation at all, whatever v0 is: a limit of its own, as y0 = 0 is
+            # omega = 0 means no oscillation for any v0: a separate limit, like y0 = 0
             count.add(*excess(one, other, sign * (one.mu_macro - other.mu_macro)))
     return count
 
@@ -133,7 +133,7 @@ def scale_invariant(table: Surrogate, share: float) -> tuple[Count, Count]:
             for factor, count in ((2.0 ** rng.integers(-60, 60, n), bits), (10.0 ** rng.uniform(-20, 20, n), near)):
                 with np.errstate(all="ignore"):
                     moved = {name: cases[name] * factor for name in pair}
-                # a factor that leaves the normal range rounds the input itself
+                # outside the normal range the scaled input itself is rounded
                 kept = np.ones(n, np.bool_)
                 for name in pair:
                     normal = (moved[name] >= 1e-305) & (moved[name] < 1e305) & (cases[name] >= 1e-305)
@@ -156,7 +156,7 @@ def neighbours(table: Surrogate, share: float) -> Count:
         cases = draw(n, seed)
         one = table.evaluate(cases)
         for name in FIELDS:
-            # zero is a limit of its own, and the last digit of a denormal number is a large part of it
+            # zero is a separate limit, and the last digit of a denormal number is a large part of it
             ordinary = (cases[name] > 1e-300) & (cases[name] < 1e300)
             moved = np.where(ordinary, np.nextafter(cases[name], 1.7e308), cases[name])
             other = table.evaluate({**cases, name: moved})
@@ -172,14 +172,14 @@ def seams(table: Surrogate, share: float) -> Count:
     count = Count()
     for v1, v2, y1, y2 in _both_sides(table, max(200, int(N // (len(SEAMS) + 3) * share)), 7):
         one, two = table.ratio_with_bound(v1, y1), table.ratio_with_bound(v2, y2)
-        change = np.maximum(np.abs(one[0] - two[0]) - 4e-13 * one[0], 0.0)  # mu~ rises by up to its own share
+        change = np.maximum(np.abs(one[0] - two[0]) - 4e-13 * one[0], 0.0)  # mu~ may change by the relative distance
         allowed = one[1] + two[1]
         count.add(change > allowed, change / allowed)
     return count
 
 
 def fresh_solves(table: Surrogate, share: float) -> Count:
-    """|table - full model| against bound + what the solver may be wrong by."""
+    """|table - full model| against bound + error estimate of the solver."""
     count = Count()
     with Sweep(os.cpu_count() or 1) as sweep:
         for n, seed in parts(N // 10, share, 20_000):
@@ -205,7 +205,7 @@ def same_bits(table: Surrogate, share: float) -> Count:
         expected = table.evaluate(cases)
         rows = np.stack([expected.mu_macro, expected.mu_ratio, expected.error_bound, expected.source_code])
 
-        def compare(found: Any, at: Any = slice(None), rows: Array = rows) -> None:  # every case of the batch by itself
+        def compare(found: Any, at: Any = slice(None), rows: Array = rows) -> None:  # every case of the batch alone
             other = np.stack([found.mu_macro, found.mu_ratio, found.error_bound, found.source_code])
             count.add(np.any(rows[:, at].view(np.uint64) != other.view(np.uint64), axis=0))
 
@@ -224,7 +224,7 @@ def same_bits(table: Surrogate, share: float) -> Count:
 
 
 def promises(share: float) -> str:
-    """Every promise, for the coarsest and the finest table."""
+    """Every property, for the coarsest and the finest table."""
     started = time.perf_counter()
     rows = []
     for tolerance in (1e-4, 1e-12):
@@ -250,7 +250,7 @@ def promises(share: float) -> str:
             found = check(table, share)
             worst = quantity(found.worst) if found.worst else ""
             rows.append([name, f"{tolerance:g}", f"{found.tried:,}", f"{found.broken:,}", worst])
-    head = ("promise", "table", "tried", "broken", "largest change or error, bound = 1")
+    head = ("property", "table", "tried", "broken", "largest change or error, bound = 1")
     return f"{markdown(head, rows)}\n\n{reporting.took(started)}"
 
 
@@ -258,20 +258,20 @@ def promises(share: float) -> str:
 
 
 def dump(path: str, n: str, tolerance: str) -> None:
-    """Answers to drawn cases, for another process."""
+    """Answers to the drawn cases, written for another process."""
     a = Surrogate.open(float(tolerance)).evaluate_columns(*draw(int(n), 99).values())
     np.save(path, np.stack(a))
 
 
 def across_processors(n: int, tolerance: float) -> tuple[Array, Array]:
-    """(mu_macro, mu~, bound, source) of n drawn cases, rows (4, n), here and compiled for a plain processor."""
+    """(mu_macro, mu~, bound, source) of n drawn cases, rows (4, n), here and compiled for a basic processor."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         for name in ("", CPU):
             environment = {
                 **os.environ,
                 "PYTHONPATH": str(reporting.ROOT),
-                # without features of its own a name gets those of this machine
+                # a processor name without a feature list gets the features of this machine
                 **({"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} if name else {}),
             }
             path = Path(folder) / f"{name}.npy"

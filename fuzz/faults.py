@@ -1,9 +1,9 @@
-"""Faults of disks, permissions, processes and clocks: nothing is lost, and the same command goes on.
+"""Faults of disks, permissions, processes and clocks: no data are lost, and the same command resumes.
 
     python fuzz/faults.py [--only killed_builds] [--share 0.1] [--write]
 
-Small disks are mounted as tmpfs and permissions are taken away from another user, both of which only root may do; what
-cannot be tried here is said to be so.
+Small disks are mounted as tmpfs and permissions are removed for another user; both need root.  A trial
+that cannot be made on this machine is reported as "not tried".
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a
 
 
 def run(*words: object, nobody: bool = False, code: int | None = 0, **environment: str) -> str:
-    """A command of the project; what it says in the end, in one line when it fails."""
+    """Run a command of the project and return its last output: one line if it fails."""
     variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT), "PYTHONDONTWRITEBYTECODE": "1", **environment}
     done = subprocess.run(
         [*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words)], cwd=reporting.ROOT, env=variables,
@@ -47,12 +47,12 @@ def run(*words: object, nobody: bool = False, code: int | None = 0, **environmen
 
 
 def build(out: Path) -> list[str]:
-    """The words that build a rough table."""
+    """The arguments that build a coarse table."""
     return ["-m", "builder", "build", "--tolerance", TOLERANCE, "--out", str(out)]
 
 
 def checksum(path: Path) -> str:
-    """Of the numbers in a table."""
+    """The checksum of the numbers in a table."""
     from mumacro import Surrogate
 
     return Surrogate.open(path).checksum
@@ -68,13 +68,13 @@ def cases(path: Path, n: int) -> Path:
 
 @contextmanager
 def small_disk(folder: Path, size: str) -> Iterator[Path]:
-    """A file system in memory, which is soon full."""
+    """A small file system in memory, which fills quickly."""
     disk = folder / "disk"
     disk.mkdir()
     mount = shutil.which("mount")
     words = [str(mount), "-t", "tmpfs", "-o", f"size={size},mode=0777", "tmpfs", str(disk)]
     if mount is None or subprocess.run(words, capture_output=True, check=False).returncode:
-        raise reporting.NotTriedError("no small file system may be mounted here")
+        raise reporting.NotTriedError("mounting a small file system is not permitted here")
     try:
         yield disk
     finally:
@@ -82,7 +82,7 @@ def small_disk(folder: Path, size: str) -> Iterator[Path]:
 
 
 def closed(folder: Path) -> Path:
-    """A folder that another user may read and not write."""
+    """A folder that another user can read but not write."""
     if not hasattr(os, "getuid") or os.getuid() != 0:
         raise reporting.NotTriedError("only root may run a trial as another user")
     folder.chmod(0o755)
@@ -90,7 +90,7 @@ def closed(folder: Path) -> Path:
         words = [*AS_NOBODY, sys.executable, "-c", "import numpy"]
         subprocess.run(words, cwd=folder, check=True, capture_output=True)
     except (OSError, subprocess.CalledProcessError):
-        raise reporting.NotTriedError("another user may not run this Python") from None
+        raise reporting.NotTriedError("another user cannot run this Python") from None
     made = folder / "closed"
     made.mkdir(mode=0o755)
     return made
@@ -131,7 +131,7 @@ def full_disk_in_writing_a_table(folder: Path) -> str:
         else:
             raise AssertionError("a table of 126 kB was written to a disk of 64 kB")
         assert left(disk) == ["before.txt"]
-    return "TableError; nothing left behind"
+    return "TableError; no file left"
 
 
 def full_disk_in_eval(folder: Path, n: int = 20_000) -> str:
@@ -150,14 +150,14 @@ def full_disk_in_eval(folder: Path, n: int = 20_000) -> str:
             assert (disk / f"out.{kind}").read_bytes() == (folder / f"whole.{kind}").read_bytes()
             assert left(disk) == [f"out.{kind}"]
         (folder / "disk").rmdir()
-    return "one line; with more space the same command goes on and gives the same bytes; CSV, NDJSON, Parquet"
+    return "one line; with more space the same command resumes and gives the same bytes; CSV, NDJSON, Parquet"
 
 
 def lost_permission_in_a_build(folder: Path) -> str:
     said = run(*build(closed(folder) / "rough.nc"), nobody=True, code=1)
     assert "Permission denied" in said, said
     assert left(folder / "closed") == []
-    return "one line; nothing left behind"
+    return "one line; no file left"
 
 
 def lost_permission_in_writing_a_table(folder: Path) -> str:
@@ -169,7 +169,7 @@ def lost_permission_in_writing_a_table(folder: Path) -> str:
     said = run("-c", program, SMALLEST, out, nobody=True)
     assert said == "cannot be written: Permission denied", said
     assert left(folder / "closed") == []
-    return "TableError; nothing left behind"
+    return "TableError; no file left"
 
 
 def lost_permission_in_eval(folder: Path) -> str:
@@ -177,7 +177,7 @@ def lost_permission_in_eval(folder: Path) -> str:
     said = run("-m", "mumacro", "eval", source, "-o", closed(folder) / "out.csv", nobody=True, code=1)
     assert "Permission denied" in said, said
     assert left(folder / "closed") == []
-    return "one line; nothing left behind"
+    return "one line; no file left"
 
 
 # --- processes ----------------------------------------------------------------------------------------
@@ -197,7 +197,7 @@ def two_builds_to_one_output(folder: Path) -> str:
     run(*build(folder / "whole.nc"))
     assert checksum(out) == checksum(folder / "whole.nc")
     assert left(folder) == ["rough.nc", "whole.nc"]
-    return "the second is refused in one line, the first ends well"
+    return "the second is refused with one line, the first completes"
 
 
 def killed_eval(folder: Path, n: int = 100_000, kills: int = 10) -> str:
@@ -222,7 +222,7 @@ def killed_eval(folder: Path, n: int = 100_000, kills: int = 10) -> str:
         run(*words, folder / f"out.{kind}", code=None)
         assert (folder / f"out.{kind}").read_bytes() == (folder / f"whole.{kind}").read_bytes()
         assert not list(folder.glob("*.parts"))
-    return f"killed up to {kills} times each, then the same command: the same bytes; CSV, Parquet"
+    return f"killed up to {kills} times each; then the same command gives the same bytes; CSV, Parquet"
 
 
 # --- kernel cache, home, clock ------------------------------------------------------------------------
@@ -244,8 +244,8 @@ def damaged_kernels(folder: Path) -> str:
     assert all(sizes.values())
     stamps = {path: path.stat().st_mtime_ns for path in files}
     assert run(*ASK, NUMBA_CACHE_DIR=str(kernels)) == sound
-    assert stamps == {path: path.stat().st_mtime_ns for path in files}  # mended: nothing was compiled again
-    return f"{len(files)} files empty, cut or with a flipped bit: the same answer, and mended"
+    assert stamps == {path: path.stat().st_mtime_ns for path in files}  # replaced: nothing was compiled again
+    return f"{len(files)} files empty, cut or with a flipped bit: the same answer; the files are replaced"
 
 
 def kernels_written_by_several(folder: Path, processes: int = 4) -> str:
@@ -257,7 +257,7 @@ def kernels_written_by_several(folder: Path, processes: int = 4) -> str:
     said = {process.communicate(timeout=1800)[0] for process in started}
     assert len(said) == 1, said
     assert not [name for name in left(folder) if not name.endswith(".kernel")], left(folder)
-    return f"{processes} processes with one empty folder: one answer, whole files"
+    return f"{processes} processes with one empty folder: the same answer from all, complete files"
 
 
 def kernels_that_cannot_be_kept(folder: Path) -> str:
@@ -283,7 +283,7 @@ def no_home(folder: Path) -> str:
 
 
 def clock_steps(folder: Path) -> str:
-    """Every reading of the clock is up to ten years from the last; files of the next century and of 1970."""
+    """Clock readings are off by up to ten years; file times are in the next century and in 1970."""
     (folder / "stepping").mkdir()
     (folder / "stepping" / "sitecustomize.py").write_text(
         "import random, time\nreal, chance = time.time, random.Random(1)\n"
@@ -318,7 +318,7 @@ FAULTS: dict[str, Callable[..., str]] = {
 
 
 def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
-    """Whether the project held, and what was seen."""
+    """Result of the trial ("held" if it passed), and what was seen."""
     with tempfile.TemporaryDirectory() as folder:
         return reporting.tried(lambda: fault(Path(folder)))
 
@@ -327,11 +327,11 @@ def faults(_share: float) -> str:
     """Every fault once."""
     started = time.perf_counter()
     rows = [[name, *tried(fault)] for name, fault in FAULTS.items()]
-    return f"{markdown(('fault', 'it', 'what was seen'), rows, 3)}\n\n{reporting.took(started)}"
+    return f"{markdown(('fault', 'result', 'what was seen'), rows, 3)}\n\n{reporting.took(started)}"
 
 
 def killed_builds(share: float, total: int = 20) -> str:
-    """Builds that are killed at random moments, started again, and killed again, until they are done."""
+    """Builds that are killed at random moments and restarted until they are complete."""
     started = time.perf_counter()
     total = max(1, round(total * share))
     chance = random.Random(7)  # noqa: S311
@@ -359,11 +359,11 @@ def killed_builds(share: float, total: int = 20) -> str:
         same = sum(checksum(out) == checksum(folder / "whole.nc") for out in outs)
         names = [out.name for out in (*outs, folder / "whole.nc")]
         rest = [name for name in left(folder) if name not in names]
-    rows = [["moments at which a build was killed", f"{killed}"],
-            ["starts that found finished parts and went on", f"{resumed}"],
-            ["tables that came of it", f"{len(outs)}"],
-            ["of them with the data of a build that nobody disturbs", f"{same}"],
-            ["other files left behind", f"{len(rest)}"]]  # fmt: skip
+    rows = [["builds killed, at random moments", f"{killed}"],
+            ["starts that resumed from finished parts", f"{resumed}"],
+            ["tables completed", f"{len(outs)}"],
+            ["of them with the data of an undisturbed build", f"{same}"],
+            ["other files left", f"{len(rest)}"]]  # fmt: skip
     return f"{markdown(('', 'count'), rows)}\n\n{reporting.took(started)}"
 
 

@@ -1,4 +1,4 @@
-"""Files that are made to harm whoever opens them: memory, time, the stack, other files, numbers of the wrong kind."""
+"""Files made to harm the program that opens them: memory, time, stack, other files, numbers of a wrong type."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Make = Callable[[Path], None]
 
 
 def edited(change: Callable[[h5py.File], Any]) -> Make:
-    """The smallest table, changed by the HDF5 library."""
+    """The smallest table, changed with the HDF5 library."""
 
     def make(path: Path) -> None:
         shutil.copy(SMALLEST, path)
@@ -43,14 +43,14 @@ def signed(change: Callable[[Table], Any]) -> Make:
 
 
 def zeros(n: int) -> bytes:
-    """``n`` zeros, a whole number of MiB, packed: one packed MiB again and again, and the checksum of them all."""
+    """``n`` zeros, a whole number of MiB, compressed: one compressed MiB repeated, and the checksum of all."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     block = packer.compress(bytes(2**20)) + packer.flush(zlib.Z_FULL_FLUSH)
     return b"\x78\xda" + block * (n >> 20) + packer.flush() + ((n % 65521 << 16) + 1).to_bytes(4, "big")
 
 
 def replaced(file: h5py.File, name: str, packed: bytes | None = None, **options: Any) -> None:
-    """Another variable of this name, with one chunk as it is to stand in the file."""
+    """Replace the variable of this name; its only chunk is written as the given bytes."""
     del file[name]
     made = file.create_dataset(name, dtype="f8", **options)
     if packed is not None:
@@ -103,9 +103,9 @@ def attribute(name: str, value: Any, group: str = "/") -> Make:
 
 
 HOSTILE: dict[str, Make] = {
-    "a group that holds itself": edited(lambda file: file.__setitem__("border/again", file["border"])),
-    "a group that holds the root": edited(lambda file: file.__setitem__("border/blocks/root", file["/"])),
-    "3,000 groups, one in the other": edited(deep),
+    "a group that contains itself": edited(lambda file: file.__setitem__("border/again", file["border"])),
+    "a group that contains the root": edited(lambda file: file.__setitem__("border/blocks/root", file["/"])),
+    "3,000 nested groups": edited(deep),
     "3,000 groups among the blocks": edited(
         lambda file: [file.create_group(f"border/blocks/g{i}") for i in range(3000)]
     ),
@@ -116,18 +116,18 @@ HOSTILE: dict[str, Make] = {
     "2 GB of zeros in a chunk of 80 bytes": edited(
         lambda file: replaced(file, "v_tilde", zeros(2**31), shape=(10,), chunks=(10,), compression="gzip")
     ),
-    "2 GB of zeros, packed twice": edited(
+    "2 GB of zeros, compressed twice": edited(
         lambda file: replaced(file, "v_tilde", zlib.compress(zeros(2**31), 9), shape=(10,), chunks=(10,),
                               compression="gzip")
     ),
-    "a variable of 160 GB, stored as nothing": edited(
+    "a variable of 160 GB without stored data": edited(
         lambda file: replaced(file, "mu_ratio", shape=(2_000_000_000, 10), chunks=(1000, 10), compression="gzip")
     ),
     "a variable of 31 dimensions": edited(lambda file: replaced(file, "v_tilde", shape=(2,) * 31, chunks=(1,) * 31)),
     "a variable in another file": edited(
         lambda file: replaced(file, "v_tilde", shape=(31,), external=[("/dev/zero", 0, 31 * 8)])
     ),
-    "a variable of another filter": edited(
+    "a variable with another filter": edited(
         lambda file: replaced(file, "v_tilde", shape=(31,), chunks=(31,), compression="lzf")
     ),
     "a link to another file": edited(lambda file: links(file, h5py.ExternalLink(SMALLEST, "/border/blocks/corner"))),
@@ -142,12 +142,12 @@ HOSTILE: dict[str, Make] = {
     "a tolerance that is not finite": attribute("tolerance", np.nan),
     "a checksum of three numbers": attribute("content_sha256", np.zeros(3)),
     "an error that is text": attribute("verified_max_abs_error", "small"),
-    "options that are no JSON": attribute("builder_options", "{"),
-    "options that are too deep": attribute("builder_options", "[" * 60_000),
+    "options that are not JSON": attribute("builder_options", "{"),
+    "options nested too deeply": attribute("builder_options", "[" * 60_000),
     "a version of two numbers": attribute("format_version", np.array([3, 3])),
-    "cells that are a compound": attribute("cells", np.zeros(1, [("a", "i4")]), "border/blocks/corner"),
+    "cells of a compound type": attribute("cells", np.zeros(1, [("a", "i4")]), "border/blocks/corner"),
     "errors that are complex": attribute("errors", np.zeros(9, complex), "border/blocks/corner"),
-    "text that is not in UTF-8": attribute("title", np.bytes_(b"\xff\xfe")),
+    "text that is not UTF-8": attribute("title", np.bytes_(b"\xff\xfe")),
     "20,000 nodes, checksum right": signed(many_nodes),
     "12 million cells, checksum right": signed(many_cells),
     "numbers of 1.7e308, checksum right": signed(huge_numbers),
@@ -155,6 +155,6 @@ HOSTILE: dict[str, Make] = {
     "a border of 1e300, checksum right": signed(wild_border),
     "amplitudes of 1e300, checksum right": signed(lambda table: setattr(table, "y_tilde", table.y_tilde * 1e300)),
     "errors of 1e308, checksum right": signed(lambda table: table.blocks[CORNER].errors.fill(1e308)),
-    "a plain grid of another shape": edited(lambda file: replaced(file, "mu_ratio", shape=(3, 3))),
+    "a grid of another shape": edited(lambda file: replaced(file, "mu_ratio", shape=(3, 3))),
 }  # fmt: skip
 assert len(CHARTS) == 12

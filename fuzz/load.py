@@ -1,8 +1,8 @@
-"""The service under load: mixed traffic, overload, and many connections that only wait or are slow.
+"""The service under load: mixed traffic, overload, and many connections that are idle or slow.
 
     python fuzz/load.py [--only mixed_load] [--share 0.05] [--write]
 
-Callers and service share this machine, so that what is called capacity is that of both together.  Requests come at
+Clients and service share this machine, so that "capacity" is that of both together.  Requests are sent at
 random moments, whether or not earlier ones are answered (an open loop), and a wait is counted from the moment at which
 a request should have been sent.
 """
@@ -34,11 +34,11 @@ IDLE, SLOW = 2000, 200
 MIXED_S, BESIDE_S, OVERLOAD_S, CAPACITY_S = 600.0, 60.0, 60.0, 15.0
 
 
-# --- what is sent, and what should come back ----------------------------------------------------------
+# --- requests and expected responses ------------------------------------------------------------------
 
 
 def answers(server: Server, asked: Sequence[Question]) -> dict[bytes, bytes]:
-    """What the service answers to each request when nobody else asks."""
+    """The response to each request when there is no other load."""
 
     async def ask_all() -> dict[bytes, bytes]:
         caller = Caller(server.port)
@@ -54,7 +54,7 @@ def answers(server: Server, asked: Sequence[Question]) -> dict[bytes, bytes]:
 
 
 class Seen:
-    """What callers saw."""
+    """What the clients received."""
 
     def __init__(self, expected: dict[bytes, bytes]) -> None:
         self.expected = expected
@@ -64,7 +64,7 @@ class Seen:
         self.faults: Counter[str] = Counter()
 
     def note(self, question: Question, wait: float, reply: Reply) -> None:
-        """An answer has come."""
+        """Count a response."""
         self.statuses[reply.status] += 1
         if reply.status == 200:
             self.waits.setdefault(question.kind, []).append(wait)
@@ -73,7 +73,7 @@ class Seen:
             self.unexplained += 1
 
     def fault(self, error: BaseException) -> None:
-        """A connection broke instead."""
+        """Count a broken connection."""
         self.broken += 1
         self.faults[type(error).__name__] += 1
 
@@ -84,13 +84,13 @@ class Seen:
 
     @property
     def verdict(self) -> str:
-        """Whether all went well but for refusals with their reason."""
+        """The result: "held" if the only failures are refusals with 503 and Retry-After."""
         bad = self.wrong + self.broken + self.unexplained
         return "held" if not bad else f"FAILED: {bad} ({dict(self.faults)}, {dict(self.statuses)})"
 
 
 async def closed_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: float, connections: int) -> float:
-    """Every caller asks again as soon as it is answered; answers per second."""
+    """Every client sends its next request after the response; returns responses per second."""
     end = time.perf_counter() + seconds
     done = 0
 
@@ -116,7 +116,7 @@ async def closed_loop(port: int, asked: Sequence[Question], seen: Seen, seconds:
 async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: float, rate: float) -> float:
     """Requests at random moments, ``rate`` a second on average; each takes a free connection, or opens one.
 
-    Ends when all are answered; tells at which moment the last one was due.
+    Ends when all are answered; returns the time at which sending ended.
     """
     chance = random.Random(2)  # noqa: S311
     free: list[Caller] = []
@@ -141,7 +141,7 @@ async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: f
         tasks.add(task)
         task.add_done_callback(tasks.discard)
         if len(tasks) % 256 == 255:
-            await asyncio.sleep(0.0)  # answers are read also where this loop is late
+            await asyncio.sleep(0.0)  # responses are read even if this loop is late
     await asyncio.gather(*tasks)
     for caller in free:
         caller.close()
@@ -149,7 +149,7 @@ async def open_loop(port: int, asked: Sequence[Question], seen: Seen, seconds: f
 
 
 async def idle(port: int, count: int, lost: Counter[str]) -> None:
-    """Connections that ask once and then wait; ``lost`` counts those that are not answered at the end."""
+    """Connections that send one request and then wait; ``lost`` counts those that are closed at the end."""
     callers = [Caller(port) for _ in range(count)]
     for caller in callers:
         await caller.ask(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
@@ -162,7 +162,7 @@ async def idle(port: int, count: int, lost: Counter[str]) -> None:
 
 
 async def slow(port: int, count: int, cut: Counter[str]) -> None:
-    """Connections that send a byte now and then, of heads and of bodies, and begin again when they are cut."""
+    """Connections that send single bytes of heads and bodies slowly, and reconnect when they are closed."""
     starts = (
         b"GET /livez HTTP/1.1\r\nX-Slow: ",
         b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n\r\n",
@@ -179,7 +179,7 @@ async def slow(port: int, count: int, cut: Counter[str]) -> None:
                     writer.write(b" ")
                     await asyncio.wait([end], timeout=1.0)
                 writer.close()
-                end.exception()  # how it was cut makes no difference
+                end.exception()  # how it was closed makes no difference
                 cut["slow"] += 1
 
     await asyncio.gather(*(drip(starts[i % len(starts)]) for i in range(count)))
@@ -197,13 +197,13 @@ def waits(found: Sequence[float]) -> list[str]:
 
 
 def slope(samples: Sequence[tuple[float, float]]) -> float:
-    """Megabytes an hour that memory grows by, over the second half of the samples."""
+    """Growth of memory in megabytes per hour, over the second half of the samples."""
     half = np.array(samples[len(samples) // 2 :])
     return float(np.polyfit(half[:, 0], half[:, 1], 1)[0] * 3600.0) if len(half) > 2 else float("nan")
 
 
 async def watched(server: Server, work: Any) -> list[tuple[float, float]]:
-    """Memory once a second while the work is done."""
+    """Memory, sampled once a second during the work."""
     samples = []
 
     async def watch() -> None:
@@ -218,7 +218,7 @@ async def watched(server: Server, work: Any) -> list[tuple[float, float]]:
 
 
 def mixed_load(share: float) -> str:
-    """Mixed traffic at four fifths of capacity, alone and beside connections that wait or are slow."""
+    """Mixed traffic at four fifths of capacity, alone and beside idle and slow connections."""
     started = time.perf_counter()
     open_files(2 * (IDLE + SLOW) + 1000)
     asked = questions(MIXED, 2000, 100)
@@ -256,22 +256,22 @@ def mixed_load(share: float) -> str:
     bad = {name: verdict for name, verdict in verdicts.items() if verdict != "held"}
     refused = alone.statuses[503] + among.statuses[503]
     text = (
-        f"Capacity {capacity:,.0f} requests a second; asked {alone.asked:,} requests at 80 % of it in "
+        f"Capacity {capacity:,.0f} requests a second; {alone.asked:,} requests were sent at 80 % of it in "
         f"{MIXED_S * share / 60.0:.3g} min (the service used {busy:.0%} of a processor, the "
-        f"callers {own:.0%}), then {among.asked:,} at 40 % of it beside the others in {beside:.0f} s. "
-        f"{alone.broken + among.broken} connections broken, {alone.wrong + among.wrong} answers with other bits, "
+        f"clients {own:.0%}), then {among.asked:,} at 40 % of it beside the others in {beside:.0f} s. "
+        f"{alone.broken + among.broken} connections broken, {alone.wrong + among.wrong} responses with other bits, "
         f"{refused} requests refused, exit code {code}. "
         f"Memory grew by {slope(samples):.1f} MB an hour over the second half, to at most {peak:.0f} MB with the "
-        f"others; {counts['idle']} of {IDLE:,} idle connections were lost, slow ones were cut {counts['slow']} times."
+        f"others; {counts['idle']} of {IDLE:,} idle connections were lost, slow ones closed {counts['slow']} times."
     )
     if bad or code or counts["idle"]:
         text += f" FAILED: {bad}"
-    head = ("traffic", "kind", "answers", *WAITS)
+    head = ("traffic", "kind", "responses", *WAITS)
     return f"{markdown(head, rows, 2)}\n\n{text}\n\n{reporting.took(started)}"
 
 
 def overload(share: float) -> str:
-    """Three times as much as can be answered."""
+    """Three times the capacity."""
     started = time.perf_counter()
     open_files(20_000)
     asked = questions(HEAVY, 120, 10_000)
@@ -308,25 +308,25 @@ def overload(share: float) -> str:
     rest = seen.statuses[503]
     text = (
         f"Capacity {capacity:,.0f} requests a second, two thirds of them laws of 10,000 points; {seen.asked:,} "
-        f"were asked at three times that in {max(OVERLOAD_S * share, 2.0):.0f} s. {seen.statuses[200]:,} were "
+        f"were sent at three times that rate in {max(OVERLOAD_S * share, 2.0):.0f} s. {seen.statuses[200]:,} were "
         f"answered, {seen.wrong} of them with other bits; {rest:,} were refused with 503 and Retry-After, "
-        f"{seen.unexplained} in another way; {seen.broken} connections broke. {recovery:.2f} s after the last question "
+        f"{seen.unexplained} in another way; {seen.broken} connections broke. {recovery:.2f} s after the last request "
         "every kind of request was answered as fast as before (twice the time at most). Memory at most "
         f"{peak:.0f} MB, exit code {code}."
     )
     if seen.verdict != "held" or first.wrong or not rest or recovery > 5.0 or code:
         text += f" FAILED: {seen.verdict}"
-    return f"{markdown(('kind', 'answers', *WAITS), rows)}\n\n{text}\n\n{reporting.took(started)}"
+    return f"{markdown(('kind', 'responses', *WAITS), rows)}\n\n{text}\n\n{reporting.took(started)}"
 
 
 def attacks(share: float) -> str:
-    """The longest wait for ``/livez`` beside each attack of tests/test_service_attacks.py, which measures it."""
+    """The longest wait for ``/livez`` during each attack, measured by tests/test_service_attacks.py."""
     started = time.perf_counter()
     path = reporting.ROOT / "tests" / "test_service_attacks.py"
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.xml"
         words = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-m", "", str(path), f"--junitxml={report}"]
-        words += ["-o", "junit_family=xunit1"]  # which has properties of single tests
+        words += ["-o", "junit_family=xunit1"]  # it records properties of single tests
         if share < 1.0:
             words += ["-k", "head_has_a_limit or blank_lines"]
         subprocess.run(words, cwd=reporting.ROOT, check=False, capture_output=True)
@@ -338,7 +338,7 @@ def attacks(share: float) -> str:
                 name = str(found.get("name")).removeprefix("test_").replace("_", " ")
                 wait, memory = float(measured.get("livez_s") or "nan"), measured.get("peak_mib", "")
                 rows.append([name, "FAILED" if failed else "held", f"{1e3 * wait:.0f}", str(memory)])
-    head = ("attack", "it", "longest wait for /livez [ms]", "memory so far [MiB]")
+    head = ("attack", "result", "longest wait for /livez [ms]", "memory so far [MiB]")
     return f"{markdown(head, rows, 2)}\n\n{reporting.took(started)}"
 
 

@@ -3,7 +3,7 @@
     python fuzz/number_strings.py [--share 0.01] [--write]
 
 Strings are drawn from doubles of every bit pattern, printed exactly, shortly and with random digits; from points half
-way between two doubles; from the ends of the range; and from what is no number at all.
+way between two doubles; from the ends of the range; and from text that is no number.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mumacro.files.answering import numbers
 from mumacro.files.columns import find_columns
 from mumacro.files.reading import open_source
 
-NAMES = ("mu0", "Fz", "y0", "omega", "v0")  # k may be rigid: what is no number there may be right
+NAMES = ("mu0", "Fz", "y0", "omega", "v0")  # k may be rigid: text that is no number is valid there
 TOTAL = 10_000_000
 WRONG = (
     *("", " ", "-", "+", ".", "e5", "1e", "1e+", "0x10", "1_000", "1,5", "1.2.3", "--1", "1e5.5", "one", "1 2", "١٢"),
@@ -75,7 +75,7 @@ SHARES = (0.3, 0.15, 0.3, 0.05, 0.05, 0.08, 0.05, 0.02)
 
 
 def expected(text: str) -> float:
-    """What Python reads; NaN for what it does not read."""
+    """The value that Python reads; NaN if it refuses."""
     try:
         return float(text)
     except ValueError:
@@ -83,13 +83,13 @@ def expected(text: str) -> float:
 
 
 def drawn(n: int, seed: int, kind: str) -> list[str]:
-    """``n`` strings of a kind."""
+    """``n`` strings of one kind."""
     chance = random.Random(seed)  # noqa: S311
     return [KINDS[kind](chance) for _ in range(n)]
 
 
 def read(path: Path, kind: str) -> Iterator[tuple[list[NDArray[np.float64]], NDArray[np.int64]]]:
-    """Columns of doubles as eval takes them, NaN for what it refuses; and the numbers of their rows, from 1."""
+    """Columns of doubles as eval reads them, NaN for refused values; and their row numbers, from 1."""
     source = open_source([path], kind, None)
     columns = find_columns(source.names, rigid=True)
     source.settle(columns, verbatim=True, part_rows=1_000_000)
@@ -102,7 +102,7 @@ def read(path: Path, kind: str) -> Iterator[tuple[list[NDArray[np.float64]], NDA
 
 
 def compare(texts: list[str], kind: str, folder: Path) -> tuple[int, int, int]:
-    """How many strings give the bits of ``float``, are refused, or give something else."""
+    """How many strings give the bits of ``float``, are refused, or give another value."""
     texts = texts[: len(texts) // len(NAMES) * len(NAMES)]
     rows = [texts[i : i + len(NAMES)] for i in range(0, len(texts), len(NAMES))]
     path = folder / f"cases.{kind}"
@@ -123,7 +123,7 @@ def compare(texts: list[str], kind: str, folder: Path) -> tuple[int, int, int]:
         found[kept[kept >= 0]] = block[kept >= 0]
     refused = np.isnan(found)
     with np.errstate(invalid="ignore"):
-        # JSON's "-0" is a whole number, which has no sign
+        # JSON's "-0" is an integer, and an integer zero has no sign
         same = ~refused & ((found.view(np.uint64) == wanted.view(np.uint64)) | ((found == 0.0) & (wanted == 0.0)))
     return int(same.sum()), int(refused.sum()), int((~same & ~refused).sum())
 
@@ -134,13 +134,13 @@ def number_strings(share: float) -> str:
     rows, piece = [], 200_000
     with tempfile.TemporaryDirectory() as folder:
         for name, part in zip(KINDS, SHARES, strict=True):
-            total = max(1000, int(TOTAL / 2 * part * share))  # half of all through each reader
+            total = max(1000, int(TOTAL / 2 * part * share))  # half of the strings through each reader
             for kind, title in (("csv", "CSV"), ("ndjson", "NDJSON")):
                 sums = np.zeros(3, np.int64)
                 for low in range(0, total, piece):
                     sums += compare(drawn(min(piece, total - low), low + len(kind), name), kind, Path(folder))
                 rows.append([name, title, f"{sums.sum():,}", *(f"{n:,}" for n in sums)])
-    head = ("strings", "reader", "tried", "bits of Python's float", "refused", "something else")
+    head = ("strings", "reader", "tried", "bits of Python's float", "refused", "another value")
     return f"{markdown(head, rows, 2)}\n\n{reporting.took(started, 'pyarrow')}"
 
 

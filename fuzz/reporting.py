@@ -1,4 +1,4 @@
-"""What the scripts here share: the source tree on the path, and docs/reliability.md, which holds what they measure."""
+"""Shared by the scripts here: the source tree on the path, and docs/reliability.md, which contains their results."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ PAGE = ROOT / "docs" / "reliability.md"
 
 
 def report(text: str, sections: Mapping[str, Callable[[float], str]], arguments: list[str] | None = None) -> None:
-    """The command line of a script: run its sections, print them, and with ``--write`` put them on the page.
+    """The command line of a script: run its sections, print them, and with ``--write`` write them to the page.
 
-    A section takes a share of the full run, from 0 to 1, and gives Markdown.
+    A section takes a share of the full run, from 0 to 1, and returns Markdown.
     """
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", choices=list(sections), help="one section")
@@ -42,7 +42,7 @@ class NotTriedError(Exception):
 
 
 def tried(trial: Callable[[], str]) -> tuple[str, str]:
-    """Whether the project held in a trial, and what was seen."""
+    """Result of a trial ("held" if it passed), and what was seen."""
     try:
         return "held", trial()
     except NotTriedError as reason:

@@ -1,4 +1,4 @@
-"""Processes of the service that end, on purpose or not, while it is asked: what callers notice.
+"""Processes of the service that end, on purpose or not, under load: the effect on clients.
 
     python fuzz/restarts.py [--only restarts] [--share 0.1] [--write]
 
@@ -33,20 +33,20 @@ CONNECTIONS = 16
 
 
 def workers_of(server: Server) -> list[int]:
-    """The processes that answer."""
+    """The worker processes."""
     lines = {child: Path(f"/proc/{child}/cmdline").read_bytes() for child in server.children()}
     return [child for child, line in lines.items() if b"spawn_main" in line]
 
 
 def counted(server: Server) -> float:
-    """Single questions that the service says it has answered with 200."""
+    """Single cases that the service has counted as answered with 200."""
     text = server.ask("GET", "/metrics")[1].decode()
     lines = re.findall(r"^mumacro_requests_total\{(.*)\} (\S+)$", text, re.MULTILINE)
     return sum(float(n) for labels, n in lines if 'route="/v1/mu-macro"' in labels and 'status="200"' in labels)
 
 
 def killed_worker(share: float) -> str:
-    """One of two workers is killed while all are busy."""
+    """One of two worker processes is killed under load."""
     asked = questions({"single": 1}, 500, 1)
     with serving(workers=2) as server:
         expected = answers(server, asked)
@@ -67,9 +67,9 @@ def killed_worker(share: float) -> str:
         server.wait(3)
         assert len(workers_of(server)) == 2
         answered = seen.statuses[200]
-        time.sleep(0.5)  # each worker leaves its numbers four times a second
+        time.sleep(0.5)  # each worker writes its counters four times a second
         missed = answered - (counted(server) - before)
-        assert set(seen.statuses) <= {200, 503}, seen.statuses  # a new worker says 503 until its tables are loaded
+        assert set(seen.statuses) <= {200, 503}, seen.statuses  # a new worker returns 503 until its tables are loaded
         assert not seen.wrong
         assert not seen.unexplained
         assert seen.broken <= CONNECTIONS, seen.faults
@@ -77,14 +77,14 @@ def killed_worker(share: float) -> str:
         assert missed <= rate * 0.5 + CONNECTIONS, missed
         assert server.stop() == 0
     return (
-        f"{seen.asked:,} requests: {seen.broken} of {CONNECTIONS} connections, those of the dead worker, broke; "
-        f"{seen.statuses[503]} refused while the new one started; all others right; {missed:.0f} requests that the "
-        "dead one had answered last are not counted; two workers again"
+        f"{seen.asked:,} requests: {seen.broken} of {CONNECTIONS} connections, those of the killed worker, broke; "
+        f"{seen.statuses[503]} refused while the new worker started; all others correct; {missed:.0f} requests that "
+        "the killed worker had answered last are not counted; two workers again"
     )
 
 
 def stopped_while_busy(share: float) -> str:
-    """SIGTERM while requests, batches and streams are under way."""
+    """SIGTERM while requests, batches and streams are in progress."""
     del share
     asked = questions({"single": 8, "batch": 2}, 200, 2000)
     line = json.dumps(CASE).encode() + b"\n"
@@ -102,10 +102,10 @@ def stopped_while_busy(share: float) -> str:
                 try:
                     reply = await caller.ask(asked[i % len(asked)].text)
                 except ConnectionRefusedError:
-                    return  # nobody listens any more
+                    return  # the port is closed
                 except FAULT as error:
                     if stopped.is_set() and not used:
-                        late += 1  # a new connection, while it closed its door
+                        late += 1  # a new connection, while the port was being closed
                         return
                     seen.fault(error)
                     return
@@ -156,14 +156,14 @@ def stopped_while_busy(share: float) -> str:
         assert found == 8 * [lines], found
         assert told == ["200", "503", "closed"], told
     return (
-        f"{seen.asked:,} requests and 8 streams of {lines} lines, which went on for seconds after it: all answered; "
-        f"{late} of {CONNECTIONS} callers who opened a new connection at the very end were not let in; /readyz said "
-        "503 before nobody listened; exit code 0"
+        f"{seen.asked:,} requests and 8 streams of {lines} lines, which continued for seconds after SIGTERM: all "
+        f"answered; {late} of {CONNECTIONS} clients that opened a new connection at the end were refused; /readyz "
+        "returned 503 before the port was closed; exit code 0"
     )
 
 
 def free_port() -> int:
-    """A port that nobody has."""
+    """An unused port."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         return int(taken.getsockname()[1])
@@ -203,7 +203,7 @@ http {{
 
 @contextmanager
 def proxy(ports: list[int]) -> Iterator[int]:
-    """nginx before these ports; the port where it listens."""
+    """nginx in front of these ports; yields its own port."""
     program = shutil.which("nginx", path=os.environ.get("PATH", "") + ":/usr/sbin")
     if program is None:
         raise reporting.NotTriedError("nginx is not installed")
@@ -228,7 +228,7 @@ def proxy(ports: list[int]) -> Iterator[int]:
 
 
 def rolling_restart(share: float, total: int = 100_000) -> str:
-    """Two replicas behind nginx are restarted one after the other, again and again, while callers ask."""
+    """Two replicas behind nginx are restarted one after the other, repeatedly, under load."""
     total = max(1000, round(total * share))
     asked = questions({"single": 9, "batch": 1}, 500, 100)
     ports = [free_port(), free_port()]
@@ -271,12 +271,12 @@ def rolling_restart(share: float, total: int = 100_000) -> str:
         assert not errors, errors[0][-1000:]
         assert seen.verdict == "held", seen.verdict
         assert set(seen.statuses) == {200}, seen.statuses
-    return f"{seen.asked:,} requests during {made} restarts, 0 failed, all right to the bit"
+    return f"{seen.asked:,} requests during {made} restarts, 0 failed, all responses correct to the bit"
 
 
 RESTARTS: dict[str, Callable[[float], str]] = {
     "SIGKILL of one of two workers": killed_worker,
-    "SIGTERM with requests, batches and streams under way": stopped_while_busy,
+    "SIGTERM with requests, batches and streams in progress": stopped_while_busy,
     "rolling restart of two replicas behind nginx": rolling_restart,
 }
 
@@ -285,7 +285,7 @@ def restarts(share: float) -> str:
     """Every trial once."""
     started = time.perf_counter()
     rows = [[name, *reporting.tried(partial(trial, share))] for name, trial in RESTARTS.items()]
-    return f"{markdown(('what happens', 'it', 'what was seen'), rows, 3)}\n\n{reporting.took(started)}"
+    return f"{markdown(('event', 'result', 'what was seen'), rows, 3)}\n\n{reporting.took(started)}"
 
 
 SECTIONS = {"restarts": restarts}

@@ -1,4 +1,4 @@
-"""What the scripts that try the service share: a server process on a loopback port, and callers of it."""
+"""Shared by the scripts that test the service: a server process on a loopback port, and its clients."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ __all__ = ["CASE", "FAULT", "Caller", "Question", "Reply", "Server", "open_files
 
 START_S = 180.0  # a first start compiles the kernels
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
-FAULT = (OSError, EOFError, asyncio.IncompleteReadError, ValueError)  # of a connection that ends, or answers nonsense
+FAULT = (OSError, EOFError, asyncio.IncompleteReadError, ValueError)  # connection ended, or response not valid
 
 
 def open_files(wanted: int) -> None:
-    """Allow this process, and those that it starts, so many open files."""
+    """Allow this process, and those that it starts, this number of open files."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(wanted, hard), hard))
@@ -51,7 +51,7 @@ class Server:
         self.port = int(found[1])
 
     def ask(self, method: str, path: str, body: str | bytes | None = None, **headers: str) -> tuple[int, bytes]:
-        """Status and body of the answer, on a connection of its own."""
+        """Status and body of the response, on a separate connection."""
         connection = HTTPConnection("127.0.0.1", self.port, timeout=60)
         try:
             named = {name.replace("_", "-"): value for name, value in headers.items()}
@@ -62,7 +62,7 @@ class Server:
             connection.close()
 
     def wait(self, workers: int = 1) -> None:
-        """Wait until so many workers have loaded their tables, and are ready."""
+        """Wait until this number of workers have loaded their tables and are ready."""
         deadline = time.monotonic() + START_S
         while self.log.read_text().count("tables are loaded") < workers or self.ask("GET", "/readyz")[0] != 200:
             assert time.monotonic() < deadline, self.log.read_text()[-2000:]
@@ -74,28 +74,28 @@ class Server:
         return next(int(line.split()[1]) for line in lines if line.startswith(what)) / 1024.0
 
     def busy(self) -> float:
-        """Seconds of a processor that it has used."""
+        """Processor time used [s]."""
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def children(self) -> list[int]:
-        """Processes that it started."""
+        """Its child processes."""
         number = self.process.pid
         return [int(child) for child in Path(f"/proc/{number}/task/{number}/children").read_text().split()]
 
     def errors(self) -> list[str]:
-        """Lines of its log about what nobody foresaw."""
+        """Lines of its log about unexpected errors."""
         return [line for line in self.log.read_text().splitlines() if '"logger": "mumacro.error"' in line]
 
     def stop(self, number: int = signal.SIGTERM) -> int:
-        """End it; the exit code."""
+        """Stop the process; returns the exit code."""
         self.process.send_signal(number)
         return self.process.wait(timeout=120)
 
 
 @contextmanager
 def serving(*words: str, workers: int = 1, **settings: object) -> Iterator[Server]:
-    """A service on the committed tables, ready, for as long as the context lasts; settings without their prefix."""
+    """A service on the committed tables, ready, until the context ends; settings without their prefix."""
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
     variables |= {"PYTHONPATH": str(reporting.ROOT), "MUMACRO_WORKERS": str(workers)}
     variables |= {f"MUMACRO_{name}": str(value) for name, value in settings.items()}
@@ -116,11 +116,11 @@ def serving(*words: str, workers: int = 1, **settings: object) -> Iterator[Serve
                 process.wait()
 
 
-# --- callers ------------------------------------------------------------------------------------------
+# --- clients ------------------------------------------------------------------------------------------
 
 
 class Reply(NamedTuple):
-    """An answer as it came."""
+    """A response as received."""
 
     status: int
     headers: dict[bytes, bytes]
@@ -128,7 +128,7 @@ class Reply(NamedTuple):
 
 
 class Caller:
-    """One connection, opened when there is something to ask, and again after it was closed."""
+    """One connection, opened for the first request and reopened after it was closed."""
 
     def __init__(self, port: int, host: str = "127.0.0.1") -> None:
         self._place = host, port
@@ -137,11 +137,11 @@ class Caller:
 
     @property
     def is_open(self) -> bool:
-        """Whether the next request goes over a connection that has been used before."""
+        """Whether the next request uses an existing connection."""
         return self._writer is not None
 
     async def ask(self, text: bytes) -> Reply:
-        """Send the request, read the answer; raises one of FAULT."""
+        """Send the request, read the response; raises one of FAULT."""
         if self._writer is None:
             self._reader, self._writer = await asyncio.open_connection(*self._place)
         assert self._reader is not None
@@ -163,7 +163,7 @@ class Caller:
 
 
 async def read_reply(reader: asyncio.StreamReader) -> Reply:
-    """The next answer on a connection."""
+    """The next response on a connection."""
     head = (await reader.readuntil(b"\r\n\r\n")).split(b"\r\n")
     headers = {}
     for line in head[1:-2]:
@@ -184,14 +184,14 @@ async def read_reply(reader: asyncio.StreamReader) -> Reply:
 
 
 class Question(NamedTuple):
-    """A request, and what kind of request it is."""
+    """A request and its kind."""
 
     kind: str
     text: bytes
 
 
 def request(path: str, body: bytes | None = None, kind: str = "application/json") -> bytes:
-    """A request as it goes over the wire."""
+    """A request as bytes."""
     if body is None:
         return f"GET {path} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
     head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
@@ -199,7 +199,7 @@ def request(path: str, body: bytes | None = None, kind: str = "application/json"
 
 
 def case(chance: random.Random) -> dict[str, float]:
-    """A random case within the table's range and around it."""
+    """A random case inside the table's range or near it."""
     spans = {"mu0": (-1, 0), "Fz": (0, 3), "k": (4, 8), "y0": (-8, -4), "omega": (3, 6), "v0": (-5, 1)}
     return {name: 10.0 ** chance.uniform(*span) for name, span in spans.items()}
 

@@ -2,9 +2,9 @@
 
     python fuzz/strange.py [--only strange_requests] [--share 0.001] [--write]
 
-Most go straight into the application, in processes of their own; one in twenty goes over a socket to a running service.
-The seed of a share of the work is its number, so that what is found can be had again:
-``python fuzz/strange.py again NUMBER`` does one share and says which requests were bad.
+Most go directly to the application, in separate processes; one in twenty goes over a socket to a running service.
+The seed of a share of the work is its number, so that a failure can be reproduced:
+``python fuzz/strange.py again NUMBER`` runs one share and prints the failing requests.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from measuring import markdown, progress
 from serving import CASE, FAULT, Caller, case, serving
 
 TABLE = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
-TOTAL, PART, LIVE = 1_000_000, 10_000, 20  # requests, in a share of work, one in so many over a socket
+TOTAL, PART, LIVE = 1_000_000, 10_000, 20  # requests; in a share of work; one of this many over a socket
 HANG_S = 1.0
 FINE = frozenset({200, 206, 304, 400, 401, 404, 405, 408, 413, 415, 416, 422})
 JSON, LINES, CSV = "application/json", "application/x-ndjson", "text/csv"
@@ -54,7 +54,7 @@ INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", 
 
 
 def document(chance: random.Random) -> tuple[str, Any]:
-    """A path that takes JSON, and a good body for it."""
+    """A path that takes JSON, and a valid body for it."""
     one: dict[str, Any] = case(chance)
     if chance.random() < 0.3:
         one["include"] = chance.sample(INCLUDED, chance.randrange(4))
@@ -93,7 +93,7 @@ def document(chance: random.Random) -> tuple[str, Any]:
 
 
 def arrow(chance: random.Random) -> bytes:
-    """A good Arrow stream."""
+    """A valid Arrow stream."""
     import numpy as np
     import pyarrow as pa
 
@@ -113,7 +113,7 @@ def arrow(chance: random.Random) -> bytes:
 
 # --- what is changed ----------------------------------------------------------------------------------
 
-#: texts that stand where a value stood
+#: texts that replace a value
 NUMBERS = (
     "0", "-0", "-1", "1e308", "1e309", "-1e400", "5e-324", "1e-400", "0.1" + "0" * 400, "9" * 400, "1" + "0" * 5000,
     "NaN", "Infinity", "-Infinity", "nan", "0x10", "1_000", "01", "+1", ".5", "1.", "1e", "1e+", "--1", "1d5", "1,5",
@@ -130,7 +130,7 @@ NAMES = (
 
 
 def text_of(value: Any, chance: random.Random, rate: float) -> str:
-    """A value as JSON, with changes at about this rate a node."""
+    """A value as JSON, with changes at about this rate per node."""
     if chance.random() < rate:
         return chance.choice(chance.choice([NUMBERS, VALUES]))
     space = " \t\r\n"[: chance.randrange(5)] if chance.random() < 0.02 else ""
@@ -150,7 +150,7 @@ def text_of(value: Any, chance: random.Random, rate: float) -> str:
 
 
 def spoil(text: bytes, chance: random.Random) -> bytes:
-    """Some bytes flipped, taken away, put in, doubled, or overwritten by a number that lies."""
+    """Some bytes flipped, removed, inserted, doubled, or overwritten by a wrong number."""
     changed = bytearray(text)
     for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
         if not changed:
@@ -295,11 +295,11 @@ def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
         yield name, KINDS[name][1](chance)
 
 
-# --- asking -------------------------------------------------------------------------------------------
+# --- sending ------------------------------------------------------------------------------------------
 
 
 def fault_of(request: Request, status: int, kind: bytes, body: bytes) -> str:
-    """What is wrong with an answer; nothing: empty."""
+    """What is wrong with a response; empty if nothing is."""
     if status == 500 and b"InvalidOutput" in body and request.path in ("/Evaluate", "/Gradient", "/ApplyJacobian"):
         return ""  # UM-Bridge's own status for a result that is not finite
     if status not in FINE:
@@ -308,12 +308,12 @@ def fault_of(request: Request, status: int, kind: bytes, body: bytes) -> str:
         try:
             orjson.loads(body)
         except ValueError:
-            return "the answer is not JSON"
+            return "the response is not JSON"
     return ""
 
 
 async def ask_app(app: Any, request: Request) -> tuple[int, bytes, bytes]:
-    """Status, media type and body of what the application answers."""
+    """Status, media type and body of the application's response."""
     scope = {
         "type": "http", "asgi": {"version": "3.0", "spec_version": "2.3"}, "http_version": "1.1", "scheme": "http",
         "method": request.method, "path": request.path, "raw_path": request.path.encode(), "root_path": "",
@@ -327,7 +327,7 @@ async def ask_app(app: Any, request: Request) -> tuple[int, bytes, bytes]:
     async def receive() -> dict[str, Any]:
         nonlocal given
         if given:
-            await asyncio.sleep(3600.0)  # the caller stays
+            await asyncio.sleep(3600.0)  # the client stays connected
         given = True
         return {"type": "http.request", "body": request.body, "more_body": False}
 
@@ -346,12 +346,12 @@ async def ask_app(app: Any, request: Request) -> tuple[int, bytes, bytes]:
 
 
 class Found:
-    """What became of many requests."""
+    """Results of many requests."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.statuses: Counter[int] = Counter()
-        self.slowest = 0.0  # seconds of a processor
+        self.slowest = 0.0  # processor time [s]
         self.memory = 0.0  # megabytes more than after the first tenth
         self.bad: list[tuple[str, str]] = []
 
@@ -371,7 +371,7 @@ def resident() -> float:
 
 
 async def ask_part(seed: int, count: int) -> Found:
-    """One share of the work, into an application in this process."""
+    """One share of the work, with an application in this process."""
     from service.app import create_app
     from service.settings import Settings
 
@@ -385,7 +385,7 @@ async def ask_part(seed: int, count: int) -> Found:
             try:
                 status, kind, body = await asyncio.wait_for(ask_app(app, request), 600.0)
                 fault = fault_of(request, status, kind, body)
-            except Exception as error:  # whatever it is, it is a finding
+            except Exception as error:  # any exception is a failure
                 status, fault = 0, f"{type(error).__name__}: {error}"
             found.note(name, request, status, fault, time.process_time() - started)
     found.memory = resident() - before
@@ -393,13 +393,13 @@ async def ask_part(seed: int, count: int) -> Found:
 
 
 def part(seed: int, count: int) -> None:
-    """The same as a process of its own, which prints what it found."""
+    """The same in a separate process, which prints its results."""
     found = asyncio.run(ask_part(seed, count))
     print(json.dumps([found.counts, found.statuses, found.slowest, found.memory, found.bad]))
 
 
 def in_other_process(seed: int, count: int, found: Found) -> None:
-    """Have one share of the work done, and add what was found."""
+    """Run one share of the work in another process, and add its results."""
     command = [sys.executable, __file__, "part", str(seed), str(count)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=36_000, check=False)
     if done.returncode:
@@ -425,7 +425,7 @@ async def ask_live(port: int, seed: int, count: int, found: Found) -> None:
     caller = Caller(port)
     for name, request in work(seed, count):
         if request.method == "HEAD":
-            continue  # has no body, whatever its head says
+            continue  # HEAD has no body, whatever the header says
         try:
             reply = await asyncio.wait_for(caller.ask(wire(request)), 60.0)
             status, body = reply.status, reply.body
@@ -469,14 +469,14 @@ def strange_requests(share: float) -> str:
     bad = Counter(fault for fault, _ in found.bad + live.bad)
     text = "" if share == 1.0 else f"{share:.1%} of the full run of {TOTAL:,} requests. "
     text += (
-        f"Statuses: {told}. Bad answers, crashes and answers that took more than {HANG_S:.0f} s: {sum(bad.values())}. "
-        f"Slowest {found.slowest:.2f} s of a processor. A process of {size:,} requests took at most "
-        f"{found.memory:.0f} MB more than after its first tenth, the running service {grown:.0f} MB more than after "
-        f"its first thousand; {len(errors)} unexpected errors in its log, exit code {code}."
+        f"Statuses: {told}. Wrong responses, crashes and responses that took more than {HANG_S:.0f} s: "
+        f"{sum(bad.values())}. Slowest {found.slowest:.2f} s of processor time. A process of {size:,} requests took at "
+        f"most {found.memory:.0f} MB more than after its first tenth, the running service {grown:.0f} MB more than "
+        f"after its first thousand; {len(errors)} unexpected errors in its log, exit code {code}."
     )
     if bad or errors or code:
         text += f" FAILED: {dict(bad)}"
-    head = ("what is changed", "straight into the application", "over a socket")
+    head = ("what is changed", "without a socket", "over a socket")
     return f"{markdown(head, rows)}\n\n{text}\n\n{reporting.took(started)}"
 
 

@@ -1,9 +1,9 @@
-"""Tables from strangers: truncated, flipped and hostile files are refused, or answer as the sound one.
+"""Truncated, damaged and hostile table files are refused, or give the answers of the intact table.
 
     python fuzz/tables.py [--only damaged_tables] [--share 0.01] [--write]
 
-Files are opened by other processes (``python fuzz/tables.py open``), which may take 256 MB more than they have after
-opening the sound table; one that dies is a finding.
+Files are opened by other processes (``python fuzz/tables.py open``), which may use 256 MB more than they have after
+opening the intact table; a process that crashes is a failure.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from measuring import markdown, progress
 
 SMALLEST = min((reporting.ROOT / "tables").glob("*.nc"), key=lambda path: path.stat().st_size)
 STEP = 256  # bytes between truncations
-MORE = 256 * 2**20  # bytes that opening a file may take
+MORE = 256 * 2**20  # bytes of memory allowed for opening a file
 PATIENCE = 3600.0  # seconds for one share of work
 
 HEAD = ("the smallest table", "files", "refused", "same answers", "same answers, other texts",
@@ -40,8 +40,8 @@ REFUSED, SAME, TEXTS, DIFFERS, ESCAPED, DIED = "refused", "same", "texts", "diff
 
 
 class Outcome(NamedTuple):
-    """What became of a file: one of the words above, what was said, seconds of a processor, memory [MB] beyond the
-    sound table's.
+    """Result for a file: one of the words above, the message, processor time [s], memory [MB] beyond that of the
+    intact table.
     """
 
     what: str
@@ -64,7 +64,7 @@ def work(start: int, count: int, change: str, stride: int = 1) -> Iterator[tuple
 
 
 def in_other_process(*arguments: str, timeout: float = PATIENCE) -> tuple[list[Outcome], int]:
-    """What the other process found, one outcome a line, and its exit code."""
+    """Results of the other process, one a line, and its exit code."""
     command = [sys.executable, __file__, "open", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
     if done.returncode:
@@ -73,7 +73,7 @@ def in_other_process(*arguments: str, timeout: float = PATIENCE) -> tuple[list[O
 
 
 def ask(table: Any) -> None:
-    """Ask a table for all that it has, near and far: it may answer as it likes, but must not crash."""
+    """Evaluate all quantities of a table over the whole range: any answer is allowed, but no crash."""
     import numpy as np
 
     v, y = np.meshgrid(*2 * [np.concatenate([[0.0, 5e-324, 1e300, np.inf], np.geomspace(1e-6, 1e6, 60)])])
@@ -94,7 +94,7 @@ def sound() -> Any:
 
 
 def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
-    """Open one file; ``before`` is the memory [kB] that was taken before."""
+    """Open one file; ``before`` is the memory [kB] that was used before."""
     from mumacro import Surrogate, TableError
     from mumacro.table import parse_table
 
@@ -111,14 +111,14 @@ def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
             what, said = TEXTS, ", ".join(names)
     except TableError as error:
         what, said = REFUSED, error.reason
-    except BaseException as error:  # anything else is a finding
+    except BaseException as error:  # any other exception is a failure
         what, said = ESCAPED, f"{type(error).__name__}: {error}"
     more = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     return Outcome(what, said[:300], time.process_time() - started, more / 1024.0)
 
 
 def open_all(arguments: Sequence[str]) -> None:
-    """Here the files are opened, under a memory limit."""
+    """Open the files under a memory limit."""
     sound()
     size = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     resource.setrlimit(resource.RLIMIT_AS, (size + MORE, size + MORE))
@@ -132,7 +132,7 @@ def open_all(arguments: Sequence[str]) -> None:
 
 
 def damaged(share: float, change: str) -> list[Outcome]:
-    """Every copy of the smallest table with one change; where ``share`` is less than 1, bytes are left out."""
+    """Every copy of the smallest table with one change; if ``share`` is less than 1, bytes are skipped."""
     total, size = SMALLEST.stat().st_size, 4096
     starts = list(range(0, total, size))
     stride = 1 if change == "cut" else round(1.0 / share)
@@ -147,7 +147,7 @@ def damaged(share: float, change: str) -> list[Outcome]:
 
 
 def row(name: str, found: Sequence[Outcome]) -> list[str]:
-    """One line of the table."""
+    """One row of the table."""
     count = Counter(outcome.what for outcome in found)
     bad = count[DIFFERS] + count[ESCAPED] + count[DIED]
     worst = max(outcome.seconds for outcome in found), max(outcome.megabytes for outcome in found)
@@ -160,11 +160,11 @@ def damaged_tables(share: float) -> str:
     started = time.perf_counter()
     rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
     left_out = "" if share == 1.0 else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
-    return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are those of a processor. {reporting.took(started, 'h5py')}"
+    return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time. {reporting.took(started, 'h5py')}"
 
 
 def hostile_tables(_share: float) -> str:
-    """Crafted files, opened by another process; where it dies, the next one goes on."""
+    """Crafted files, opened by another process; after a crash, a new process continues with the next file."""
     started = time.perf_counter()
     found: list[Outcome] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -181,7 +181,7 @@ def hostile_tables(_share: float) -> str:
         [name, one.what, one.said.replace("|", "/")[:90], size, f"{one.seconds:.2f}", f"{one.megabytes:.0f}"]
         for name, one, size in zip(HOSTILE, found, sizes, strict=True)
     ]
-    head = ("what is in the file", "it is", "because", "size [kB]", "seconds", "memory so far [MB]")
+    head = ("content of the file", "result", "reason", "size [kB]", "seconds", "memory so far [MB]")
     return f"{markdown(head, rows, 3)}\n\n{reporting.took(started, 'h5py')}"
 
 

@@ -1,4 +1,4 @@
-"""A headless Chromium that opens the page: what tests and pictures of it share."""
+"""A headless Chromium that opens the page, for tests and screenshots."""
 
 import base64
 import json
@@ -8,11 +8,11 @@ import time
 
 import numpy as np
 
-PATIENCE_S = 120  # a browser beside many other programs can be slow
+PATIENCE_S = 120  # a browser on a busy machine can be slow
 
 
 def start(folder):
-    """A browser of its own that reaches nothing but this machine; its files are in the folder.
+    """A separate browser that can connect to this machine only; its files are in the folder.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def start(folder):
 
 
 class Opened:
-    """Opens a state of the page: by its address, and as a new document only where that makes a difference."""
+    """Opens a state of the page by its address; loads a new document only if needed."""
 
     def __init__(self, browser, url):
         self.browser, self.url, self.shown = browser, url, None
@@ -86,7 +86,7 @@ class Page:
         )
 
     def settle(self):
-        """Wait until every question that follows from the state is answered."""
+        """Wait until every request that follows from the state is answered."""
         self.run(
             "while (document.getElementById('main')?.dataset.asking !== 'false')"
             " await new Promise((next) => setTimeout(next, 10));"
@@ -119,7 +119,7 @@ class Page:
             self.settle_unless_bad()
 
     def settle_unless_bad(self):
-        # a question begins with the frame after the one that took the value
+        # a request starts one frame after the value is read
         self.run("await new Promise((next) => requestAnimationFrame(() => requestAnimationFrame(next)));")
         if self.run("return document.querySelector('#main').dataset.asking;") == "true":
             self.settle()
@@ -167,7 +167,7 @@ class Page:
         return np.frombuffer(base64.b64decode(found[2]), np.uint8).reshape(found[0], found[1], 4)
 
     def touched(self, selector, x, y, click=False):
-        """Move the pointer to a share of an element's width and height."""
+        """Move the pointer to a relative position in an element."""
         from selenium.webdriver import ActionChains
 
         element = self.find(selector)
@@ -178,7 +178,7 @@ class Page:
         (actions.click() if click else actions).perform()
 
     def download(self, selector, folder, name):
-        """What comes when an element is clicked."""
+        """The file that is downloaded when an element is clicked."""
         behaviour = {"behavior": "allow", "downloadPath": str(folder)}
         self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
         self.run(f"document.querySelector({selector!r}).click();")

@@ -1,4 +1,4 @@
-"""Compilers that tests of exports use where they are installed, and how one is called."""
+"""Compilers used by tests of exports, if installed, and a function to call them."""
 
 import functools
 import importlib.util
@@ -14,7 +14,7 @@ STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
 
 @functools.cache
 def compiler(name: str) -> tuple[str, ...]:
-    """The command of a compiler; skips the test where it is not installed."""
+    """The command of a compiler; skips the test if it is not installed."""
     if name.startswith("zig"):
         if importlib.util.find_spec("ziglang") is None:
             pytest.skip("zig is not installed (pip install ziglang)")

@@ -1,4 +1,4 @@
-"""What the tests share: the committed tables, a service with its client, reference values, solvers, the builder."""
+"""Shared by the tests: the committed tables, a service with its client, reference values, solvers, the builder."""
 
 import csv
 import http.client
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from builder.sweep import Sweep
 from mumacro import Surrogate
 
-if TYPE_CHECKING:  # tests of the library do without the service and what it is made of
+if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from fastapi import FastAPI
     from starlette.testclient import TestClient
 
@@ -35,7 +35,7 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 
 
 def load(name: str) -> ModuleType:
-    """A module of helpers beside this file; by its path, since tests are no package."""
+    """A module of helpers beside this file; by its path, because tests/ is not a package."""
     spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -76,7 +76,7 @@ def client(app: "FastAPI") -> "Iterator[TestClient]":
 
 @pytest.fixture(scope="session")
 def surrogate() -> Surrogate:
-    """The tightest committed table, which also answers by default in the service."""
+    """The tightest committed table, which is also the default of the service."""
     return Surrogate.open()
 
 
@@ -116,7 +116,7 @@ class LiveServer:
 def live_server(
     surrogate: Surrogate, repository: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[LiveServer]:
-    """One service on the committed tables for all tests that talk to a real socket and do not stop it."""
+    """One service on the committed tables for all tests that use a real socket and do not stop it."""
     log = tmp_path_factory.mktemp("live") / "log.jsonl"
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
     command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path.parent)]
@@ -136,7 +136,7 @@ def live_server(
 
 
 def wait_until_ready(url: str) -> None:
-    """Wait until the service at the URL says that it is ready: it listens before that."""
+    """Wait until the service at the URL reports that it is ready; it listens earlier."""
     deadline = time.monotonic() + START_S
     while True:
         try:
@@ -149,7 +149,7 @@ def wait_until_ready(url: str) -> None:
 
 
 class Server:
-    """A service process of this test's own, and what it logged."""
+    """A service process for one test, and its log."""
 
     def __init__(self, repository, tables, arguments, environment):
         command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(tables), *arguments]
@@ -189,7 +189,7 @@ class Server:
             connection.close()
 
     def wait_for_workers(self):
-        """Wait until somebody listens: with several workers the port is known before that."""
+        """Wait until the port is open: with several workers it is known earlier."""
         deadline = time.monotonic() + START_S
         while True:
             try:
@@ -199,7 +199,7 @@ class Server:
                 time.sleep(0.1)
 
     def wait_until_ready(self):
-        """Wait until questions are answered, or refused for good because of the tables."""
+        """Wait until requests are answered, or refused permanently because of the tables."""
         deadline = time.monotonic() + START_S
         while True:
             self.wait_for_workers()
@@ -210,7 +210,7 @@ class Server:
             time.sleep(0.05)
 
     def wait_for_tables(self, workers):
-        """Wait until so many workers have said that their tables are loaded."""
+        """Wait until this number of workers have logged that their tables are loaded."""
         deadline = time.monotonic() + START_S
         while sum("tables are loaded" in line for line in list(self.lines)) < workers:
             assert time.monotonic() < deadline, "".join(self.lines)
@@ -230,7 +230,7 @@ class Server:
 
 @pytest.fixture(scope="session")
 def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
-    """A service process of one's own, for as long as the context lasts."""
+    """A separate service process, until the context ends."""
 
     @contextmanager
     def serve(tables: Path, *arguments: str, ready: bool = True, **environment: str) -> Iterator[Server]:
@@ -249,7 +249,7 @@ def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
 
 @pytest.fixture(scope="session")
 def open_page(live_server: LiveServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
-    """Opens the page in a headless Chromium (tests/browser.py), where there is one."""
+    """Opens the page in a headless Chromium (tests/browser.py), if installed."""
     module = load("browser")
     try:
         browser = module.start(tmp_path_factory.mktemp("browser"))
@@ -259,7 +259,7 @@ def open_page(live_server: LiveServer, tmp_path_factory: pytest.TempPathFactory)
     browser.quit()
 
 
-# --- what the numerical tests share -------------------------------------------------------------------
+# --- shared by the numerical tests ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 It shares nothing with ``builder``: no half period, no closed form, no events, no root-finding.  The foot follows the
 sweeping process u <- P(u + dP) with P the projection on the unit disc and dP the displacement of the upper point.
-Its error is proportional to the step, which is what makes it a witness.
+Its error is proportional to the step, so extrapolation gives an independent check.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def march(v: float, y: float, steps: int, periods: int, ux: float = 0.0, uy: flo
 
 
 def periods_until_steady(v: float, y: float) -> int:
-    """Periods after which a start is forgotten: the slip path per period is at least 4 (y~ - 1) and about 2 pi v~."""
+    """Periods until the start has no effect: the slip path per period is at least 4 (y~ - 1) and about 2 pi v~."""
     return math.ceil(1.0 / v + 40.0 / max(2.0 * math.pi * v, 4.0 * (y - 1.0)))
 
 

@@ -1,4 +1,4 @@
-"""The scripts behind docs/benchmarks.md: they run, their tables hold what they promise, and the page is theirs."""
+"""The scripts behind docs/benchmarks.md: they run, their tables are right, and the page contains them."""
 
 import re
 import subprocess
@@ -22,7 +22,7 @@ Row = dict[str, str]
 
 
 def run(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """One script of benchmarks/, in a process of its own, from the root."""
+    """One script of benchmarks/, in a separate process, from the root."""
     command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *arguments]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
 
@@ -49,7 +49,7 @@ def number(cell: str) -> float:
 
 @pytest.fixture(scope="module")
 def printed() -> str:
-    """What a quick comparison prints."""
+    """The output of a quick comparison."""
     done = run("speed_against_error", "--quick", "--rounds", "1")
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -62,7 +62,7 @@ def speed(printed: str) -> list[list[Row]]:
 
 
 def test_comparison_has_a_row_for_every_method(speed: list[list[Row]]) -> None:
-    names = [row["what answers"] for row in speed[0]]
+    names = [row["method"] for row in speed[0]]
     for path in (ROOT / "tables").glob("*.nc"):
         assert names.count(f"**{path.stem}**") == 2, "one thread and all cores"
     for peer in (
@@ -82,14 +82,14 @@ def test_comparison_has_a_row_for_every_method(speed: list[list[Row]]) -> None:
 
 def test_tables_keep_their_tolerance_where_plain_grids_do_not(speed: list[list[Row]]) -> None:
     for row in speed[0]:
-        name = row["what answers"].strip("*")
+        name = row["method"].strip("*")
         if name.startswith("mumacro-"):
             tolerance = float(name.removeprefix("mumacro-"))
             assert 0.0 < number(row["max abs error"]) <= tolerance
             assert number(row["max rel error"]) <= 10.0 * tolerance
         elif " x " in row["data"] and name.startswith(("scipy", "xarray")):
             assert number(row["max abs error"]) > 1e-3, "24 and 48 nodes a side cannot follow the border"
-    by_name = {row["what answers"]: row for row in speed[0]}
+    by_name = {row["method"]: row for row in speed[0]}
     assert number(by_name["direct solve of the full model"]["max abs error"]) < 1e-15
     assert 0.5 < number(by_name["eq. (35), rigid contact"]["max abs error"]) <= 1.0
 
@@ -109,8 +109,8 @@ def test_errors_of_the_other_quantities_lie_below_their_largest_bound(speed: lis
         assert row["max bound"] == "-" or number(row["max error"]) <= number(row["max bound"])
 
 
-def test_a_peer_that_is_not_there_is_named(printed: str, speed: list[list[Row]]) -> None:
-    names = [row["what answers"] for row in speed[0]]
+def test_a_peer_that_is_not_installed_is_named(printed: str, speed: list[list[Row]]) -> None:
+    names = [row["method"] for row in speed[0]]
     for package in ("CoolProp", "baobzi", "interpolation"):
         answered = any(name.startswith(package) for name in names)
         assert answered != (f"\n- {package}: " in printed), "either a row or a reason"
@@ -132,7 +132,7 @@ def test_linear_peers_agree_with_each_other(speed: list[list[Row]]) -> None:
         errors = {
             (row["max abs error"], row["max rel error"])
             for row in speed[0]
-            if row["data"] == size and row["what answers"].endswith(linear)
+            if row["data"] == size and row["method"].endswith(linear)
         }
         assert len(errors) == 1, "the same grid, the same interpolant"
 
@@ -183,7 +183,7 @@ def test_quick_runs_are_never_written_down(script: str) -> None:
     before = PAGES[script].read_bytes()
     done = run(script, "--quick", "--write")
     assert done.returncode == 2
-    assert "--quick measures nothing worth writing down" in done.stderr
+    assert "--quick cannot be combined with --write" in done.stderr
     assert PAGES[script].read_bytes() == before
 
 

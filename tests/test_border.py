@@ -1,4 +1,4 @@
-"""The border of continuous sliding: solved, stored, and at its two ends."""
+"""The border of continuous sliding: solved, stored, and its two limits."""
 
 import math
 from pathlib import Path
@@ -35,7 +35,7 @@ def test_solved_border_is_finite_and_rises_everywhere(sweep: Sweep) -> None:
 
 @pytest.mark.parametrize("y", [0.11012028129012316, 0.0002339104158737087, 0.0014321221280091054])
 def test_border_does_not_divide_by_a_settled_secant(y: float) -> None:
-    # two equal residuals at rounding level once gave NaN or infinity here, as success
+    # two equal residuals at rounding level once gave NaN or infinity here, with status "success"
     crit, mu = border(y)
     assert crit == pytest.approx(0.5 * y * y * (1.0 - 5.0 / 12.0 * y * y), rel=y**4 + 1e-13)
     assert solve(crit * (1.0 + 1e-9), y).mu_ratio == pytest.approx(mu, abs=1e-11)

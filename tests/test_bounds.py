@@ -1,4 +1,4 @@
-"""Every bound covers its error where that is hardest: exact inputs, corner, border, ends of double precision."""
+"""Every bound covers its error in the hardest cases: exact inputs, corner, border, ends of double precision."""
 
 import math
 from fractions import Fraction
@@ -32,11 +32,11 @@ def fine() -> Surrogate:
 
 
 def unit(v: Array, y: Array) -> dict[str, object]:
-    """Inputs whose groups are these, to the last digit."""
+    """Inputs with these groups, to the last digit."""
     return {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": y, "omega": 1.0, "v0": v}
 
 
-# --- inputs whose groups doubles cannot hold ----------------------------------------------------------
+# --- inputs with groups that are not doubles ----------------------------------------------------------
 
 AT_REST = {
     "mu0": 0.9972117790122037, "Fz": 33.00548924565685, "k": 232272.5189101842, "y0": 0.00014170192325057914,
@@ -75,14 +75,14 @@ def test_the_static_limit_covers_the_last_digit_of_the_amplitude(table: Surrogat
 def test_the_corner_covers_the_last_digit_of_the_amplitude(table: Surrogate) -> None:
     truth = corner_ratio(CREEPING)
     found = table.evaluate(CREEPING)
-    assert abs(found.mu_ratio - truth) > 1e-9  # doubles cannot do better
+    assert abs(found.mu_ratio - truth) > 1e-9  # limit of double precision
     assert abs(found.mu_ratio - truth) <= found.error_bound / CREEPING["mu0"]
     assert found.error_bound < 1e-6
 
 
 @pytest.mark.parametrize("still", [True, False])
 def test_any_inputs_next_to_the_corner_are_covered(fine: Surrogate, still: bool) -> None:
-    """y~ is 1 but for rounding of a product of four doubles; v~ from nothing to where mu~ is 1e-5."""
+    """y~ is 1 but for rounding of a product of four doubles; v~ from 0 to where mu~ is 1e-5."""
     rng = np.random.default_rng(31)
     worst = 0.0
     for _ in range(400):
@@ -100,7 +100,7 @@ def test_any_inputs_next_to_the_corner_are_covered(fine: Surrogate, still: bool)
         bound = found.error_bound / mu0
         assert abs(found.mu_ratio - truth) <= bound + truth**3
         worst = max(worst, abs(found.mu_ratio - truth) / bound)
-    assert worst > 0.2  # such inputs do happen, and the bound is none that covers anything
+    assert worst > 0.2  # such inputs exist, and the bound is not excessive
 
 
 def test_a_ratio_below_the_normal_range_is_not_zero(table: Surrogate) -> None:
@@ -158,7 +158,7 @@ def test_a_regime_that_is_certain_is_that_of_a_fresh_solve(table: Surrogate, swe
     assert np.all(right[found.regime_certain])
     far = distance > 2.0 * table.border.max_rel_error + 2e-14
     assert np.all(found.regime_certain[far])
-    assert not found.regime_certain.all()  # and next to the border it says so
+    assert not found.regime_certain.all()  # next to the border it is reported as uncertain
 
 
 def test_a_regime_is_certain_at_all_but_a_small_share_of_points(table: Surrogate) -> None:
@@ -174,7 +174,7 @@ def test_a_regime_is_certain_at_all_but_a_small_share_of_points(table: Surrogate
 
 
 def covered(table: Surrogate, sweep: Sweep, which: int, v: Array, y: Array) -> tuple[Array, Array]:
-    """Errors of both slopes beyond what differences are off by, and their bounds; errors within them."""
+    """Errors of both slopes beyond the error of the differences, and their bounds; whether errors are within them."""
     _, along_v, along_y, bound_v, bound_y = table.slopes(v, y, QUANTITIES[which], bounds=True)
     truth, noise = differences(table, sweep, which, v, y)
     error = np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0)
@@ -188,7 +188,7 @@ def covered(table: Surrogate, sweep: Sweep, which: int, v: Array, y: Array) -> t
 @pytest.mark.parametrize("case", KINDS)
 def test_slopes_lie_within_their_bounds(table: Surrogate, sweep: Sweep, case: str, which: int) -> None:
     v, y = draw(case, 400 if which == MU else 150, table, seed=41)
-    if which == STICK:  # below the border it is a square root, above it nothing
+    if which == STICK:  # below the border it is a square root, above it zero
         keep = np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-3
         v, y = v[keep], y[keep]
     covered(table, sweep, which, v, y)
@@ -203,7 +203,7 @@ def test_slopes_of_mu_lie_within_their_bounds_beside_the_border(
         covered(table, sweep, MU, table.v_tilde_crit(y) * (1.0 + side * distance), y)
 
 
-def test_bounds_of_slopes_are_no_blanket(table: Surrogate, sweep: Sweep) -> None:
+def test_bounds_of_slopes_are_not_excessive(table: Surrogate, sweep: Sweep) -> None:
     """In each block the bound is within a factor of 30 of the largest error there; bounds shrink with the tolerance."""
     v, y = draw("random", 3000, table, seed=43)
     error, bound = covered(table, sweep, MU, v, y)
@@ -214,7 +214,7 @@ def test_bounds_of_slopes_are_no_blanket(table: Surrogate, sweep: Sweep) -> None
         if at.sum() >= 50 and error[:, at].max() > 0.0:
             shares.append(float(np.median(bound[:, at]) / error[:, at].max()))
     assert np.median(shares) <= 30.0
-    # most points err far less than the worst of their block, whose error the bound is made of
+    # most points have far smaller errors than the worst of their block, which determines the bound
     some = error > 0.0
     assert np.median(bound[some] / error[some]) <= 1e4
     assert np.median(bound) <= 10.0 * table.tolerance
@@ -277,7 +277,7 @@ def test_the_gradient_lies_within_its_bound_of_differences_of_the_full_model(
 
 
 def test_the_gradient_is_that_of_the_answer(fine: Surrogate) -> None:
-    """Central differences of the answers themselves, away from the edges of cells."""
+    """Central differences of the answers, away from the edges of cells."""
     case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
     for place in ({}, {"v0": 0.3}, {"y0": 1e-5}, {"y0": 1e-5, "v0": 2.0}, {"v0": 1e-4}):
         base = {**case, **place}

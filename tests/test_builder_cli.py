@@ -1,4 +1,4 @@
-"""``python -m builder`` beyond the plain cases: whole builds, failures while working, help."""
+"""``python -m builder`` beyond the simple cases: complete builds, failures during work, help."""
 
 import json
 import shutil
@@ -19,7 +19,7 @@ Run = Callable[..., "CompletedProcess[str]"]
 
 
 def refused(done: Any, *parts: str) -> None:
-    """The command failed with a message that holds ``parts``, and without a traceback."""
+    """The command failed with a message that contains ``parts``, and without a traceback."""
     assert done.returncode not in (0, None)
     assert "Traceback" not in done.stderr + done.stdout
     message = " ".join(done.stderr.replace("│", " ").split())
@@ -32,7 +32,7 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     out = tmp_path / "rough.nc"
     done = run_builder("build", "--tolerance", "1e-3", "--out", out, "--workers", 2)
     assert done.returncode == 0, done.stderr
-    report = json.loads(done.stdout)  # nothing but JSON: the progress bar goes to stderr
+    report = json.loads(done.stdout)  # JSON only: the progress bar goes to stderr
     opened = Surrogate.open(out)
     assert report["table"] == str(out)
     assert report["content_sha256"] == opened.checksum
@@ -75,7 +75,7 @@ def test_solve_far_below_the_border_leaves_out_what_it_did_not_compute(run_build
 
 def test_verify_rejects_a_table_that_misses_its_tolerance(run_builder: Run, tables_dir: Path, tmp_path: Path) -> None:
     table = read_table(tables_dir / "mumacro-1e-4.nc")
-    table.attributes["tolerance"] = 1e-9  # it promises what it cannot hold
+    table.attributes["tolerance"] = 1e-9  # it states a tolerance that it does not meet
     write_table(table, tmp_path / "boast.nc")
     done = run_builder("verify", tmp_path / "boast.nc", "--points", 300)
     refused(done, "boast.nc", "misses its tolerance of 1e-09")

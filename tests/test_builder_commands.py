@@ -1,4 +1,4 @@
-"""``python -m builder``: happy paths, and every bad argument answered without a traceback."""
+"""``python -m builder``: valid calls, and every bad argument refused without a traceback."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""``--format c``: the header compiles everywhere, says what Python says to the last digits, and nothing breaks it."""
+"""``--format c``: the header compiles everywhere, agrees with Python to the last digits, and refuses bad input."""
 
 import ctypes
 import json
@@ -68,13 +68,13 @@ def load(compilers, folder, *options):
 
 @pytest.fixture(scope="module")
 def fused(folder, compilers):
-    """With fused multiply-adds, as numba compiles on this processor; without, where the processor has none."""
+    """With fused multiply-adds, as numba compiles on this processor; without them if the processor has none."""
     return load(compilers, folder / "1e-7", "-march=native", "-ffp-contract=fast")
 
 
 @pytest.fixture(scope="module")
 def plain(folder, compilers):
-    """Every operation rounded by itself, as in interpreted Python."""
+    """Every operation rounded separately, as in interpreted Python."""
     return load(compilers, folder / "1e-7", "-ffp-contract=off")
 
 
@@ -88,7 +88,7 @@ def ask(function, n, columns, *arrays):
 
 
 def ulps(found, expected):
-    """Distance in units of the last place of what is expected; equal infinities and NaN are at 0."""
+    """Distance in units of the last place of the expected value; 0 for equal infinities and NaN."""
     same = (found == expected) | (np.isnan(found) & np.isnan(expected))
     with np.errstate(all="ignore"):
         return np.where(same, 0.0, np.abs(found - expected) / np.spacing(np.abs(expected)))
@@ -105,7 +105,7 @@ def neighbours(x, most=3):
 
 
 def seams(surrogate):
-    """Points on both sides of every seam: of blocks, of cells, of the border's pieces, of the closed forms."""
+    """Points on both sides of every seam: blocks, cells, the border's pieces, the closed forms."""
     edges = [charts.Y_STICK_LO, 1.0, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL, 1e-150, 1e150]
     y = np.concatenate([neighbours(edges), np.geomspace(1e-8, 1e8, 60)])
     crit = surrogate.v_tilde_crit(y)
@@ -161,13 +161,13 @@ def test_values_are_pythons_to_four_units_of_the_last_place(fused, table):
     assert ulps(ask(fused.ratios, v.size, 1, v, y), mu).max() <= 4.0
     assert np.array_equal(found[:, 7] == 0, source >= 0)
     assert set(source) >= set(range(-1, charts.RIGID))
-    # a bound is a sum of parts, some of which are roots of a rounding error
+    # a bound is a sum of terms, some of which are roots of a rounding error
     assert np.allclose(found[:, 1], bound, rtol=1e-6, atol=0.0, equal_nan=True)
     assert ulps(ask(fused.borders, y.size, 1, y), table.v_tilde_crit(y)).max() <= 4.0
 
 
 def close(found, expected, allowed, digits):
-    """Equal, or off by what is allowed and some units of the last place."""
+    """Equal, or within the allowed difference and some units of the last place."""
     with np.errstate(all="ignore"):
         near = np.abs(found - expected) <= allowed + digits * np.spacing(np.abs(expected))
     return near | (found == expected) | (np.isnan(found) & np.isnan(expected))
@@ -178,7 +178,7 @@ def test_every_quantity_and_slope_is_pythons(fused, table, quantity):
     v, y = (np.ascontiguousarray(np.concatenate(p)) for p in zip(drawn(table, 20_000, 2), seams(table), strict=True))
     found = ask(fused.points, v.size, 8, quantity, v, y)
     value, *slopes = table.slopes(v, y, charts.QUANTITIES[quantity], bounds=True)
-    digits = 72.0 if quantity == charts.POWER else 4.0  # what its bound allows for terms that cancel, 1.6e-14
+    digits = 72.0 if quantity == charts.POWER else 4.0  # its bound includes 1.6e-14 for terms that cancel
     if quantity == charts.STICK:  # near the border the root of a rounding error
         with np.errstate(all="ignore"):
             assert np.all(close(found[:, 0] ** 2, value**2, 4e-15 * np.minimum(1.0, 1.0 / y), 8.0))
@@ -189,7 +189,7 @@ def test_every_quantity_and_slope_is_pythons(fused, table, quantity):
     assert np.all(close(found[:, 1], bound, 1e-6 * bound, 0.0))
     if quantity != charts.STICK:
         assert np.all(close(found[:, 0], value, 1e-2 * bound if quantity else 0.0, digits))
-    for i in (0, 1):  # a twentieth of what the bound allows
+    for i in (0, 1):  # a twentieth of the bound
         assert np.all(close(found[:, 2 + i], slopes[i], 5e-2 * slopes[2 + i], digits))
         assert np.all(close(found[:, 4 + i], slopes[2 + i], 1e-6 * slopes[2 + i], 0.0))
 
@@ -220,7 +220,7 @@ def test_dimensional_cases_are_pythons(fused, table):
     for i, name in enumerate(FIELDS):
         slope, bound = answer.gradient[name][legal], answer.gradient_bound[name][legal]
         assert np.all(close(found[legal, 8 + i], slope, 5e-2 * bound, 4.0))
-        kept = x[legal, 0] > 1e-100  # a smaller mu0 takes the digits of the bound that columns carry
+        kept = x[legal, 0] > 1e-100  # with a smaller mu0 the bound of columns loses its digits
         assert np.all(close(found[legal, 14 + i], bound, 1e-6 * bound + 1e-300, 1.0)[kept])
     faults = np.array([next((i for i, n in enumerate(FIELDS, 1) if bad(n, c[i - 1])), 0) for c in x])
     assert np.array_equal(found[:, 7], faults)
@@ -294,7 +294,7 @@ def test_without_fused_operations_it_is_interpreted_python(plain, table, tables_
             (0, 0),
             (1, 2),
             (2, 3),
-        ):  # the same bits but where a cube root or hypotenuse has another last one
+        ):  # the same bits, except where a cube root or hypotenuse differs in the last one
             assert np.mean(ulps(found[:, column], rows[i]) == 0.0) > 0.95, (quantity, i)
 
 
@@ -342,14 +342,14 @@ def test_kernels_become_readable_c():
     text = into.functions[name]
     assert text.startswith("/* A function with what kernels use. */\nstatic inline mumacro_in_di mumacro_in_chosen(")
     assert "    total = total + x * x / (n + i);" in text
-    assert "int small_;" in text  # a name that windows.h takes
+    assert "int small_;" in text  # a name that windows.h defines
     assert result == into.structs["mumacro_in_di"]
 
 
 def chosen(x: float, n: int):
     """A function with what kernels use.
 
-    Nothing below the first paragraph is carried over.
+    Nothing below the first paragraph is copied.
     """
     total, small = 0.0, x < 1.0
     for i in range(1, 4):
@@ -385,7 +385,7 @@ def test_what_has_no_translation_is_named(function, types, said):
         Translator().call(function, types)
 
 
-def test_numbers_survive_the_way_through_text():
+def test_numbers_are_exact_through_text():
     rng = np.random.default_rng(7)
     for x in [*rng.standard_normal(100) * 10.0 ** rng.uniform(-300, 300, 100), 5e-324, 1.7976931348623157e308, -0.0]:
         assert float(literal(float(x)).strip("()")) == x

@@ -1,4 +1,4 @@
-"""mumacro.h from Fortran, Octave, Abaqus' interface and Modelica's: each compiled by its own tool, each compared."""
+"""mumacro.h from Fortran, Octave, Abaqus and Modelica interfaces: compiled by their tools and compared with Python."""
 
 import shutil
 
@@ -94,7 +94,7 @@ def test_abaqus_gets_the_coefficient_and_its_derivatives(compilers, folder, tabl
         load = call((v0, p * (1 - step), a, w), (v0, p * (1 + step), a, w))[:, 0]
         assert row[1] == pytest.approx((rate[1] - rate[0]) / (2 * step * v0), rel=1e-4, abs=1e-9)
         assert row[2] == pytest.approx((load[1] - load[0]) / (2 * step * p), rel=1e-4, abs=1e-12)
-    # without pressure: rigid contact; at rest on y~ = 1, where the slope is infinite: no slope
+    # without pressure: rigid contact; at rest with y~ = 1, where the slope is infinite: no slope
     rigid, corner = call((0.01, 0.0, 1.0, 1.0), (0.0, 2e-6 * stiffness / 0.3, 1.0, 1.0))
     assert rigid[0] == pytest.approx(table.evaluate({**CASE, "k": None}).mu_macro, rel=1e-14)
     assert rigid[2] == 0.0

@@ -39,7 +39,7 @@ def _value(coef: Array, p: int, u: float, w: float) -> float:
 
 
 def at(coef: Array, cells: tuple[int, int], x: float, z: float) -> float:
-    """Value at (x, z) in [0, 1]^2 of cells as :func:`cells_2d` lays them out."""
+    """Value at (x, z) in [0, 1]^2 of cells in the layout of :func:`cells_2d`."""
     i, j = min(int(x * cells[0]), cells[0] - 1), min(int(z * cells[1]), cells[1] - 1)
     return float(_value(coef, i * cells[1] + j, 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0))
 
@@ -159,7 +159,7 @@ def _cell(blocks: Array, patches: int, block: int, a: float, b: float) -> tuple[
 @pytest.mark.parametrize("index", range(len(CHARTS)), ids=charts.NAMES)
 @pytest.mark.parametrize("cells", [(1, 1), (2, 7), (7, 2), (40, 1)])
 def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cells: tuple[int, int]) -> None:
-    """As evaluation counts them: the first cell holds the near end, the last the far one, none is left out."""
+    """Numbering in the evaluation: the first cell contains the low end, the last the high end, none is skipped."""
     none = np.empty(0)
     blocks = block_rows([Block(none, none, none, cells, none)] * len(CHARTS))
     size = cells[0] * cells[1]
@@ -183,7 +183,7 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cell
 
 
 def test_no_coordinate_makes_a_cell_of_another_table() -> None:
-    """Whatever comes in, a patch that exists is read."""
+    """For any input, an existing patch is read."""
     none = np.empty(0)
     blocks = block_rows([Block(none, none, none, (3, 3), none)] * len(CHARTS))
     for index in range(charts.OTHER + 1):

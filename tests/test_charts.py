@@ -1,4 +1,4 @@
-"""The atlas: a point's place and the place's point undo each other, in every block, on nodes, edges and seams."""
+"""The atlas: point to place and place to point are inverse, in every block, on nodes, edges and seams."""
 
 import math
 from pathlib import Path
@@ -48,19 +48,19 @@ def _form(block: Any, v: Array, y: Array, phi: Array) -> Any:
 
 
 def along(axis: Axis) -> Array:
-    """Nodes of an axis, and points that crowd towards its edges; the edges themselves are other blocks' too."""
+    """Nodes of an axis, and points dense near its edges; without the edges, which other blocks share."""
     width = axis.high - axis.low
     return np.concatenate([nodes(17, axis.low, axis.high), axis.low + width * np.array(PARTS)])
 
 
 def points(table: Surrogate, index: int) -> tuple[Array, Array, Array, Array]:
-    """(a, b) in the file's coordinates and the points (v~, y~) there, of those that doubles hold."""
+    """(a, b) in the file's coordinates and the points (v~, y~) there that are representable as doubles."""
     chart = CHARTS[index]
     a, b = (x.ravel() for x in np.meshgrid(along(chart.a), along(chart.b), indexing="ij"))
     v, y, _ = charts.point(chart, a, b, table.border)
     crit = table.v_tilde_crit(y)
     keep = (v > 1e-280) & np.isfinite(y) & (y > 1e-140) & (v < 1e140)
-    # on the wrong side of the border, or of the cut between stick_slip_mid and the corner, another block answers
+    # on the wrong side of the border, or of the cut between stick_slip_mid and the corner, another block applies
     if chart.regime == charts.CONTINUOUS:
         keep &= v >= crit
     elif index == charts.S_MID:
@@ -75,7 +75,7 @@ def test_place_and_point_undo_each_other(table: Surrogate, index: int) -> None:
     chart = CHARTS[index]
     a, b, v, y = points(table, index)
     block, (found_a, found_b, phi) = _locate(v, y, *table.border.arrays)
-    # a point on an edge belongs to either block that has it
+    # a point on an edge belongs to any block with this edge
     inside = (a > chart.a.low) & (a < chart.a.high) & (b > chart.b.low + 1e-9) & (b < chart.b.high * (1 - 1e-9))
     away = np.minimum(a - chart.a.low, chart.a.high - a) > 1e-11 * max(abs(chart.a.low), abs(chart.a.high))
     assert np.all((block == index)[inside & away])
@@ -119,7 +119,7 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
 
 
 def test_selections_and_branches_place_a_point_alike(table: Surrogate) -> None:
-    """`place` selects what `locate` branches to; `form` gives the same bits as `place`, common points and seams."""
+    """`place` selects where `locate` branches; `form` gives the same bits as `place`, at common points and seams."""
     rng = np.random.default_rng(3)
     n = 40_000
     v, y = 10.0 ** rng.uniform(-12.0, 8.0, n), 10.0 ** rng.uniform(-8.0, 5.0, n)
@@ -160,7 +160,7 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
 
 
 def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate) -> None:
-    """mu~ = base + factor q with q from the file: nodes are met, to the table's error."""
+    """mu~ = base + factor q with q from the file: exact at nodes, to the table's error."""
     for index, (chart, part) in enumerate(zip(CHARTS, table.table.blocks, strict=True)):
         a, b = np.meshgrid(part.a, part.b, indexing="ij")
         v, y, eta = charts.point(chart, a, b, table.border)

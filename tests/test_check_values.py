@@ -1,4 +1,4 @@
-"""The check values for ports: made of the references alone, met by the solver, and by every table within its bounds."""
+"""The check values for ports: made of the references only; the solver and, within bounds, every table agree."""
 
 import csv
 import importlib
@@ -18,7 +18,7 @@ INPUTS = ("mu0", "Fz", "k", "y0", "omega", "v0")
 
 
 def rows(*quantities: str) -> list[dict[str, Any]]:
-    """Rows of these quantities, numbers as floats; what is empty is left out."""
+    """Rows of these quantities, numbers as floats; empty cells are left out."""
     with FILE.open(newline="", encoding="utf-8") as stream:
         found = [row for row in csv.DictReader(stream) if row["quantity"] in quantities]
     assert found

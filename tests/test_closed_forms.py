@@ -121,7 +121,7 @@ def critical_of(y: float) -> float:
     return border(y)[1]
 
 
-# largest deviations as the paper's own ranges see them, from the full model; docs/validation.md has them all
+# largest deviations from the full model in the ranges of the paper; docs/validation.md has all of them
 @pytest.mark.parametrize(
     ("formula", "deviations"),
     [
@@ -152,7 +152,7 @@ def test_a_formula_of_the_border_keeps_its_digits_at_both_ends(formula) -> None:
     assert found[0] == 0.0
     assert np.all(np.diff(found[1:]) > 0.0)
     assert np.all(np.isfinite(found))
-    growth = 1e100 if formula is closed_forms.border_24 else 1e50  # the others go like the square root
+    growth = 1e100 if formula is closed_forms.border_24 else 1e50  # the others grow like the square root
     assert float(formula(1e300)) == pytest.approx(growth * float(formula(1e200)), rel=1e-14)
     power = {closed_forms.border_26: 1e3, closed_forms.border_large_amplitude: 1e3, closed_forms.border_27: 1e15}
     assert float(formula(1e-9)) == pytest.approx(float(formula(1e-15)) * power.get(formula, 1e12), rel=1e-12)
@@ -199,14 +199,14 @@ def test_a_formula_for_continuous_sliding_is_off_by_what_was_measured(formula, d
 def test_the_value_at_the_border_has_the_coefficient_five_sixty_fourths() -> None:
     y = np.array([0.05, 0.1])
     left = [(1.0 - critical_of(float(a)) - 0.25 * a * a) / a**4 for a in y]
-    # what is left of O(y~^2) goes with the next order
+    # the remaining O(y~^2) term vanishes with the next order
     assert (4.0 * left[0] - left[1]) / 3.0 == pytest.approx(-5.0 / 64.0, rel=1e-4)
 
 
 def normalised(y: float, x: np.ndarray) -> np.ndarray:
     """(mu~ - static) / (critical - static) of the full model at v~ = x v~crit."""
     crit, top = border(y)
-    # of the deficits, in which small amplitudes keep their digits
+    # from the deficits 1 - mu~, which keep their digits at small amplitudes
     loss = 1.0 - float(closed_forms.static_limit(y)) if y > 1e-3 else 0.5 * y * y * (1.0 + 0.25 * y * y)
     deficit = np.array([solve(float(share) * crit, y).deficit for share in x])
     return (loss - deficit) / (loss - (1.0 - top if y > 1e-3 else solve(crit * (1.0 + 1e-15), y).deficit))
@@ -221,7 +221,7 @@ def test_the_master_curve_tends_to_its_limit() -> None:
 
 
 @pytest.mark.parametrize(("y", "deviation"), [(0.1, 0.01424), (0.3, 0.01372), (0.5, 0.01656), (0.9, 0.1254)])
-def test_equation_28_is_too_low_but_for_the_last_of_the_way(y: float, deviation: float) -> None:
+def test_equation_28_is_too_low_except_near_the_border(y: float, deviation: float) -> None:
     x = np.linspace(0.005, 1.0, 200)
     off = closed_forms.master_curve(x) - normalised(y, x)
     assert off.min() == pytest.approx(-deviation, rel=5e-3)

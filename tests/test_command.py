@@ -1,4 +1,4 @@
-"""The command ``mumacro``: answers with units, remedies for wrong words, exit codes."""
+"""The command ``mumacro``: answers with units, advice for wrong arguments, exit codes."""
 
 import json
 import math
@@ -24,7 +24,7 @@ def tightest():
 
 
 def said(capsys, code, *words):
-    """What ``mumacro WORDS`` prints; on stderr, in one line, when it fails."""
+    """The output of ``mumacro WORDS``; from stderr, one line, if it fails."""
     assert main(words) == code
     found = capsys.readouterr()
     if code:
@@ -94,7 +94,7 @@ def test_a_table_is_picked_by_path_or_tolerance(capsys, tables_dir, name):
         (CASE.replace("0.01", "1e999"), 2, "v0 must be finite and >= 0"),
     ],
 )
-def test_wrong_words_get_the_remedy_in_one_line(capsys, words, code, parts):
+def test_wrong_arguments_get_advice_in_one_line(capsys, words, code, parts):
     assert parts in said(capsys, code, words)
 
 
@@ -226,7 +226,7 @@ def test_export_is_that_of_the_builder(capsys, tmp_path, tables_dir):
     assert out.read_text().startswith("v_tilde,")
 
 
-def test_a_reader_that_has_enough_is_no_error(repository):
+def test_a_closed_output_pipe_is_no_error(repository):
     command = [sys.executable, "-m", "mumacro", "law", CASE.replace("v0=0.01", ""), "--from", "1e-4", "--to", "1"]
     process = subprocess.Popen(
         [*command, "--points", "20000"], cwd=repository, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -246,7 +246,7 @@ def test_a_reader_that_has_enough_is_no_error(repository):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name):
     assert suggestion(name) == suggestion(f" {name.lower()} ") == name
-    assert suggestion(name.upper()) == ("Fz" if name == "f" else name)  # a capital F is a force
+    assert suggestion(name.upper()) == ("Fz" if name == "f" else name)  # F is a force
     assert scale_of(name, SI[name][0]) == (1.0, 1.0)
 
 

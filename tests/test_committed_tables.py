@@ -1,4 +1,4 @@
-"""The committed tables: tolerance, bounds, seams, monotony and slopes against fresh solves and the reference."""
+"""The committed tables: tolerance, bounds, seams, monotony and slopes, compared with fresh solves and the reference."""
 
 import math
 import threading
@@ -51,7 +51,7 @@ def test_reference_points_lie_within_tolerance_and_bound(table, reference):
     assert np.all(error <= bound)
     regime = np.array(REGIMES)[REGIME_OF_SOURCE[source]]
     wrong = regime != reference.regime
-    # the label can only be wrong as close to the border as the stored border is right
+    # the label can be wrong only within the error of the stored border
     distance = np.abs(reference.v / table.v_tilde_crit(reference.y) - 1.0)
     assert np.all(distance[wrong] <= table.border.max_rel_error)
 
@@ -67,7 +67,7 @@ def test_fresh_solves_lie_within_tolerance_and_bound(table, sweep, case):
     assert np.all(error <= bound + SOLVER_NOISE * truth)
 
 
-def test_bounds_are_no_blanket(table, sweep):
+def test_bounds_are_not_excessive(table, sweep):
     """In each block the bound is within a factor of 30 of the largest error there."""
     v, y = draw("random", 30_000, table, seed=5)
     truth = sweep.solve("full", v, y)["mu_ratio"]
@@ -76,7 +76,7 @@ def test_bounds_are_no_blanket(table, sweep):
     for code in np.unique(source):
         at = source == code
         if SOURCES[code] in {"tail_fast", "corner"} or at.sum() < 100:
-            continue  # a closed form errs by rounding; the corner's bound also covers the last digit of y~
+            continue  # closed forms have rounding errors only; the corner's bound also covers the last digit of y~
         ratios.append(np.median(bound[at]) / max(np.abs(mu - truth)[at].max(), 1e-15))
     assert np.median(ratios) <= 30.0
 
@@ -90,7 +90,7 @@ def test_slopes_go_on_across_seams(fine):
 
 
 def test_mu_rises_with_speed_and_falls_with_amplitude(table):
-    # along lines 1e-2.7 apart in the logarithm, across all seams; steps smaller than the tolerance are not resolved
+    # along lines 1e-2.7 apart in the logarithm, across all seams; smaller steps are not resolved
     assert monotony(table) <= 1e-15 + (table.tolerance if table.tolerance > 1e-9 else 0.0)
 
 
@@ -185,7 +185,7 @@ def test_power_and_stick_fraction(fine, sweep, case):
 
 
 def inside(table, sweep, v, y):
-    """Whether fresh solves lie within the bounds of power and stick fraction; the bounds, too."""
+    """Whether fresh solves lie within the bounds of power and stick fraction; and the bounds."""
     solved = sweep.solve("full", v, y)
     power, of_power = table.power_with_bound(v, y)
     stick, of_stick = table.stick_fraction_with_bound(v, y)
@@ -211,7 +211,7 @@ def test_bounds_of_power_and_stick_fraction_hold_on_the_border(table, sweep):
         for side in (-1.0, 1.0):
             _, of_stick = inside(table, sweep, crit * (1.0 + side * distance), y)
             assert of_stick.max() <= 0.7 * math.sqrt(table.border.max_rel_error + 2e-15) + 30.0 * table.tolerance
-    # and far above it nothing is uncertain
+    # far above it the bound is zero
     assert table.stick_fraction_with_bound(2.0 * crit, y)[1].max() == 0.0
 
 
@@ -228,7 +228,7 @@ def test_stick_fraction_of_the_reference_lies_within_its_bound(table, reference)
     assert np.all(np.abs(stick - reference.stick_fraction) <= bound + STICK_NOISE)
 
 
-def test_bounds_of_power_and_stick_fraction_are_no_blanket(table, sweep):
+def test_bounds_of_power_and_stick_fraction_are_not_excessive(table, sweep):
     v, y = draw("random", 30_000, table, seed=6)
     solved = sweep.solve("full", v, y)
     power, of_power = table.power_with_bound(v, y)

@@ -1,4 +1,4 @@
-"""Derivatives inside JAX, PyTorch and OpenMDAO: checked by each library's own checker, limits and illegal cases too."""
+"""Derivatives inside JAX, PyTorch and OpenMDAO: each library's own checker, limits and illegal cases."""
 
 import importlib
 import math
@@ -21,7 +21,7 @@ POINTS = np.array([[0.1, 0.5], [2.0, 1.0], [1e-3, 0.7], [0.3, 30.0]])
 
 
 def loaded(name: str) -> ModuleType:
-    """The library, or a skip; what it warns of while it loads is its own affair."""
+    """The library, or a skip; warnings during its import are ignored."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return pytest.importorskip(name)
@@ -32,7 +32,7 @@ def table() -> Surrogate:
     return Surrogate.open(1e-10, threads=1)
 
 
-# --- what both differentiators ask the table ------------------------------------------------------------
+# --- slopes of the table, for all libraries ------------------------------------------------------------
 
 
 def test_slopes_are_those_of_the_surrogate(table: Surrogate) -> None:
@@ -50,7 +50,7 @@ def test_slopes_are_those_of_the_surrogate(table: Surrogate) -> None:
 @pytest.mark.parametrize("y", [0.3, 0.9, 1.2, 5.0])
 def test_slopes_at_rest_are_the_limit_of_those_beside_it(table: Surrogate, name: str, y: float) -> None:
     speeds = np.array([0.0, 1e-7, 1e-6])
-    order = math.sqrt(10.0) if y < 1.0 else 10.0  # the next term grows with the root of the speed, or with the speed
+    order = math.sqrt(10.0) if y < 1.0 else 10.0  # the next term grows with sqrt(speed) or with the speed
     by_speed, by_amplitude = quantities(table)[name].slopes(speeds, np.full(3, y))
     if name == "stick_fraction" and y < 1.0:
         assert by_speed[0] == -math.inf
@@ -218,7 +218,7 @@ def test_torch_transformations_compose(torch: ModuleType, in_torch: Any, table: 
     np.testing.assert_array_equal(in_torch.mu_ratio(v[:, None], y).numpy(), plane.numpy())
     slopes = vmap(grad(in_torch.power))(v[:2], y)
     np.testing.assert_array_equal(slopes.numpy(), quantities(table)["power"].slopes(v.numpy()[:2], y.numpy())[0])
-    single = torch.tensor([0.1, 0.5], requires_grad=True)  # of single precision
+    single = torch.tensor([0.1, 0.5], requires_grad=True)  # single precision
     ratio = in_torch.mu_ratio(single, 2.0)
     assert ratio.dtype == torch.float64
     ratio.sum().backward()

@@ -1,4 +1,4 @@
-"""From SI inputs to dimensionless groups: what is legal, what an illegal value is told, and every edge of the range."""
+"""From SI inputs to dimensionless groups: legal values, messages for illegal values, and the ends of the range."""
 
 import math
 from fractions import Fraction
@@ -44,7 +44,7 @@ def exactly(numerator: list[float], denominator: list[float]) -> float:
 
 
 def close(found: float, expected: float) -> bool:
-    """Equal to a few rounding errors, or to the last digit where numbers run out near zero, or both infinite."""
+    """Equal to a few rounding errors, or to the last digit of denormal numbers, or both infinite."""
     if math.isinf(expected) or math.isinf(found):
         return min(found, expected) > 1.797e308
     return abs(found - expected) <= 8e-16 * expected + 5e-324
@@ -66,7 +66,7 @@ def test_groups_are_right_whatever_overflows_on_the_way(
     assert (whole.v_tilde[0], whole.y_tilde[0], whole.length_scale[0]) == (
         found.v_tilde, found.y_tilde, found.length_scale,
     )  # fmt: skip
-    # what the quick way says of a whole column is the same, or nothing
+    # the fast path for whole columns gives the same result, or none
     v, y = np.empty(1), np.empty(1)
     odd = group_columns(*(np.array([x]) for x in (mu0, Fz, k, y0, omega, v0)), v, y)
     assert odd == (v[0] == -1.0)
@@ -93,7 +93,7 @@ def test_groups_at_the_ends_of_double_precision(
     found_v, found_y = found.v_tilde, found.y_tilde
     exact_v = exactly([inputs[5], inputs[2]], [inputs[0], inputs[1], inputs[4]])
     exact_y = exactly([inputs[3], inputs[2]], [inputs[0], inputs[1]])
-    assert exact_v == pytest.approx(v, rel=1e-3)  # denormal inputs have few digits of their own
+    assert exact_v == pytest.approx(v, rel=1e-3)  # denormal inputs have few digits
     assert exact_y == pytest.approx(y, rel=1e-3)
     assert close(found_v, exact_v)
     assert close(found_y, exact_y)
@@ -120,7 +120,7 @@ def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
     assert found.mu_ratio == pytest.approx(math.sqrt((1.0 - y) * (1.0 + y)) if y < 1.0 else 0.0, rel=5e-16, abs=0.0)
     assert found.regime == "static"
     assert found.source == "static_limit"
-    # the last digit of y~ = y0 k/(mu0 Fz) counts as its root on the edge of the static limit, and nowhere else
+    # the last digit of y~ = y0 k/(mu0 Fz) enters by its root only at the edge of the static limit
     assert 0.0 <= found.error_bound < (1e-7 if y == 1.0 else 1e-12)
 
 
@@ -159,7 +159,7 @@ def test_rigid_contact_without_drive_has_no_friction(table: Surrogate) -> None:
 @pytest.mark.parametrize(
     ("inputs", "expected"),
     [
-        # y~ underflows: nothing happens; y~ overflows while v~ overflows too: only their ratio counts
+        # y~ underflows: no effect of the oscillation; y~ and v~ both overflow: only their ratio matters
         ({"y0": 1e-300, "k": 1e-300, "Fz": 1e300}, 1.0),
         ({"y0": 1e200, "k": 1e200, "v0": 1e200, "omega": 1.0}, 0.8346268416740731),  # r = 1: 1/AGM(1, sqrt 2)
         ({"y0": 1e300, "k": 1e300, "v0": 1e-300, "omega": 1e300}, 0.0),
@@ -184,7 +184,7 @@ def test_any_legal_input_has_a_finite_answer_with_a_bound(
     found = table.evaluate(inputs)
     assert 0.0 <= found.mu_ratio <= 1.0
     assert 0.0 <= found.mu_macro <= mu0
-    assert 0.0 <= found.error_bound <= mu0  # a wider bound would say nothing
+    assert 0.0 <= found.error_bound <= mu0  # a larger bound would be useless
     assert not math.isnan(found.length_scale)
     whole = table.evaluate({**inputs, "mu0": np.array([mu0, mu0])})
     assert whole.mu_ratio.tolist() == [found.mu_ratio] * 2
@@ -197,7 +197,7 @@ exponent = st.integers(min_value=-60, max_value=60)
 @settings(max_examples=300, deadline=None)
 @given(a=exponent, b=exponent, c=exponent, v=st.floats(1e-6, 1e6), y=st.floats(1e-6, 1e6))
 def test_only_the_two_groups_matter(table: Surrogate, a: int, b: int, c: int, v: float, y: float) -> None:
-    """Scaling the inputs by powers of two so that v~ and y~ stay leaves mu~ as it is, to the last digit."""
+    """Scaling the inputs by powers of two at constant v~ and y~ does not change mu~, to the last digit."""
     plain = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=1.0, v0=v)
     length, force, time = 2.0**a, 2.0**b, 2.0**c
     scaled = table.evaluate(
@@ -220,7 +220,7 @@ def test_answer_agrees_with_the_exact_solver(table: Surrogate) -> None:
     assert found.v_tilde == pytest.approx(0.01 / (l0 * 1.3e5), rel=1e-15)
 
 
-# --- what is illegal, and what it is told -------------------------------------------------------------
+# --- illegal values and their messages ---------------------------------------------------------------
 
 
 def test_fields_bounds_and_units_name_the_same() -> None:
@@ -274,7 +274,7 @@ def test_an_illegal_value_of_an_array_affects_only_its_case(
     for name, values in numbers.items():
         assert np.isnan(values).tolist() == [False, True, False], name
         assert values[0] == values[2]
-    # a scalar that is illegal beside an array spoils every case
+    # an illegal scalar together with an array makes every case illegal
     for other in FIELDS:
         if other != field:
             spoilt = table.evaluate(**{**PLAIN, field: bad, other: [PLAIN[other]] * 2}, **asked)
@@ -293,7 +293,7 @@ def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> No
         assert table.evaluate(**{**PLAIN, field: -0.0}).mu_macro == table.evaluate(**{**PLAIN, field: 0.0}).mu_macro
 
 
-# --- what must be said --------------------------------------------------------------------------------
+# --- required inputs ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("field", [name for name in FIELDS if name != "omega"])

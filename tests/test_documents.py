@@ -1,4 +1,4 @@
-"""Documents: links lead somewhere, metadata agrees with the package, terms are those of the code."""
+"""Documents: links are valid, metadata agrees with the package, terms agree with the code."""
 
 import json
 import re
@@ -44,7 +44,7 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch) -> None:
     text = "\n".join(_operations(create_app(Settings(tables=(ROOT / "tables",))).openapi()))
     for name in ("power.saved", "results[].roots[].settling.periods", "curves[].border[].value", "errors[].reason"):
         assert f"| `{name}`" in text
-    # an object is followed by its fields, unless the description leaves them open
+    # an object is followed by its fields, unless the description does not fix them
     rows = re.findall(r"^\| `(\S+?)`(?:, required)? \| (.*?) \|", text, re.MULTILINE)
     objects = [place for place, (_, kind) in enumerate(rows) if re.search(r"\bobject\b(?! of)", kind)]
     bare = {rows[place][0] for place in objects if not rows[place + 1][0].startswith(rows[place][0])}
@@ -86,7 +86,7 @@ def test_the_folds_are_those_on_the_page(surrogate, monkeypatch) -> None:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if turning_points(surrogate, middle) else (middle, high)
     assert high == pytest.approx(float(born), abs=0.005)
-    # the minimum moves from where it is born to its place at large r
+    # the minimum moves from its first position to the one at large r
     assert turning_points(surrogate, high)[0][0] == pytest.approx(float(last), abs=0.05)
     assert turning_points(surrogate, 1e8)[0][0] == pytest.approx(float(first), abs=0.05)
 

@@ -1,4 +1,4 @@
-"""The examples do what they say, each where its tool is installed."""
+"""The examples run and give the documented results, if their tools are installed."""
 
 import csv
 import importlib.util
@@ -33,7 +33,7 @@ def run(repository, *command):
 
 
 def need(name, *modules):
-    """Skip unless a program, or Python packages, are there."""
+    """Skip unless a program, or Python packages, are installed."""
     if name is not None and shutil.which(name) is None:
         pytest.skip(f"{name} is not installed")
     for module in modules:
@@ -98,7 +98,7 @@ def test_the_spreadsheets_addresses(repository, live_server, surrogate):
 
 
 def test_libreoffice_calc(repository, live_server, surrogate, tmp_path):
-    """The formulas and the linked table of spreadsheet.md, typed into a sheet, and what its cells then show."""
+    """The formulas and the linked table of spreadsheet.md, entered into a sheet, and the values of its cells."""
     need("soffice")
     text = (repository / "examples" / "spreadsheet.md").read_text("utf-8")
     text = text.replace("http://127.0.0.1:8000", live_server.url)
@@ -122,7 +122,7 @@ def test_libreoffice_calc(repository, live_server, surrogate, tmp_path):
 
 
 def in_calc(cells, link, below, folder):
-    """What LibreOffice Calc shows, as rows of text, after cells were typed and a table was linked below some rows."""
+    """The sheet of LibreOffice Calc, as rows of text, with cells entered and a table linked below some rows."""
     profile, out = folder / "profile", folder / "shown.csv"
 
     def quoted(text):
@@ -222,5 +222,5 @@ def test_least_power(repository, tables_dir):
     )
     text = run(repository, sys.executable, "-c", script, table)
     assert number(r"WORST ([\d.e-]+)", text) < 1e-4
-    # the best of 400 frequencies, each with the amplitude that just meets the target
+    # the best of 400 frequencies, each with the amplitude that meets the target exactly
     assert found == pytest.approx(number(r"GRID ([\d.e-]+)", text), rel=1e-4)

@@ -1,4 +1,4 @@
-"""``python -m builder export``: every format read back by what it is for, the same numbers, the same bytes."""
+"""``python -m builder export``: every format read back by its program: the same numbers, the same bytes."""
 
 import csv
 import json

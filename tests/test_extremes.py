@@ -1,4 +1,4 @@
-"""The solver over all positive doubles: limits, laws of scale at both ends, and a second way to the same cycle."""
+"""The solver over all positive doubles: limits, scaling laws at both ends, and a second method for the same cycle."""
 
 import math
 from typing import Any
@@ -74,7 +74,7 @@ def test_the_corners_of_the_double_range(v: float, y: float) -> None:
 
 @pytest.mark.parametrize("y", [1.0 + 2.3e-16, 1.001, 1.2, 2.0, 10.0, 1.4e5, 1e13, 1e20])
 def test_mu_is_linear_in_creeping_speeds_above_one(y: float) -> None:
-    # the secant step underflowed below v~ = 1e-147: mu~ was up to 11 % off, as success
+    # the secant step underflowed below v~ = 1e-147: mu~ was up to 11 % off, with status "success"
     expected = solve(1e-60, y)
     for v in (10.0**exponent for exponent in range(-62, -307, -7)):
         found = solve(v, y)
@@ -161,7 +161,7 @@ def test_layers_at_the_turns_depend_on_one_number(x: float) -> None:
 
     expected = layer(1e20)
     for y in (1e12, 1e13, 9e13, 1.1e14, 1e16, 1e40):
-        # y~/v~ multiplies what rounding leaves of mu~ y~/v~ = (2/pi) ln(4 y~/v~) + G
+        # y~/v~ multiplies the rounding error of mu~ y~/v~ = (2/pi) ln(4 y~/v~) + G
         rounding = 4e-15 * (math.log(4.0 * math.sqrt(y) / x) + abs(expected))
         assert layer(y) == pytest.approx(expected, abs=1.0 / y + rounding)
 
@@ -192,7 +192,7 @@ def test_no_step_where_rigid_contact_takes_over() -> None:
 
 
 def test_the_smallest_slip_speed_is_seen_in_stiff_steps() -> None:
-    # stiff steps passed the turn by: 1e12 instead of 3e7
+    # stiff steps once missed the turn: 1e12 instead of 3e7
     for v, y in ((3e7, 1e12), (300.0, 200.0), (1e3, 1e5)):
         assert solve(v, y).min_slip_speed == pytest.approx(v, rel=5e-3)
 
@@ -237,7 +237,7 @@ def test_mu_falls_with_amplitude_over_all_doubles(v: float, sweep: Sweep) -> Non
 
 
 def through_the_other_section(v: float, y: float, eta: float) -> tuple[float, float, float]:
-    """mu~ by the section that the solver takes, mu~ by the other one, 1 - mu~; NaN where the other one has no root."""
+    """mu~ by the section that the solver uses, mu~ by the other one, 1 - mu~; NaN if the other one has no root."""
     w, out, orbit, res = workspace()
     if stick_slip(v, y, eta, math.nan, w, out, orbit) != OK:
         return math.nan, math.nan, math.nan

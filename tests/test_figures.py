@@ -1,4 +1,4 @@
-"""The figures, of cycles and of the paper: drawn by one command, the committed ones too, small enough for a page."""
+"""The figures, of cycles and of the paper: drawn by one command, equal to the committed ones, small files."""
 
 import doctest
 import json
@@ -30,7 +30,7 @@ def test_the_committed_figure_is_the_one_that_is_drawn(drawn, repository, name) 
     assert committed.stat().st_size < 120_000
     ours, theirs = (matplotlib.image.imread(path)[..., :3] for path in (drawn / committed.name, committed))
     assert ours.shape == theirs.shape
-    # other versions of fonts and of the drawing library move edges by a pixel, nothing else
+    # other versions of fonts and of the drawing library move edges by one pixel at most
     assert float(np.abs(ours - theirs).mean()) < 0.02
 
 

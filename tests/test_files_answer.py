@@ -1,4 +1,4 @@
-"""One record batch: the bits of the surrogate, every type of column, units, and names that must not be mistaken."""
+"""One record batch: the bits of the surrogate, every type of column, units, and ambiguous names."""
 
 import decimal
 import math

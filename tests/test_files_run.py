@@ -1,4 +1,4 @@
-"""``mumacro eval``: formats in and out, rejects, going on after a stop, and every known way to lose rows silently."""
+"""``mumacro eval``: input and output formats, rejects, resuming after a stop, and every known cause of lost rows."""
 
 import csv
 import gzip
@@ -73,7 +73,7 @@ def rejects_of(path):
 
 
 def ran(capsys, code, *words):
-    """What ``mumacro eval WORDS`` says; in one line when it fails."""
+    """The output of ``mumacro eval WORDS``; one line if it fails."""
     assert main(["eval", *map(str, words)]) == code
     said = capsys.readouterr()
     assert "Traceback" not in said.err
@@ -130,7 +130,7 @@ def test_columns_of_parquet_keep_their_types(tmp_path, table):
     assert found.select(before.schema.names).equals(before)
     assert pa.types.is_dictionary(found.schema.field("regime").type)
     assert pa.types.is_dictionary(found.schema.field("source").type)
-    evaluate_files([source], tmp_path / "out.ndjson", table)  # and as text: JSON without anything that is none
+    evaluate_files([source], tmp_path / "out.ndjson", table)  # and as text: valid JSON
     first = read(tmp_path / "out.ndjson")[0]
     assert (first["text"], first["list"], first["money"], first["flag"]) == ("µ,\n", [1, 2], 1.0, True)
     evaluate_files([source], tmp_path / "out.csv", table)
@@ -322,7 +322,7 @@ def test_mixed_types_are_reported_in_one_line(tmp_path, capsys):
 def test_a_run_that_is_stopped_between_naming_the_output_and_clearing_up_ends_well(
     tmp_path, table, monkeypatch, kind, stop, part_rows
 ):
-    """In between a file after the other goes; whichever was the last to go, the same command goes on."""
+    """Files are deleted one after the other; after any of these steps the same command resumes."""
     source, out = write(cases(500), tmp_path / f"cases.{kind}"), tmp_path / f"out.{kind}"
     removed = []
 
@@ -338,7 +338,7 @@ def test_a_run_that_is_stopped_between_naming_the_output_and_clearing_up_ends_we
         with suppress(KeyboardInterrupt):
             evaluate_files([source], out, table, part_rows=part_rows)
     if len(removed) <= stop:
-        return  # one part only: done before it could be stopped there
+        return  # one part only: complete before the stop
     before = out.read_bytes()
     assert evaluate_files([source], out, table, part_rows=part_rows).rows == 500
     assert out.read_bytes() == before
@@ -355,7 +355,7 @@ def test_a_run_that_is_killed_before_its_list_is_written_resumes(tmp_path, table
     assert left(tmp_path) == ["cases.csv", "out.csv"]
 
 
-def test_two_runs_to_one_output_do_not_meet(tmp_path, capsys, table):
+def test_a_second_run_to_one_output_is_refused(tmp_path, capsys, table):
     source = write(cases(3000), tmp_path / "cases.csv")
     said = []
 
@@ -376,7 +376,7 @@ def test_a_folder_of_parts_of_another_run_is_unchanged(tmp_path, capsys):
     assert (tmp_path / "out.csv.parts" / "precious.txt").read_text() == "mine"
 
 
-# --- going on -----------------------------------------------------------------------------------------
+# --- resuming ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["csv", "csv.gz", "ndjson", "parquet"])
@@ -472,7 +472,7 @@ def test_a_full_disk_is_reported_in_one_line_and_the_run_resumes_later(tmp_path,
     assert out.read_bytes() == (tmp_path / f"whole.{kind}").read_bytes()
 
 
-# --- wrong words and files ----------------------------------------------------------------------------
+# --- wrong arguments and files ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -543,5 +543,5 @@ def test_memory_does_not_grow_with_the_file(tmp_path, repository):
         )
         return int(done.stdout.split()[-1])
 
-    # 1.2 million rows more are 130 MB of numbers
+    # 1.2 million more rows are 130 MB of numbers
     assert peak(1_500_000) - peak(300_000) < 100

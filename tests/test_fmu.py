@@ -1,4 +1,4 @@
-"""``--format fmu`` and ``fmu3``: FMPy finds nothing wrong, simulates them, and gets Python's values and derivatives."""
+"""``--format fmu`` and ``fmu3``: FMPy validates and simulates them, with Python's values and derivatives."""
 
 import os
 import shutil
@@ -37,7 +37,7 @@ def unit(request, units):
 
 @pytest.fixture
 def fmpy(compilers):
-    """FMPy, and a compiler that has made the unit's binary."""
+    """FMPy, and a compiler that has built the unit's binary."""
     compilers.compiler("gcc")
     pytest.importorskip("fmpy.validation", reason="fmpy is not installed")
     import fmpy

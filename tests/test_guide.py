@@ -1,4 +1,4 @@
-"""What the documents show runs as it stands: Python sessions, commands, and questions to a live service."""
+"""The examples in the documents run unchanged: Python sessions, commands, and requests to a live service."""
 
 import doctest
 import os
@@ -73,5 +73,5 @@ def test_commands(page: Path, commands: dict[str, str], tmp_path: Path, request:
             assert done.returncode == 0, done.stdout + done.stderr
             (words, numbers), (shown_words, shown_numbers) = parts(done.stdout), parts(shown)
             assert words == shown_words, command
-            # the last digits are those of the processor; bounds of errors are of rounding size
+            # the last digits depend on the processor; error bounds are of rounding size
             assert numbers == pytest.approx(shown_numbers, rel=1e-9, abs=2e-13), command

@@ -1,4 +1,4 @@
-"""One policy, safe to call: a bad scalar is refused by name, a bad value of an array is NaN, and nothing crashes."""
+"""One policy for bad input: a bad scalar is refused by name, a bad array value gives NaN, and nothing crashes."""
 
 import json
 import math
@@ -122,7 +122,7 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
 def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
-    """A masked value is unknown: it is not answered with whatever lies beneath the mask."""
+    """A masked value is unknown: the value under the mask is not evaluated."""
     masked = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
     found = table.mu_ratio(masked, 0.5)
     assert np.isnan(found).tolist() == [False, True, False]
@@ -234,8 +234,8 @@ print("survived")
 """
 
 
-def test_any_bits_at_all_do_no_harm(repository: Path) -> None:
-    """In a process of its own, which would be gone if a kernel read where it must not."""
+def test_random_bits_do_no_harm(repository: Path) -> None:
+    """In a separate process, which would crash if a kernel read invalid memory."""
     command = [sys.executable, "-X", "faulthandler", "-W", "error", "-c", SCRIPT]
     environment = {**os.environ, "PYTHONPATH": str(repository)}
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)

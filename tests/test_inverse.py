@@ -1,4 +1,4 @@
-"""The inverse question and the friction law: roots against the forward answer, folds, reach, border, approximations."""
+"""The inverse problem and the friction law: roots against the forward answer, folds, reach, border, approximations."""
 
 import math
 
@@ -40,7 +40,7 @@ def test_the_forward_answer_is_inverted(surrogate, case, unknown):
     forward = surrogate.evaluate(**case)
     solution = solve_for(surrogate, unknown, forward.mu_macro, others(case, unknown))
     if solution.constant or not solution.roots[0]:
-        # to the surrogate's own error the input has no influence here, or its end is not told from the limit
+        # within the surrogate's error the input has no influence here, or its end equals the limit
         edge = min(abs(forward.mu_macro - solution.reach.mu_min), abs(forward.mu_macro - solution.reach.mu_max))
         assert edge <= 4.0 * forward.error_bound + 1e-9 * case["mu0"]
         return
@@ -62,7 +62,7 @@ def test_a_root_is_enclosed_to_the_tables_error(surrogate):
 
 
 def test_an_enclosure_on_a_plateau_spans_it(surrogate):
-    # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, whatever the stiffness from a hundredth of this one on
+    # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of this one on
     case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
     root = only_root(solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, others(case, "k")))
     assert root.low < 10.0

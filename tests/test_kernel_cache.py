@@ -1,4 +1,4 @@
-"""Compiled kernels on the disk: whose they are, and what becomes of them when they are damaged or cannot be kept."""
+"""Compiled kernels on disk: ownership, damaged files, and folders that cannot be written."""
 
 import os
 import stat
@@ -24,7 +24,7 @@ def double(x: float) -> float:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where kernels of this test are kept."""
+    """The folder for kernels of this test."""
     monkeypatch.setattr(kernel_cache, "cache_folder", lambda *_: tmp_path)
     return tmp_path
 
@@ -35,7 +35,7 @@ def declared(function: Callable[..., Any] = double) -> Any:
 
 
 def hits(kernel: Any) -> int:
-    """How many of its signatures came from the disk."""
+    """How many of its signatures were loaded from disk."""
     return sum(kernel.stats.cache_hits.values())
 
 
@@ -82,7 +82,7 @@ def test_a_damaged_file_is_compiled_again_and_replaced(folder: Path, damage: str
 
 
 def test_every_flipped_byte_is_noticed(folder: Path) -> None:
-    """Machine code that is a bit off would answer, or crash; it is never run."""
+    """Damaged machine code could give wrong values or crash; it is never run."""
     declared()(1.5)
     (path,) = stored(folder)
     whole = path.read_bytes()
@@ -127,12 +127,12 @@ def test_a_kernel_that_cannot_be_kept_answers(
         assert kernel(1.5) == 3.0
         assert kernel(np.float32(1.5)) == 3.0
     assert stored(folder) == []  # no part of a file is left
-    (record,) = caplog.records  # said once, not for every kernel
+    (record,) = caplog.records  # reported once, not for every kernel
     assert os.strerror(number) in record.getMessage()
 
 
 def test_kernels_may_be_written_by_many_at_once(tmp_path: Path, repository: Path) -> None:
-    """Two processes with two signatures each, one empty folder: right answers, whole files, nothing left over."""
+    """Two processes with two signatures each, one empty folder: right answers, complete files, no other files left."""
     program = (
         "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[2]); import numpy as np\n"
         "from mumacro import kernel_cache; kernel_cache.cache_folder = lambda *_: Path(sys.argv[1])\n"
@@ -158,12 +158,12 @@ def test_kernels_may_be_written_by_many_at_once(tmp_path: Path, repository: Path
     assert int(late.stdout) == 1
 
 
-# --- whose files they are -----------------------------------------------------------------------------
+# --- owners of the files ------------------------------------------------------------------------------
 
 
 @pytest.fixture
 def chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder that NUMBA_CACHE_DIR names; and the folder of kernels in it."""
+    """The folder named by NUMBA_CACHE_DIR, and the folder of kernels in it."""
     kernel_cache.cache_folder.cache_clear()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     yield tmp_path / "kernels" / f"kernels-{kernel_cache.source_digest()}"
@@ -204,7 +204,7 @@ def test_a_folder_that_others_can_write_to_is_not_used(chosen: Path, mode: int) 
 @posix
 @pytest.mark.parametrize(("mode", "used"), [(0o777, False), (0o1777, True), (0o755, True)])
 def test_a_folder_that_others_can_rename_is_not_used(chosen: Path, mode: int, used: bool) -> None:
-    """In a folder that all can write to, only the sticky bit keeps others from putting theirs in its place."""
+    """In a folder that all can write to, only the sticky bit prevents others from replacing it."""
     chosen.parent.mkdir()
     chosen.parent.chmod(mode)
     assert (kernel_cache.cache_folder() == chosen) is used
@@ -212,7 +212,7 @@ def test_a_folder_that_others_can_rename_is_not_used(chosen: Path, mode: int, us
 
 @root
 def test_a_folder_of_the_administrator_is_used(chosen: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An image's kernels are compiled by root when it is built, and run by somebody else."""
+    """An image's kernels are compiled by root when it is built, and run by another user."""
     chosen.mkdir(parents=True)
     monkeypatch.setattr(os, "getuid", lambda: 12345)
     assert kernel_cache.cache_folder() == chosen
@@ -229,7 +229,7 @@ def test_a_link_to_somebody_elses_folder_is_not_used(chosen: Path, tmp_path: Pat
 
 @pytest.mark.parametrize("home", ["missing", "a file", "nowhere"])
 def test_without_a_home_no_kernel_is_stored_in_a_shared_folder(tmp_path: Path, repository: Path, home: str) -> None:
-    """No predictable folder among the temporary files takes its place; the kernel runs, and a line says why."""
+    """No predictable folder among the temporary files is used instead; the kernel runs; one line gives the reason."""
     (tmp_path / "file").touch()
     temporary = tmp_path / "temporary"
     temporary.mkdir()

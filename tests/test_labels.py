@@ -1,4 +1,4 @@
-"""Labels survive: pandas, xarray and Dask objects in, the same out, and Dask computes nothing before it is asked to."""
+"""Labels are kept: pandas, xarray and Dask objects in, the same types out; Dask stays lazy until compute()."""
 
 import math
 from typing import Any
@@ -22,7 +22,7 @@ def table() -> Surrogate:
 
 
 def columns(n: int = N) -> dict[str, Any]:
-    """Cases of every regime, rigid ones and illegal ones among them."""
+    """Cases of every regime, including rigid and illegal ones."""
     rng = np.random.default_rng(5)
     found = {name: np.full(n, value) for name, value in CASE.items()}
     found["v0"] = 10.0 ** rng.uniform(-4.0, 0.0, n)
@@ -35,7 +35,7 @@ def columns(n: int = N) -> dict[str, Any]:
 
 
 def same(found: Any, expected: Any) -> None:
-    """Two answers say the same, whatever they are made of; those expected are plain arrays."""
+    """Two answers have the same values, for any array type; the expected ones are plain arrays."""
     for name in VALUES:
         np.testing.assert_array_equal(np.asarray(getattr(found, name)), getattr(expected, name), err_msg=name)
     for name in ("gradient", "gradient_bound"):
@@ -92,7 +92,7 @@ def test_a_frame_gives_a_frame_with_its_index(table: Surrogate, index: str) -> N
     found = table.evaluate(frame)
     assert found.index.equals(at)
     np.testing.assert_array_equal(found["mu_ratio"], table.evaluate(columns()).mu_ratio[:n])
-    assert "note" in frame  # which is passed by
+    assert "note" in frame  # ignored
     assert "note" not in found
 
 

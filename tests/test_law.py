@@ -1,4 +1,4 @@
-"""The approximations that a law carries, by equation number: where they are given, and what they are there."""
+"""The approximations in a law, by equation number: their ranges and values."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_formulas_of_continuous_sliding_are_nan_in_stick_slip(surrogate, y) -> N
     sliding = law.answer.regime == "continuous"
     for name in ("small_amplitude", "continuous"):
         assert (np.isfinite(found[name]) == sliding).all()
-    # where they are given they are as good as they promise
+    # within their ranges they have the stated accuracy
     assert np.nanmax(np.abs(found["continuous"] - law.answer.mu_macro)) < 0.0401 * UNIT["mu0"]
     assert np.nanmax(np.abs(found["small_amplitude"] - law.answer.mu_macro)) <= 0.08 * y**4 * UNIT["mu0"] + 1e-13
 
@@ -68,7 +68,7 @@ def test_the_papers_law_of_small_amplitudes(surrogate) -> None:
     assert borders["eq_24"] * l0 * omega == pytest.approx(
         0.5 * omega * (math.sqrt(l0 * l0 + 2.0 * y0 * y0) - l0), rel=1e-13
     )
-    # the limit of the master curve is the better one, and both meet the law's ends
+    # the limit of the master curve is more accurate, and both agree with the law's ends
     miss = {
         name: np.nanmax(np.abs(found[name] - law.answer.mu_macro)) for name in ("master_curve", "master_curve_limit")
     }

@@ -36,7 +36,7 @@ HALF = 0.5 * math.pi
 
 
 def follow(v: float, y: float, start: float, angle: float, end: float, chart: int = 0) -> tuple[float, Array]:
-    """Angle after slip from ``start`` to ``end`` in sigma, and everything else that slip reports."""
+    """Angle after slip from ``start`` to ``end`` in sigma, and all other outputs of slip."""
     w, out, _, _ = workspace()
     assert slip(v, y, start, 0, angle - chart * HALF, chart, end, False, w, out) == OK
     return out[CHART] * HALF + out[ANGLE], out.copy()

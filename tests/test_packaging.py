@@ -1,4 +1,4 @@
-"""What is shipped: one version, tables beside the library, one line where something is missing."""
+"""The distribution: one version, tables with the library, a one-line message if something is missing."""
 
 import re
 import subprocess
@@ -79,7 +79,7 @@ def test_an_installed_package_finds_its_own_tables_and_no_others(tmp_path, monke
 
 @pytest.mark.parametrize("module", ["service", "builder", "mumacro"])
 def test_without_packages_one_line_says_what_to_install(repository, module):
-    # -S leaves site-packages out: nothing but the standard library is there
+    # -S leaves out site-packages: only the standard library is available
     done = subprocess.run(
         [sys.executable, "-S", "-m", module], cwd=repository, capture_output=True, text=True, timeout=60, check=False
     )

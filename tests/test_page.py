@@ -1,4 +1,4 @@
-"""The pages: what they are served with, whether they fit the screen and its users, and the API key."""
+"""The pages: their headers, whether they fit the screen, accessibility, and the API key."""
 
 import re
 import time
@@ -89,7 +89,7 @@ def test_it_fits_the_screen(open_page, width, height):
     )
     assert sizes[2] <= width
     assert min(sizes[:2]) >= 0.2 * width
-    # nothing stands on anything else, and what is to be touched is large enough for a finger
+    # nothing overlaps, and controls are large enough for a finger
     small = page.run(
         "return [...document.querySelectorAll('input, select, button, summary, nav a')].map((element) => "
         "[element.id || element.outerHTML, (element.closest('.switch') ?? element).getBoundingClientRect().height])"
@@ -133,7 +133,7 @@ AXE = "tests/data/axe-core/axe.min.js"
 
 
 def inaccessible(page, repository):
-    """What axe-core finds wrong, in the light and in the dark: rules, and where they are broken."""
+    """Violations found by axe-core, in the light and dark schemes: rules and elements."""
     found = {}
     page.browser.execute_script((repository / AXE).read_text("utf-8"))
     for scheme, rules in (("light", "{}"), ("dark", "{ runOnly: ['color-contrast'] }")):
@@ -161,7 +161,7 @@ def test_the_description_is_accessible_and_leads_back(open_page, repository):
     page = open_page(path="docs")
     page.wait_for("#swagger-ui", "The value of one input that gives a wanted mu_macro")
     assert not page.find("#key-form").is_displayed()
-    # with a call of either kind open
+    # with one GET and one POST operation open
     page.run("for (const call of ['get', 'post'])"
              " document.querySelector(`.opblock-${call} .opblock-summary-control`).click();")  # fmt: skip
     page.wait_for("#swagger-ui", "Coulomb friction coefficient of the contact")
@@ -179,7 +179,7 @@ def closed(serving, tables_dir):
         yield server
 
 
-def test_the_page_is_open_where_the_numbers_are_not(closed):
+def test_the_page_needs_no_key_but_the_numbers_do(closed):
     for path in page_route.OPEN_PATHS | docs.OPEN_PATHS:
         assert closed.ask("GET", path)[0] == 200, path
     for path in ("/static/page/map.json", "/v1/mu-macro", "/openapi.json", "/v1/law.csv", "/Info", "/static/page/"):
@@ -195,7 +195,7 @@ def test_the_pages_ask_for_the_key_and_use_it(open_page, closed, tmp_path):
     page.enter_key("open-sesame")
     page.wait_for("#swagger-ui", "mu_macro over a range of one input")
     assert not page.find("#key-form").is_displayed()
-    page.find("#back").click()  # the tab still has the key; forgotten, it has not
+    page.find("#back").click()  # the tab keeps the key until it is deleted
     page.wait_for("#mu", "^0.240012$")
     page.find("#forget").click()
     page.wait_for("#mu", "^…$")
@@ -213,5 +213,5 @@ def test_the_pages_ask_for_the_key_and_use_it(open_page, closed, tmp_path):
     assert "sesame" not in page.browser.current_url + page.find("#link").get_attribute("href")
     assert page.download("#csv", tmp_path, "friction-law-v0.csv").stat().st_size > 10_000
     page.run("sessionStorage.clear();")
-    # a browser writes down every answer of 401; nothing else may be there
+    # a browser logs every response with 401; nothing else may be logged
     assert [entry for entry in page.complaints() if "401" not in entry] == []

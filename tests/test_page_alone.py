@@ -1,4 +1,4 @@
-"""The page without a service: a folder that computes in the browser, and goes on when its host is gone."""
+"""The page without a service: a folder that computes in the browser and continues when its host is stopped."""
 
 import functools
 import http.server
@@ -54,7 +54,7 @@ class Host:
 
 @pytest.fixture(scope="module")
 def host(folder):
-    """One for all tests that do not stop it."""
+    """One host for all tests that do not stop it."""
     made = Host(folder)
     yield made
     made.stop()
@@ -103,7 +103,7 @@ def test_it_answers_and_goes_on_when_its_host_is_gone(open_page, folder, table):
 
 
 def test_its_numbers_are_pythons(open_page, host, table):
-    """Cases of every regime by the million would take as long as they do in C; these are some thousand."""
+    """Some thousand cases of every regime."""
     rng = np.random.default_rng(13)
     n = 20_000
     v, y = 10.0 ** rng.uniform(-4.0, 4.0, (2, n))
@@ -120,7 +120,7 @@ def test_its_numbers_are_pythons(open_page, host, table):
         "return cases.map((row) => { const a = evaluate(Object.fromEntries(names.map((name, i) => [name, row[i]])));"
         " return [a.mu_macro, a.error_bound, ...names.map((name) => a.gradient[name])]; });"
     ))  # fmt: skip
-    # the same operations as interpreted Python; compiled Python joins products and sums
+    # the same operations as interpreted Python; compiled Python fuses products and sums
     assert np.all(np.abs(found[:, 0] - answer.mu_macro) <= answer.error_bound)
     ulp = np.abs(found[:, 0] - answer.mu_macro) / np.spacing(answer.mu_macro)
     assert np.mean(ulp > 4.0) < 5e-3

@@ -1,4 +1,4 @@
-"""The page in a browser: what is typed, what a link says, and what is shown while there is no answer."""
+"""The page in a browser: typed values, links, and the display while there is no response."""
 
 import json
 import math
@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 import pytest
 
-READ = {  # (field, unit, text): SI value, or what the refusal says
+READ = {  # (field, unit, text): SI value, or part of the message
     ("y0", "µm", "5 mm"): 5e-3,
     ("y0", "µm", "5mm"): 5e-3,
     ("y0", "µm", "2"): 2e-6,
@@ -70,7 +70,7 @@ def test_what_is_typed_is_understood_as_a_whole_or_refused(open_page):
             assert answer == {"rigid": True}
         else:
             assert expected in answer.get("fault", ""), (case, answer)
-    # of the deviations: an empty field is none, per cent are of the value
+    # deviations: an empty field means none, per cent are relative to the value
     deviations = {"": 0.0, "5 %": 1e-7, "±0.1": 1e-7, "0.1 mm": 1e-4, "-1": None, "x": None, "1 N": None}
     found = page.run(
         "const { readDeviation } = await import('./static/page/read.js');"
@@ -98,7 +98,7 @@ def test_a_typed_value_applies_on_commit(open_page, surrogate, case):
     assert page.value("#unit-omega") == "Hz"
     expected = surrogate.evaluate(**{**case, "y0": 3.1e-6, "omega": 2000 * math.pi})
     assert float(page.text("#mu")) == page.rounded(expected.mu_macro)
-    page.type("#field-Fz", "1 lbf")  # a unit that the list did not have
+    page.type("#field-Fz", "1 lbf")  # a unit that is not in the list
     assert (page.value("#field-Fz"), page.value("#unit-Fz")) == ("1", "lbf")
     page.type("#field-Fz", "9.123456789012 N")
     assert page.value("#field-Fz") == "9.123456789012"  # with all digits that were typed
@@ -114,7 +114,7 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate,
     assert page.find("#field-Fz").get_attribute("aria-invalid") == "true"
     assert page.text("#fault-Fz") == "Fz: “mm” is not a unit of Fz: give N, mN, kN."
     assert page.text("#status") == f"{page.text('#fault-Fz')} Grey results belong to earlier values."
-    # another field does not mend it, and nothing is asked meanwhile
+    # another field does not repair it, and no request is sent meanwhile
     page.type("#field-mu0", "0.4")
     assert page.is_old()
     assert page.text("#mu") == "0.240012"
@@ -123,7 +123,7 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate,
     assert not page.is_old()
     assert (page.text("#status"), page.text("#fault-Fz"), page.value("#field-Fz")) == ("", "", "10")
     assert float(page.text("#mu")) == page.rounded(surrogate.evaluate(**{**case, "mu0": 0.4}).mu_macro)
-    # the slider of a field mends it, too; a bad uncertainty is as bad
+    # the slider of a field repairs it, too; a bad uncertainty has the same effect
     page.type("#field-v0", "fast")
     page.type("#std-k", "many")
     page.choose("#slider-v0", "-1000", "input")
@@ -149,7 +149,7 @@ def test_a_contact_is_rigid_by_a_switch(open_page, surrogate, case):
     page.wait_for("#map-read", "switch it off")
     assert page.value("#field-v0") == "10"
     page.click("#rigid")
-    assert page.value("#field-k") == "0.5"  # that of before
+    assert page.value("#field-k") == "0.5"  # the earlier value
     page.type("#field-k", "rigid")
     assert page.find("#rigid").is_selected()
     assert page.find("#rigid").get_attribute("role") == "switch"
@@ -167,7 +167,7 @@ def test_uncertainties_and_their_shares(open_page, surrogate, case):
     page.wait_for("#uncertainty", f"^± {std:.3g} \\(one standard deviation\\)$")
     for name in case:
         assert page.text(f"#share-{name}") == f"{100 * (parts.get(name, 0) / std) ** 2:.1f} %"
-    # at the corner slopes say nothing: then it is samples
+    # at the corner slopes are useless: samples are used
     page.type("#field-y0", "3 µm")
     page.type("#field-v0", "1e-6")
     page.type("#std-y0", "0.3")
@@ -200,7 +200,7 @@ def test_offline_the_result_is_grey_until_the_service_is_back(open_page, surroga
 
 @pytest.fixture
 def answered_by(open_page):
-    """Puts an answer of ours in place of the service's; the page is loaded anew afterwards."""
+    """Replaces the service's response; the page is reloaded afterwards."""
 
     def answer(page, script):
         page.run(f"window.real ??= window.fetch; window.fetch = {script};")
@@ -229,7 +229,7 @@ def test_a_busy_a_refusing_and_a_slow_service_have_their_own_messages(open_page,
     assert page.text("#status") == ""
 
 
-def test_an_answer_that_is_none_is_asked_for_again(open_page, answered_by):
+def test_an_unreadable_response_is_requested_again(open_page, answered_by):
     page = open_page()
     answered_by(page, "async () => new Response('<html>', { status: 200 })")
     page.run("document.querySelector('#rigid').click();")

@@ -25,7 +25,7 @@ def test_it_loads_and_shows_the_known_value(open_page, surrogate, live_server, c
     power = surrogate.power(expected.v_tilde, expected.y_tilde) * 0.3 * 10 * 3e-6 * 1.3e5
     assert page.text("#shaker") == f"{1e3 * power:.4g} mW"
     assert page.text("#saved") == f"{1e3 * (0.3 - expected.mu_macro) * 10 * 0.01:.4g} mW"
-    # where the number comes from stands in a line that is closed until somebody wants to know
+    # the source of the number is in a section that is closed by default
     assert not page.find("#bound").is_displayed()
     assert float(page.text("#bound").removeprefix("± ")) == page.rounded(expected.error_bound, 2)
     assert (page.text("#source"), page.text("#table")) == (expected.source, surrogate.id)
@@ -73,7 +73,7 @@ def test_the_map_is_read_and_moved_on(open_page, surrogate, case):
     page.touched("#map", 0.6, 0.4)
     read = page.wait_for("#map-read", r"ṽ = (\S+), ỹ = (\S+): µ/µ₀ = (\S+), (\S+)")
     v, y, ratio = (float(read[i]) for i in (1, 2, 3))
-    # three digits of the place are shown
+    # three digits of the position are shown
     assert ratio == pytest.approx(surrogate.mu_ratio(v, y), abs=0.02 * surrogate.mu_ratio(v, y))
     page.touched("#map", 0.6, 0.4, click=True)
     page.settle()
@@ -93,11 +93,11 @@ def test_the_map_is_read_and_moved_on(open_page, surrogate, case):
     assert page.complaints() == []
 
 
-ORANGE = (194, 51, 10)  # of the user's point
+ORANGE = (194, 51, 10)  # colour of the user's point
 
 
 def point_on(page, name):
-    """Where the user's point is painted, as shares of the canvas: left to right, top to bottom."""
+    """Where the user's point is drawn, as shares of the canvas: left to right, top to bottom."""
     pixels = page.pixels(name)
     rows, columns = np.nonzero(np.all(pixels[..., :3] == ORANGE, axis=-1))
     return columns.mean() / pixels.shape[1], rows.mean() / pixels.shape[0]
@@ -160,7 +160,7 @@ def test_the_law_is_in_the_units_of_its_field(open_page, surrogate, case):
     assert page.text("#law-input") == "v₀ [m/s]"
     page.choose("#along", "omega")
     assert page.text("#law-input") == "f [kHz]"
-    # a click goes to where the pointer is, in that unit
+    # a click selects the value at the pointer, in that unit
     page.touched("#law", 0.5, 0.5)
     at = float(page.wait_for("#law-read", r"f = (\S+) kHz")[1])
     page.touched("#law", 0.5, 0.5, click=True)
@@ -176,7 +176,7 @@ def test_the_range_of_the_law_is_chosen(open_page):
     page.type("#stop", "2 m/s")
     assert "at v₀ = 5 mm/s to" in page.find("#law").get_attribute("aria-label")
     assert "at v₀ = 2000 mm/s" in page.find("#law").get_attribute("aria-label")
-    page.type("#stop", "1")  # below the start: the service says what is wrong
+    page.type("#stop", "1")  # below the start: the service reports the error
     page.wait_for("#law-status", "refuses this: .*stop.* Grey results")
     assert page.is_old("#law-section")
     assert not page.is_old()
@@ -187,7 +187,7 @@ def test_the_range_of_the_law_is_chosen(open_page):
     page.choose("#scale", "linear")
     page.type("#start", "0")
     assert page.text("#law-status") == ""
-    page.complaints()  # a refusal is written down by the browser
+    page.complaints()  # a refusal is logged by the browser
 
 
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega"])
@@ -229,7 +229,7 @@ def legend_of(page, name="legend"):
 
 
 def borders_told(page):
-    """The border by the paper's formulas, as the legend says it: equations -> values."""
+    """The border by the paper's formulas, from the legend: equations -> values."""
     told = {}
     for text in legend_of(page):
         found = re.fullmatch(r"border by (.+): (.+)", text)
@@ -247,12 +247,12 @@ def test_the_border_by_the_papers_equations(open_page):
     for numbers, formula in small.items():
         assert found[numbers] == pytest.approx([speed * float(formula(2 / 3))], rel=1e-3)
     assert legend_of(page, "map-legend") == [f"border by {one}" for one in ("(23)", "(24), (39)", "(26)", "(27)")]
-    page = open_page("#approximations=1&y0=6e-6&scale=linear")  # y~ = 2, of which (23) and (24) say nothing
+    page = open_page("#approximations=1&y0=6e-6&scale=linear")  # y~ = 2, outside the range of (23) and (24)
     found = borders_told(page)
     assert found.keys() == {"(26)", "(27)"}
     for numbers, formula in (("(26)", border_26), ("(27)", border_27)):
         assert found[numbers] == pytest.approx([speed * float(formula(2.0))], rel=1e-3)
-    # along the amplitude: where the border's speed is v0 = 10 mm/s; l0 = 3 um
+    # along the amplitude: at the border v0 = 10 mm/s; l0 = 3 um
     page = open_page("#approximations=1&along=y0")
     for numbers, formula in small.items():
         (amplitude,) = borders_told(page)[numbers]
@@ -276,12 +276,12 @@ def test_the_papers_borders_are_drawn(open_page, name):
 
 def test_curves_approximations_and_downloads(open_page, surrogate, tmp_path, case):
     page = open_page("#approximations=1")
-    # every column that the service has here has its line in the legend, with the paper's equations
+    # every column of the service's response has a line in the legend, with the paper's equations
     legend = legend_of(page)
     assert "master curve (28)" in legend
     assert "critical (32), (40)" in legend
     curves = [text for text in legend if not text.startswith("border")]
-    assert len(curves) == 8 == len(APPROXIMATIONS) - 1  # the corner is too far for its own
+    assert len(curves) == 8 == len(APPROXIMATIONS) - 1  # the corner approximation does not apply here
     page.choose("#family", "y0")
     assert page.value("#curves") == "1; 2; 4"
     page.type("#curves", "1; 2 mm")

@@ -1,4 +1,4 @@
-"""Many points at once against one by one: the same bits, wherever the points lie and however many there are."""
+"""Many points at once against one by one: the same bits, for all positions and numbers of points."""
 
 import math
 from pathlib import Path
@@ -22,7 +22,7 @@ def table(request: pytest.FixtureRequest, tables_dir: Path) -> Surrogate:
 
 
 def one_by_one(table: Surrogate, v: Array, y: Array) -> tuple[Array, Array, Array]:
-    """The answers of the function for one point, which knows nothing of passes."""
+    """The answers of the function for single points, which does not use passes."""
     found = np.array([evaluate.answer(charts.MU, a, b, *table._data) for a, b in zip(v, y, strict=True)])
     return found[:, 0], found[:, 1], found[:, 2]
 
@@ -65,7 +65,7 @@ def test_on_both_sides_of_every_seam(table: Surrogate) -> None:
 
 
 def test_on_every_edge_of_every_cell(table: Surrogate) -> None:
-    """Where rounding decides which of two cells answers."""
+    """Where rounding decides which of two cells is used."""
     _, blocks, _, pieces = table._data
     rng = np.random.default_rng(7)
     ends = []

@@ -1,4 +1,4 @@
-"""The compiled code as plain Python: with NUMBA_DISABLE_JIT=1 debuggers see what runs, and it says the same."""
+"""The compiled code as plain Python: with NUMBA_DISABLE_JIT=1 debuggers work, and the results are the same."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The programs of docs/scale.md run as they stand there, and say what the library says."""
+"""The programs of docs/scale.md run unchanged and agree with the library."""
 
 import math
 import textwrap
@@ -28,7 +28,7 @@ def programs(heading: str) -> list[str]:
 
 
 def run(heading: str, *needs: str) -> dict[str, Any]:
-    """What the blocks below a heading leave behind, run one after another."""
+    """The variables after running the blocks below a heading in order."""
     for name in needs:
         pytest.importorskip(name)
     names: dict[str, Any] = {"__name__": "recipe"}

@@ -1,4 +1,4 @@
-"""Samples of what the scripts in fuzz/ try in full for docs/reliability.md."""
+"""Samples of the trials that the scripts in fuzz/ run in full for docs/reliability.md."""
 
 import importlib
 import re
@@ -21,7 +21,7 @@ PAGE = ROOT / "docs" / "reliability.md"
 
 
 def load(name: str) -> ModuleType:
-    """A script of fuzz/ as a module, with its neighbours importable and the path as it was afterwards."""
+    """A script of fuzz/ as a module; the folder is on the path only during the import."""
     before = sys.path[:]
     sys.path.insert(0, str(ROOT / "fuzz"))
     try:
@@ -50,19 +50,19 @@ def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> N
         assert "::" in line or line.startswith("| what is "), line
 
 
-# --- tables from strangers ----------------------------------------------------------------------------
+# --- untrusted tables --------------------------------------------------------------------------------
 
-#: a table with other numbers and a checksum that fits them is another table; it may answer as it likes
+#: a table with other numbers and a matching checksum is a different table; any answer is allowed
 ANOTHER = {
     "numbers of 1.7e308, checksum right", "random numbers of 1e100, checksum right",
     "amplitudes of 1e300, checksum right", "errors of 1e308, checksum right",
 }  # fmt: skip
-HARMLESS = {"a group that holds itself", "3,000 groups, one in the other"}
+HARMLESS = {"a group that contains itself", "3,000 nested groups"}
 
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, str, float, float]]:
-    """Every hostile file, opened by one other process that may take 256 MB."""
+    """Every hostile file, opened by another process that may use 256 MB."""
     folder = tmp_path_factory.mktemp("hostile")
     for i, make in enumerate(hostile.HOSTILE.values()):
         make(folder / f"{i}.nc")
@@ -123,7 +123,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate,
     assert abs(found - expected.mu_ratio) <= bound + expected.error_estimate
     along_v, along_y, error_v, error_y = table.slopes(v, y, bounds=True)[1:]
     near = {h: (solve(v * (1.0 + h), y).mu_ratio, solve(v, y * (1.0 + h)).mu_ratio) for h in (-1e-4, 1e-4)}
-    noise = 1e-7 * found  # of differences
+    noise = 1e-7 * found  # error of the differences
     assert abs(along_v - (near[1e-4][0] - near[-1e-4][0]) / 2e-4) <= error_v + noise
     assert abs(along_y - (near[1e-4][1] - near[-1e-4][1]) / 2e-4) <= error_y + noise
 
@@ -136,7 +136,7 @@ def test_a_ratio_beyond_double_range_is_bounded(table: Surrogate) -> None:
     assert abs(inside.mu_ratio - beyond.mu_ratio) <= inside.error_bound + beyond.error_bound
 
 
-def test_scales_that_the_groups_do_not_see_are_not_seen(table: Surrogate) -> None:
+def test_scaling_at_constant_groups_changes_nothing(table: Surrogate) -> None:
     by_powers_of_two, by_any_factor = answers.scale_invariant(table, 0.01)
     assert by_powers_of_two.tried > 5000
     assert by_powers_of_two.broken == by_any_factor.broken == 0
@@ -144,7 +144,7 @@ def test_scales_that_the_groups_do_not_see_are_not_seen(table: Surrogate) -> Non
 
 @pytest.mark.slow
 def test_another_processor_answers_within_the_bounds() -> None:
-    """What is promised across processors: not the bits, but both bounds, and the same source."""
+    """Guaranteed across processors: both bounds and the source, but not the bits."""
     here, there = answers.across_processors(20_000, 1e-12)
     assert np.all(np.abs(here[0] - there[0]) <= here[2] + there[2])
     assert np.array_equal(here[3], there[3])
@@ -212,7 +212,7 @@ def test_a_folder_is_given_back_at_the_end(tmp_path: Path) -> None:
         with pytest.raises(BusyError, match="another process is at work here"), alone_in(folder):
             pass
         (folder / "part").touch()
-    assert folder.is_dir()  # what was not finished stays
+    assert folder.is_dir()  # unfinished work is kept
     with alone_in(folder):
         (folder / "part").unlink()
     assert not folder.exists()

@@ -1,4 +1,4 @@
-"""Bracketed Newton steps: every kind of curve that a sweep can be, and how few evaluations the ordinary ones take."""
+"""Bracketed Newton steps: every shape of curve, and the number of evaluations for ordinary ones."""
 
 import math
 import subprocess
@@ -14,7 +14,7 @@ CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01
 
 
 class Known:
-    """A sweep along a function that is known: f(x) and df / d ln x."""
+    """A sweep along a known function: f(x) and df / d ln x."""
 
     def __init__(self, function, slope):
         self.function, self.slope, self.calls = function, slope, 0
@@ -51,7 +51,7 @@ def test_levels_are_met_to_rounding_in_a_few_steps(sign):
     piece = curve(known, 0.0, TINY, 1e-300, 1e-3, 1.0, 1e3, 1e300)
     level = sign * np.array([1e-290, 1e-12, 0.3, 0.78, 1.5, 1.57])
     found = piece.meet(level)
-    assert found == pytest.approx(np.tan(np.abs(level)), rel=1e-12)  # 1.57 stands 1,250 times flatter than 0.3
+    assert found == pytest.approx(np.tan(np.abs(level)), rel=1e-12)  # 1,250 times flatter at 1.57 than at 0.3
     assert np.all(np.abs(known.function(found) - level) <= 2.0 * 2.0**-52 * np.abs(level))
     known.calls = 0
     piece.meet(sign * np.array([0.3]))
@@ -61,11 +61,11 @@ def test_levels_are_met_to_rounding_in_a_few_steps(sign):
 def test_a_slope_that_vanishes_at_the_root_is_no_obstacle():
     known = Known(lambda x: 1.0 + np.log(x) ** 3, lambda x: 3.0 * np.log(x) ** 2)
     (found,) = curve(known, 1e-5, 1e4).meet(np.array([1.0]))
-    assert found == pytest.approx(1.0, abs=1e-5)  # the cube is rounding from there on
+    assert found == pytest.approx(1.0, abs=1e-5)  # closer to the root the cube is below rounding
 
 
 @pytest.mark.parametrize("slope", [math.nan, math.inf, 0.0, -1.0, 1e-300, 1e300])
-def test_a_slope_that_lies_costs_steps_and_no_digits(slope):
+def test_a_wrong_slope_costs_steps_but_no_digits(slope):
     known = Known(lambda x: np.where(x < math.pi, 0.25, 0.75), lambda x: np.full_like(x, slope))
     piece = curve(known, 0.0, 1e300)
     (found,) = piece.meet(np.array([0.5]))
@@ -86,7 +86,7 @@ def test_a_plateau_is_met_at_its_first_double_and_left_at_its_last():
     assert both.tolist() == [10.0, left]
 
 
-def test_what_is_never_met_is_an_end():
+def test_a_level_that_is_never_reached_gives_an_end():
     known = Known(np.arctan, lambda x: x / (1.0 + x * x))
     piece = curve(known, 0.5, 2.0)
     assert piece.meet(np.array([0.1, 1.5])).tolist() == [0.5, 2.0]
@@ -106,7 +106,7 @@ def test_newton_agrees_with_bisection_of_the_bits(surrogate, name):
         level = low + (high - low) * np.array([0.01, 0.3, 0.5, 0.9])
         newton = piece.meet(level)
         off = np.abs(sweep.mu(newton) - level)
-        # one unit in the last place of the input moves mu_macro by this much, where the curve is steep
+        # change of mu_macro for one unit in the last place of the input, where the curve is steep
         grain = np.abs(sweep.mu(np.nextafter(newton, 1e300)) - sweep.mu(np.nextafter(newton, 0.0)))
         assert np.all(off <= 4.0 * 2.0**-52 * level + grain)
         sign = piece.sign
@@ -130,7 +130,7 @@ def test_the_cusp_of_the_static_limit_is_met(surrogate):
     assert piece.meet(np.array([0.0]))[0] == pytest.approx(3e-6, rel=4e-16)
 
 
-def test_an_ordinary_question_takes_few_evaluations(surrogate, monkeypatch):
+def test_an_ordinary_target_takes_few_evaluations(surrogate, monkeypatch):
     sweep = sweep_over(surrogate, "v0")
     calls = []
     inner = sweep.with_slope
@@ -138,7 +138,7 @@ def test_an_ordinary_question_takes_few_evaluations(surrogate, monkeypatch):
     x = np.geomspace(1e-8, 1e8, 97)
     piece = Curve(sweep, x, sweep.mu(x))
     piece.meet(np.linspace(0.23, 0.29, 1000))
-    # a bisection of the bits takes 50 and more
+    # a bisection of the bits takes 50 or more
     assert len(calls) <= 12
     assert sum(calls) <= 6 * 1000
 

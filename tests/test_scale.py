@@ -1,4 +1,4 @@
-"""Designs that exist chunk by chunk and reductions of answers: right values, lazy, from any counter on."""
+"""Designs made chunk by chunk and reductions of answers: right values, lazy, from any start counter."""
 
 import math
 from typing import Any

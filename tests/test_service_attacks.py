@@ -1,4 +1,4 @@
-"""One request must not bring the service down: each attack on a live server, with /livez asked beside it.
+"""One request must not bring the service down: each attack on a live server, with requests to /livez in parallel.
 
 Memory is the peak of the process; the manifests in deploy/ allow 768 MiB.
 """
@@ -14,23 +14,23 @@ from pathlib import Path
 import pytest
 
 MOST_MIB = 768
-LONGEST_S = 5.0  # that /livez may take in these tests; a busy machine is slow, a frozen service is much slower
+LONGEST_S = 5.0  # longest time for /livez in these tests; a busy machine is slow, a blocked service is much slower
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 
 
 @pytest.fixture(scope="module")
 def server(serving, surrogate):
-    """A server with default settings, whose memory is watched."""
+    """A server with default settings; its memory is measured."""
     with serving(surrogate.path) as started:
         yield started
 
 
 @pytest.fixture
 def watched(server, record_property):
-    """The server, asked beside the attack whether it lives; afterwards its memory is looked at.
+    """The server, with requests to /livez during the attack; afterwards its memory is checked.
 
-    fuzz/load.py reads what is recorded here.
+    fuzz/load.py reads the values recorded here.
     """
     waits, over = [], threading.Event()
 
@@ -64,7 +64,7 @@ def connect(server):
 
 
 def send_until_cut(raw, piece, most):
-    """Send up to so many bytes; how many there were when the server ended it."""
+    """Send up to this number of bytes; returns the number sent when the server closed the connection."""
     sent = 0
     try:
         while sent < most:
@@ -169,7 +169,7 @@ def test_unfinished_bodies_take_little_memory(watched):
         raw.close()
 
 
-def test_idle_streams_hold_little(watched):
+def test_idle_streams_take_little_memory(watched):
     head = f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: application/x-ndjson\r\nContent-Length: 1\r\n\r\n"
     raws = [connect(watched) for _ in range(300)]
     for raw in raws:
@@ -222,7 +222,7 @@ def test_many_single_lines_are_answered_when_all_are_sent_before_reading(watched
     assert (status, body.count(b"\n")) == (200, 150_000)
 
 
-def test_a_stop_loses_no_request_of_busy_callers(serving, surrogate):
+def test_a_stop_loses_no_request_of_busy_clients(serving, surrogate):
     body = json.dumps(CASE)
     lost, over = [], threading.Event()
     with serving(surrogate.path, MUMACRO_DRAIN_S="2") as server:
@@ -234,7 +234,7 @@ def test_a_stop_loses_no_request_of_busy_callers(serving, surrogate):
                     try:
                         connection.connect()
                     except OSError:
-                        return  # nobody listens any more
+                        return  # the port is closed
                 try:
                     connection.request("POST", SINGLE, body, {"Content-Type": "application/json"})
                     response = connection.getresponse()

@@ -1,4 +1,4 @@
-"""Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, limits of size."""
+"""Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, size limits."""
 
 import json
 
@@ -233,7 +233,7 @@ def test_one_batch_too_many_is_refused_before_it_is_read(tables_dir, case, probl
         problem(response, 503)
         assert response.headers["retry-after"] == "1"
         problem(client.post(PATH, content=pieces()), 503)
-        assert client.post(PATH, json=[case]).status_code == 200  # a small one takes no place
+        assert client.post(PATH, json=[case]).status_code == 200  # a small one is not counted
         app.state.work.used = 0
         assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
         assert app.state.work.used == 0
@@ -249,10 +249,10 @@ def test_a_small_text_that_asks_for_much_takes_a_place(tables_dir, case, problem
 
 
 @pytest.mark.parametrize("n", [1, 7, 300, 4096, 4097])
-def test_plain_columns_get_the_same_bytes_the_short_way(client, case, n):
+def test_plain_columns_get_the_same_bytes_on_the_fast_path(client, case, n):
     columns = {**case, "v0": np.geomspace(1e-6, 1e2, n).tolist(), "k": [1e6] * n}
     text = json.dumps(columns)
-    doubled = '{"mu0": 0.7, ' + text[1:]  # a name given twice goes the long way; the last one holds
+    doubled = '{"mu0": 0.7, ' + text[1:]  # a name given twice is handled by the general parser; the last value counts
     headers = {"Content-Type": "application/json", "Accept-Encoding": "identity"}
     short, long = (client.post(PATH, content=body, headers=headers) for body in (text, doubled))
     assert short.content == long.content

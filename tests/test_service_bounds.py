@@ -1,4 +1,4 @@
-"""What keeps one caller from being everybody's trouble: on a live server, with callers who misbehave."""
+"""Limits that protect other clients from one faulty client: on a live server."""
 
 import http.client
 import json
@@ -14,13 +14,13 @@ import pytest
 pytestmark = pytest.mark.slow
 
 BATCH = "/v1/mu-macro/batch"
-LIMIT_S = 2  # of the client's moves, in these tests
-PATIENCE_S = 60  # until a test that waits for something gives up
+LIMIT_S = 2  # client timeout in these tests
+PATIENCE_S = 60  # longest wait in a test
 
 
 @pytest.fixture(scope="module")
 def server(serving, surrogate):
-    """A server that is impatient and takes two batches at a time."""
+    """A server with a short client timeout, for two batches at a time."""
     settings = {
         "CLIENT_TIMEOUT_S": str(LIMIT_S),
         "MAX_BATCHES": "2",
@@ -46,7 +46,7 @@ def head(path, length=None, kind="application/json", extra=""):
 
 
 def read_to_end(raw):
-    """Everything until the server closes; fails the test if it never does."""
+    """All bytes until the server closes; fails the test if it never does."""
     received = b""
     try:
         while piece := raw.recv(65536):
@@ -57,7 +57,7 @@ def read_to_end(raw):
 
 
 def drip(raw, byte=b" "):
-    """Send a byte at a time until the connection is cut; fails the test if it never is."""
+    """Send single bytes until the connection is closed; fails the test if it never is."""
     deadline = time.monotonic() + PATIENCE_S
     raw.settimeout(0.2)
     while time.monotonic() < deadline:
@@ -69,7 +69,7 @@ def drip(raw, byte=b" "):
             continue
         except OSError:
             return
-    pytest.fail("the connection was never cut")
+    pytest.fail("the connection was never closed")
 
 
 @pytest.mark.parametrize("path", ["/v1/mu-macro", BATCH])
@@ -124,7 +124,7 @@ def memory(server):
 
 
 def stream(server, line, count):
-    """Send the line so many times while another thread reads; return lines and largest memory that were seen."""
+    """Send the line this number of times while another thread reads; return the lines and the largest memory."""
     raw = connect(server)
     block = b"%x\r\n%b\r\n" % (len(line), line)
     sizes, received = [], [0, b""]
@@ -159,7 +159,7 @@ def test_the_memory_of_a_stream_does_not_grow_with_its_length(server, case):
     assert long < short + 16e6  # the answers alone are 150 MB
 
 
-def test_answers_come_while_the_question_is_still_being_sent(server, case):
+def test_answers_come_while_the_request_is_still_being_sent(server, case):
     line = json.dumps(case).encode() + b"\n"
     with connect(server) as raw:
         raw.sendall(head(BATCH, None, "application/x-ndjson"))
@@ -197,7 +197,7 @@ def test_the_answer_to_a_stream_begins_before_its_first_line(server, case):
 
 
 def test_no_piece_of_a_stream_is_lost(server, case):
-    # The pieces are cut so that lines end within them and between them, and both directions are busy at once.
+    # Lines end inside pieces and between pieces, and both directions are busy at the same time.
     lines = b"".join(json.dumps({**case, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))
     answers = []
     with connect(server) as raw:
@@ -307,7 +307,7 @@ def test_threads_for_batches_have_a_lower_priority(server, case):
 
 @pytest.mark.parametrize("sent", [300_000, 3_000_000])
 def test_a_client_that_leaves_within_a_body_frees_its_place(server, case, sent):
-    for _ in range(3):  # one more than there are places
+    for _ in range(3):  # one more than the batches allowed
         with connect(server) as raw:
             raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 20_001)]})
@@ -316,10 +316,10 @@ def test_a_client_that_leaves_within_a_body_frees_its_place(server, case, sent):
         assert time.monotonic() < deadline
 
 
-def test_a_third_batch_is_turned_away_unread(server, case):
+def test_a_third_batch_is_refused_unread(server, case):
     deadline = time.monotonic() + PATIENCE_S
     answer = b""
-    while not answer.startswith(b"HTTP/1.1 503"):  # once the service has read the heads of the two before the third
+    while not answer.startswith(b"HTTP/1.1 503"):  # once the service has read the heads of the first two
         assert time.monotonic() < deadline
         with connect(server) as first, connect(server) as second, connect(server) as third:
             for raw in (first, second):
@@ -355,7 +355,7 @@ def test_a_stop_lets_readiness_fall_first_and_requests_finish(serving, surrogate
                 assert time.monotonic() < deadline
             assert server.ask("GET", "/livez")[0] == 200  # still listening
             assert server.ask("POST", "/v1/mu-macro", json.dumps(case))[0] == 200
-            while True:  # until it listens no more
+            while True:  # until the port is closed
                 try:
                     server.ask("GET", "/livez")
                 except OSError:
@@ -397,7 +397,7 @@ def test_pipelined_requests_are_answered_in_order(server, case):
 @pytest.mark.parametrize(
     "extra", ["Expect: 100-continue\r\n", "Connection: close\r\n", "X-Forwarded-For: 10.1.2.3\r\n", ""]
 )
-def test_the_short_way_and_the_long_way_give_one_answer(server, case, extra):
+def test_the_fast_and_the_general_path_give_the_same_answer(server, case, extra):
     body = json.dumps(case).encode()
     with connect(server) as raw:
         raw.sendall(head("/v1/mu-macro", len(body), extra=extra))
@@ -413,7 +413,7 @@ def test_the_short_way_and_the_long_way_give_one_answer(server, case, extra):
     assert {"content-length", "content-type", "date", "x-request-id", "x-content-type-options"} <= names
 
 
-def test_two_thousand_idle_connections_are_kept_and_keep_nobody_waiting(serving, surrogate, case):
+def test_two_thousand_idle_connections_are_kept_and_delay_no_request(serving, surrogate, case):
     resource = pytest.importorskip("resource", reason="this system has no limits of open files to set")
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if hard != resource.RLIM_INFINITY and hard < 5000:
@@ -439,7 +439,7 @@ def test_two_thousand_idle_connections_are_kept_and_keep_nobody_waiting(serving,
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-def test_a_connection_too_many_is_told_to_come_again(serving, surrogate):
+def test_a_connection_too_many_is_refused_with_retry_after(serving, surrogate):
     with serving(surrogate.path, MUMACRO_MAX_CONNECTIONS="20") as server:
         ask = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
         raws = [connect(server) for _ in range(20)]

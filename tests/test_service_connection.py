@@ -1,4 +1,4 @@
-"""HTTP/1.1 as bytes on a socket: what comes back, and in which order, however the bytes come."""
+"""HTTP/1.1 as bytes on a socket: the responses and their order, for any division of the bytes."""
 
 import asyncio
 import http.client
@@ -25,7 +25,7 @@ def raw(live_server):
 
 
 def rest(raw):
-    """Everything until the service closes."""
+    """All bytes until the service closes."""
     received = b""
     while piece := raw.recv(65536):
         received += piece
@@ -80,7 +80,7 @@ def test_a_half_closed_client_gets_the_whole_answer(raw, case):
 @pytest.mark.parametrize("path", [SINGLE, BATCH])
 @pytest.mark.parametrize("before", [b"", GET])
 def test_a_client_that_ends_within_a_body_is_disconnected_at_once(raw, path, before):
-    raw.settimeout(10)  # less than the time that a slow caller has
+    raw.settimeout(10)  # less than the timeout for a slow client
     raw.sendall(before + f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n".encode() + b"{")
     raw.shutdown(socket.SHUT_WR)
     received = rest(raw)
@@ -88,7 +88,7 @@ def test_a_client_that_ends_within_a_body_is_disconnected_at_once(raw, path, bef
 
 
 def served(app, request, *, stopping=False):
-    """What the connection answers where the application is this one, perhaps after the server has begun to stop."""
+    """The bytes that the connection sends with this application, perhaps after the server has begun to stop."""
 
     async def talk():
         state = SimpleNamespace(connections=set(), tasks=set(), total_requests=0, default_headers=[(b"date", b"now")])
@@ -151,7 +151,7 @@ def test_a_field_that_would_break_the_head_is_not_written(field):
 
 @pytest.mark.parametrize("try_number", range(10))
 def test_a_client_that_sends_too_much_can_read_the_reason(live_server, try_number):
-    del try_number  # a reset would be seen in about half of the tries
+    del try_number  # a reset would occur in about half of the tries
     host, _, port = live_server.url.removeprefix("http://").rpartition(":")
     connection = http.client.HTTPConnection(host, int(port), timeout=30)
     connection.request("POST", SINGLE, b" " * 3_000_000, {"Content-Type": "application/json"})

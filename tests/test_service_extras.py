@@ -1,4 +1,4 @@
-"""Gradient, deviations, power, stick fraction and settling: what they say, in every form; how they are refused."""
+"""Gradient, deviations, power, stick fraction and settling: their values in every format, and refusals."""
 
 import json
 import math
@@ -112,7 +112,7 @@ def test_power_and_stick_fraction_are_the_surrogates(client, case, surrogate, v0
     assert bounds[0] == pytest.approx(surrogate.power_with_bound(v, y)[1] * unit, rel=1e-9)
     assert bounds[1] == pytest.approx(answer["error_bound"] * case["Fz"] * v0, rel=1e-2, abs=1e-14)
     assert all(0.0 <= bound < 1e-6 for bound in bounds)
-    # what both drives put in is lost where the contact slips, so neither is more than the friction force can take
+    # the work of both drives is dissipated in slip, so neither exceeds the maximum friction power
     speed = v0 + y0 * case["omega"]
     assert 0 <= shaker + v0 * answer["mu_macro"] * case["Fz"] <= case["mu0"] * case["Fz"] * speed * (1 + 1e-9)
 

@@ -1,4 +1,4 @@
-"""What every request has in common: errors, identities, keys, body limits, the interface's description."""
+"""Common to all requests: errors, request ids, keys, body limits, the interface's description."""
 
 import json
 import logging
@@ -79,7 +79,7 @@ def test_requests_are_logged_as_json_lines(client, case, caplog):
 
 @pytest.fixture
 def broken(tables_dir):
-    """A client of an application whose tables raise what nobody foresaw."""
+    """A client of an application whose tables raise an unexpected error."""
     app = create_app(Settings(tables=(tables_dir,)), wait=True)
 
     def fail(*_args):
@@ -97,7 +97,7 @@ def test_an_unexpected_error_is_logged_and_not_shown(broken, case, problem, capl
     assert "secret detail" in JsonFormatter().format(record)
 
 
-def test_an_unexpected_error_of_a_plain_case_is_one_of_any_other(client, case, problem, caplog, monkeypatch):
+def test_an_unexpected_error_of_a_plain_case_is_handled_like_any_other(client, case, problem, caplog, monkeypatch):
     def fail(*_args):
         raise RuntimeError("secret detail")
 
@@ -158,7 +158,7 @@ def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed):
 
 
 @pytest.mark.parametrize("headers", [{"X-API-Key": "s3cret-key"}, {"Authorization": "bearer s3cret-key"}])
-def test_the_key_opens(closed, case, headers):
+def test_the_key_gives_access(closed, case, headers):
     response = closed.get("/v1/mu-macro", params=case, headers=headers)
     assert response.status_code == 200
     assert response.headers["cache-control"] == "private, max-age=3600"
@@ -232,7 +232,7 @@ def test_the_description_is_whole(client):
 
 
 def described_examples(document):
-    """(method, path, how to ask) for every example of the description; what needs no input is its own example."""
+    """(method, path, arguments) for every example of the description; operations without input count as examples."""
     schemas = document["components"]["schemas"]
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
@@ -291,7 +291,7 @@ def test_every_answer_forbids_guessing_its_type(client):
         assert client.get(path).headers["x-content-type-options"] == "nosniff"
 
 
-def test_a_page_that_the_caller_has_is_not_sent_again(client):
+def test_a_page_that_the_client_has_is_not_sent_again(client):
     pages = ["/", "/docs", "/v1/table.nc", *(f"/static/swagger-ui/{name}" for name in ASSETS)]
     pages += [f"/static/page/{name}" for name in PAGE_ASSETS]
     for path in pages:
@@ -360,7 +360,7 @@ def test_no_route_compresses_for_a_client_without_gzip(client, case, offer):
     assert "content-encoding" not in client.get("/v1/table.nc", headers=asked).headers
 
 
-def test_every_answer_has_the_headers_that_keep_a_browser_from_harm(client, case):
+def test_every_answer_has_the_security_headers(client, case):
     policies = {}
     for path in ("/", "/docs"):
         policy = client.get(path).headers["content-security-policy"]

@@ -84,7 +84,7 @@ SMALL = [
 
 
 @pytest.mark.parametrize("packing", ["identity", "gzip", "gzip;q=0, br", "*"])
-def test_a_small_batch_gets_the_same_answer_the_short_and_the_long_way(roomy, case, packing):
+def test_a_small_batch_gets_the_same_answer_on_the_fast_and_the_general_path(roomy, case, packing):
     texts = [(json.dumps({**case, **change}).encode(), status) for change, status in SMALL]
     texts += [(json.dumps([{**case, "v0": v0} for v0 in (0.1, -1, 0.2)]).encode(), 200)]
     texts += [(b"[]", 200), (b"[17, {}]", 200), (b"{", 400), (b"17", 422), (b'{"mu0": 0.3}' + b" " * 60_000, 422)]
@@ -101,7 +101,7 @@ def test_a_small_batch_gets_the_same_answer_the_short_and_the_long_way(roomy, ca
 def test_a_small_batch_is_counted_once(serving, surrogate, case):
     with serving(surrogate.path) as server:
         body = json.dumps({**case, "v0": [0.01] * 1000 + [-1]}).encode()
-        kinds = {"Content-Type": "application/json", "Accept-Encoding": "gzip"}  # too long for it to go the short way
+        kinds = {"Content-Type": "application/json", "Accept-Encoding": "gzip"}  # too long for the fast path
         for text, kind in ((body, kinds), (json.dumps({**case, "v0": [0.01, 0.02]}).encode(), kinds)):
             assert server.ask("POST", "/v1/mu-macro/batch", text, kind)[0] == 200
         lines = server.ask("GET", "/metrics")[2].decode().splitlines()
@@ -144,7 +144,7 @@ def test_a_request_that_is_not_http_does_no_harm(server):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stop_that_was_asked_for_is_a_success(serving, surrogate, number):
+def test_a_requested_stop_is_a_success(serving, surrogate, number):
     with serving(surrogate.path) as server:
         assert server.ask("GET", "/readyz")[0] == 200
         server.ask("GET", "/nowhere", headers={"X-Request-ID": "the-last"})
@@ -166,7 +166,7 @@ def test_several_workers_serve_and_stop(serving, surrogate):
 
 
 def test_batches_at_once_are_all_answered(serving, surrogate, case):
-    # The layer that numba falls back on without OpenMP ends the process when two threads use it at once.
+    # Without OpenMP numba uses a layer that ends the process when two threads use it at the same time.
     body = json.dumps([{**case, "v0": 1e-4 * index} for index in range(2000)])
     with serving(surrogate.path, NUMBA_THREADING_LAYER="workqueue") as server:
         with ThreadPoolExecutor(8) as pool:
@@ -202,10 +202,10 @@ def test_workers_whose_parent_is_killed_end_and_release_the_port(serving, surrog
         server.wait_for_tables(2)
         children = Path(f"/proc/{server.process.pid}/task/{server.process.pid}/children")
         if not children.exists():
-            pytest.skip("this system does not tell the children of a process")
+            pytest.skip("this system does not list the children of a process")
         workers = [int(number) for number in children.read_text().split()]
         assert len(workers) >= 2
-        body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})  # they are at work
+        body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})  # the workers are busy
         with ThreadPoolExecutor(4) as pool:
             asked = [pool.submit(server.ask, "POST", "/v1/mu-macro/batch", body) for _ in range(8)]
             server.process.send_signal(signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""What the service writes: whole lines of JSON whatever callers send, no secrets, and nobody waits for a reader."""
+"""The service's log: complete lines of JSON for any request, no secrets, and no waiting for the reader of the log."""
 
 import http.client
 import json
@@ -17,12 +17,12 @@ pytestmark = pytest.mark.slow
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 JSON = {"Content-Type": "application/json"}
-#: texts that a caller behind a proxy can put where the client's address stands
+#: texts that a client behind a proxy can send in place of its address
 NO_ADDRESS = ['a"b', "a\\", '1.2.3.4" "level": "error', "\t1.2.3.4", "{}", "\u00e9\u00ff", "a" * 5000]
 
 
 def fields_of(lines):
-    """Every line as an object; one that is no JSON, or has a name twice, fails the test."""
+    """Every line as an object; a line that is not JSON, or has a name twice, fails the test."""
 
     def once(pairs):
         names = [name for name, _ in pairs]
@@ -83,7 +83,7 @@ def test_no_key_is_logged_or_shown(serving, surrogate, case):
 
 @contextmanager
 def started(repository, surrogate):
-    """A service whose standard output is read up to the line with its port, and no further."""
+    """A service whose standard output is read up to the line with its port only."""
     command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
     process = subprocess.Popen(command, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
@@ -102,7 +102,7 @@ def started(repository, surrogate):
 
 
 def statuses(port, path, many=1):
-    """Answers to the same question on one connection."""
+    """Responses to the same request on one connection."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     found = []
     for _ in range(many):

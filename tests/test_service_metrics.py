@@ -1,4 +1,4 @@
-"""Counters: what they count, over all ways to an answer and over all workers."""
+"""Counters: their values, over all code paths and all workers."""
 
 import json
 import re
@@ -26,7 +26,7 @@ def samples(text):
 
 @pytest.fixture
 def fresh(tables_dir):
-    """A client of an application that has counted nothing yet."""
+    """A client of an application with all counters at zero."""
     with TestClient(create_app(Settings(tables=(tables_dir,)), wait=True)) as started:
         yield started
 
@@ -59,7 +59,7 @@ def test_requests_are_counted_by_route_method_and_status(fresh, case):
     assert 0 < found["mumacro_request_duration_seconds_sum", PATH] < 60
 
 
-def test_there_are_counters_before_the_first_question_is_answered(tables_dir, monkeypatch):
+def test_there_are_counters_before_the_first_request_is_answered(tables_dir, monkeypatch):
     app = create_app(Settings(tables=(tables_dir,)), wait=True)
     start, faults = app.state.metrics.start, []
 
@@ -73,8 +73,8 @@ def test_there_are_counters_before_the_first_question_is_answered(tables_dir, mo
     assert faults == ["the tables are not loaded yet"]
 
 
-def test_callers_make_no_labels(fresh, case):
-    """However many paths, methods and names callers think of, the number of series stays."""
+def test_clients_cannot_add_labels(fresh, case):
+    """The number of series does not depend on the paths, methods and names that clients send."""
 
     def ask(i):
         fresh.get(f"/nowhere/{i}")
@@ -84,7 +84,7 @@ def test_callers_make_no_labels(fresh, case):
 
     ask(0)
     before = scrape(fresh).keys()
-    before = scrape(fresh).keys()  # now it counts the first question for itself, too
+    before = scrape(fresh).keys()  # now it counts the first request to /metrics, too
     for i in range(1, 200):
         ask(i)
     assert scrape(fresh).keys() == before
@@ -103,17 +103,17 @@ def test_cases_are_counted_by_source_and_regime(fresh, case, surrogate):
         key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
         expected[key] = expected.get(key, 0) + 1
     assert {key: value for key, value in found.items() if key[0] == "mumacro_cases_total"} == expected
-    assert found["mumacro_bad_cases_total", surrogate.id] == 4  # a line of one bad case is a problem of its own
+    assert found["mumacro_bad_cases_total", surrogate.id] == 4  # of the batch; bad lines are not counted here
     assert found["mumacro_table_info", *sorted((surrogate.id, f"{surrogate.tolerance:g}"))] == 1
 
 
-def test_the_longer_way_counts_the_same(fresh, case, surrogate):
+def test_the_general_path_counts_the_same(fresh, case, surrogate):
     answer = fresh.get(PATH, params=case)
     fresh.get(PATH, params=case, headers={"If-None-Match": answer.headers["etag"]})
     fresh.get(PATH, params={**case, "include": "groups"})
     found = scrape(fresh)
     key = sorted((surrogate.id, answer.json()["source"], answer.json()["regime"]))
-    assert found["mumacro_cases_total", *key] == 2  # what the caller had already was not computed again
+    assert found["mumacro_cases_total", *key] == 2  # the response that the client had already was not computed again
     assert found["mumacro_requests_total", *sorted((PATH, "GET", "304"))] == 1
 
 
@@ -140,7 +140,7 @@ def test_every_worker_gives_the_sum_of_all(serving, surrogate, case):
         key = ("mumacro_requests_total", *sorted((PATH, "POST", "200")))
         deadline = time.monotonic() + PATIENCE_S
         in_a_row = 0
-        while in_a_row < 20:  # more scrapes than one worker would get by chance alone
+        while in_a_row < 20:  # more scrapes than one worker would get by chance
             found = samples(server.ask("GET", "/metrics")[2].decode())
             assert found.get(key, 0) <= asked
             in_a_row = in_a_row + 1 if found.get(key) == asked else 0

@@ -1,4 +1,4 @@
-"""The compiled reader of plain numeric columns: exact, and only for the ordinary."""
+"""The compiled reader of plain numeric columns: exact, and only for simple input."""
 
 import json
 import math

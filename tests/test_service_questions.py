@@ -1,4 +1,4 @@
-"""``/v1/solve-for``, ``/v1/law`` and ``/v1/law.csv`` over HTTP: values, forms, and every way to get them wrong."""
+"""``/v1/solve-for``, ``/v1/law`` and ``/v1/law.csv`` over HTTP: values, formats, and refusals."""
 
 import csv
 import io
@@ -88,7 +88,7 @@ def test_a_bad_question_is_refused_by_field(client, problem, changed, field):
 
 
 @pytest.mark.parametrize("path", ["/v1/solve-for", "/v1/law"])
-def test_a_body_that_is_not_a_question_is_refused(client, problem, path):
+def test_a_body_with_wrong_fields_is_refused(client, problem, path):
     for body, status in ((b"", 400), (b"{", 400), (b"[]", 422), (b"3", 422), (b"{}", 422)):
         problem(client.post(path, content=body), status)
     problem(client.post(path, content=b'{"target": NaN, "start": NaN}'), 422)
@@ -145,7 +145,7 @@ def test_a_law_goes_along_any_input(client, along):
     assert law["mu_macro"][77] == pytest.approx(middle["mu_macro"], rel=1e-14)
 
 
-def test_an_approximation_out_of_its_depth_is_null(client):
+def test_an_approximation_outside_its_range_is_null(client):
     text = client.post("/v1/law", json={**LAW, "y0": 1e-5, "include": ["approximations"]}).text
     law = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
     assert set(law["approximations"]["small_amplitude"]) == {None}

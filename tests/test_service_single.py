@@ -1,4 +1,4 @@
-"""One case over HTTP: values, includes, limits, caching, and every way to get it wrong."""
+"""One case over HTTP: values, includes, limits, caching, and refusals."""
 
 import json
 import math
@@ -23,7 +23,7 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def test_a_default_answer_holds_what_was_asked_for_and_no_more(client, case, surrogate):
+def test_a_default_answer_has_only_the_requested_fields(client, case, surrogate):
     answer = client.post(PATH, json=case).json()
     assert answer.keys() == DEFAULT
     assert answer["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
@@ -228,7 +228,7 @@ def test_a_refusal_suggests_the_right_field(client, case, problem, change, advic
     assert advice in fault["reason"]
 
 
-def test_one_value_is_had_as_text(client, case, problem):
+def test_one_value_is_returned_as_text(client, case, problem):
     answer = client.post(PATH, json={**case, "include": ["power"]}).json()
     plain = client.get(PATH, params=case, headers={"Accept": "text/plain"})
     assert (float(plain.text), plain.headers["content-type"]) == (answer["mu_macro"], "text/plain; charset=utf-8")
@@ -240,7 +240,7 @@ def test_one_value_is_had_as_text(client, case, problem):
     assert fault["parameter"] == "value"
 
 
-def test_most_cases_take_the_short_way(client, app, case):
+def test_most_cases_take_the_fast_path(client, app, case):
     def short():
         layer = app.middleware_stack
         while type(layer).__name__ != "SingleCase":
@@ -307,7 +307,7 @@ def test_json_is_read_whatever_the_case_of_its_type(client, case, content_type):
 
 
 def test_a_body_without_a_type_is_json(client, case):
-    # Some clients send none; the framework by itself would refuse such a body.
+    # Some clients send none; the framework alone would refuse such a body.
     request = client.build_request("POST", PATH, content=json.dumps(case))
     assert "content-type" not in request.headers
     assert client.send(request).json() == client.post(PATH, json=case).json()

@@ -1,4 +1,4 @@
-"""Strange requests: whatever arrives, the answer is an answer or a problem document, never a 500."""
+"""Strange requests: the response is always a result or a problem document, never a 500."""
 
 import json
 
@@ -69,4 +69,4 @@ def test_any_raw_query_is_answered(client, query):
 def test_half_of_a_surrogate_pair_is_refused_in_json_that_every_parser_reads(client, path, body):
     response = client.post(path, content=body.encode())
     assert response.status_code in (200, 400, 422)
-    orjson.loads(response.content)  # which is strict
+    orjson.loads(response.content)  # a strict parser

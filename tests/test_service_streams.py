@@ -82,13 +82,13 @@ def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(tables_dir, ca
     with TestClient(create_app(Settings(tables=(tables_dir,), max_body_bytes=1024, max_batch=3), wait=True)) as client:
         line = json.dumps(case) + "\n"
         assert len(lines_of(client.post(PATH, content=iter([line.encode()] * 100), headers=LINES))) == 100
-        refused = client.post(PATH, content=line * 100, headers=LINES)  # who tells a length may not read meanwhile
+        refused = client.post(PATH, content=line * 100, headers=LINES)  # a client with a length may read late
         assert "without a Content-Length" in refused.json()["detail"]
         over = json.dumps({**case, "v0": [0.1] * 4})
         (answer,) = lines_of(client.post(PATH, content=over, headers=LINES))
         assert (answer["status"], answer["max_batch"]) == (413, 3)
         pieces = iter([line.encode(), *[b" " * 600] * 3])
-        cut = client.post(PATH, content=pieces, headers=LINES)  # its answer had begun: it just ends
+        cut = client.post(PATH, content=pieces, headers=LINES)  # the response had begun: it is cut off
         assert len(cut.text.splitlines()) <= 1
 
 
@@ -254,7 +254,7 @@ def test_other_large_answers_are_compressed_but_not_the_file(client, case):
         assert packed.headers["content-encoding"] == "gzip"
         assert "accept-encoding" in packed.headers["vary"].lower()
         assert packed.content == plain.content
-    # Packed already, and its tag is the tag of its bytes.
+    # The file is compressed already, and its tag is that of its bytes.
     assert "content-encoding" not in client.get("/v1/table.nc", headers={"Accept-Encoding": "gzip"}).headers
 
 
@@ -306,7 +306,7 @@ def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(client, ca
     lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(n)]
     for index in bad:
         lines[index] = {**case, "v0": -1.0} if index % 2 else {**case, "speed": 1.0}
-    lines[1000] = {**case, "v0": [0.1, 0.2]}  # a block of columns that looks plain
+    lines[1000] = {**case, "v0": [0.1, 0.2]}  # columns in a line that looks like the others
     answers = lines_of(client.post(PATH, content="\n".join(map(json.dumps, lines)), headers=LINES))
     v0 = [1e-4 * (i + 1) for i in range(n)]
     expected = client.post(PATH, json={**case, "v0": v0}).json()["mu_macro"]

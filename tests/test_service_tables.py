@@ -18,7 +18,7 @@ HEALTH = ("/readyz", "/healthz")
 
 @pytest.fixture
 def table_copy(surrogate, tmp_path):
-    """A table that a test may damage."""
+    """A copy of a table that a test may damage."""
     return Path(shutil.copy(surrogate.path, tmp_path / surrogate.path.name))
 
 
@@ -109,7 +109,7 @@ def test_one_flipped_bit_is_noticed(table_copy, problem):
     table_copy.write_bytes(content)
     with started(table_copy) as client:
         assert client.get("/livez").status_code == 200
-        # The bit may lie in slack space of the file, where it changes no data: then the table is as good as ever.
+        # The bit may lie in unused space of the file, where it changes no data: then the table is still valid.
         response = client.get("/readyz")
         if response.status_code != 200:
             assert table_copy.name in problem(response, 503)["detail"]
@@ -121,7 +121,7 @@ def test_an_empty_directory_and_a_missing_one_are_named(tmp_path, problem):
             assert path.name in problem(client.get("/readyz"), 503)["detail"]
 
 
-def test_one_bad_table_among_good_ones_is_not_passed_over(table_copy, problem):
+def test_one_bad_table_among_good_ones_is_not_ignored(table_copy, problem):
     (table_copy.parent / "zzz.nc").write_bytes(b"")
     with started(table_copy.parent) as client:
         assert "zzz.nc" in problem(client.get("/readyz"), 503)["detail"]
@@ -185,7 +185,7 @@ def test_two_tables_of_one_name_are_refused(tmp_path, table_copy, surrogate, pro
 
 @pytest.fixture
 def tables():
-    """Three tables: the tighter the larger, and one that is tight and small."""
+    """Three tables: a tighter one is larger, except one that is tight and small."""
 
     def table(name, tolerance, size):
         return LoadedTable(SimpleNamespace(id=name, tolerance=tolerance), None, (size, 0, 0))

@@ -1,4 +1,4 @@
-"""However a case is asked, the answer has the same bits: every endpoint, every format, and the library itself."""
+"""A case has the same bits from every endpoint, in every format, and from the library."""
 
 import csv
 import json
@@ -29,7 +29,7 @@ def columns():
 
 @pytest.fixture(scope="module")
 def expected(surrogate, columns):
-    """What the library answers to all at once."""
+    """The library's answer for all cases at once."""
     return surrogate.evaluate(columns).mu_macro
 
 
@@ -160,7 +160,7 @@ WAYS = [
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
-def test_every_way_of_asking_gives_the_same_bits(client, surrogate, columns, expected, way):
+def test_every_endpoint_and_format_gives_the_same_bits(client, surrogate, columns, expected, way):
     found = np.array(way(client, surrogate, columns), dtype=np.float64)
     assert found.size in (MANY, FEW)
     assert np.array_equal(found.view(np.int64), expected[: found.size].view(np.int64))

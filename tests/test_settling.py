@@ -23,11 +23,11 @@ def of(surrogate, v, y, **more):
 
 
 def at_rest_angles(v: float, y: float) -> tuple[float, float]:
-    """Cosine of the angle that the spring turns through while the contact sticks, and the stick's share."""
+    """Cosine of the angle by which the spring turns during stick, and the stick fraction."""
     w, out, orbit, res = workspace()
     assert solve_raw(v, y, y - 1.0, w, out, orbit, res) == 0
     duration, start = orbit[0], orbit[4]
-    # the foot rests: the spring's end moves with the upper point; both ends are on the unit circle
+    # in stick the spring's end moves with the upper point; start and end are on the unit circle
     across = y * (math.cos(start + duration) - math.cos(start))
     return 1.0 - 0.5 * ((v * duration) ** 2 + across * across), res[3]
 
@@ -75,7 +75,7 @@ def test_any_disturbance_is_gone_in_time(surrogate, naive, v, y) -> None:
         first = float(np.hypot(*(np.array(start) - steady)))
         for n in (1, 3, math.ceil(found.periods_any)):
             left = float(np.hypot(*(naive.march(v, y, 4000, n, *start)[-1] - steady)))
-            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3  # the steps of the march
+            assert left <= first * math.exp(-0.5 * n * found.slip_path) + 2e-3  # error of the time steps
             if n >= found.periods_any:
                 assert left <= 0.01 * first + 2e-3
 
@@ -106,7 +106,7 @@ def test_without_oscillation_the_drag_decides(surrogate) -> None:
 def test_at_zero_speed_only_large_amplitudes_settle(surrogate) -> None:
     for y, slips in ((0.5, False), (1.0, False), (1.5, True)):
         found = of(surrogate, 0.0, y)
-        # slip in every half period is what the stroke 2 y~ exceeds the diameter by
+        # slip in every half period is the stroke 2 y~ minus the diameter
         assert found.slip_path == pytest.approx(4.0 * (y - 1.0) if slips else 0.0, rel=1e-9)
 
 

@@ -1,4 +1,4 @@
-"""Threads, processes and pickles: the same bits everywhere, nothing waits, nothing is left over that a fork misses."""
+"""Threads, processes and pickles: the same bits everywhere, no blocking, no state that a fork loses."""
 
 import multiprocessing
 import operator
@@ -39,7 +39,7 @@ def points(n: int, seed: int = 1) -> tuple[Array, Array]:
 
 
 def everything(table: Surrogate, n: int = N, seed: int = 1) -> bytes:
-    """The bits of all that a table says of some points."""
+    """The bits of all quantities of a table at some points."""
     v, y = points(n, seed)
     inputs = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": y, "omega": 1.0, "v0": v}
     answer = table.evaluate(inputs, gradient=True)
@@ -72,7 +72,7 @@ def test_one_thread_means_that_none_is_started(table: Surrogate, monkeypatch: py
     assert everything(table.on_one_thread()) == expected
     with pytest.raises(AssertionError, match="a thread was started"):
         table.mu_ratio(*points(N))
-    # columns are answered on the calling thread, whatever the table was opened with
+    # columns are evaluated on the calling thread, for any number of threads of the table
     v, y = points(N)
     one = np.ones(1)
     table.evaluate_columns(0.5 * one, 2.0 * one, one, y, one, v)
@@ -85,7 +85,7 @@ def test_no_thread_outlives_its_call(table: Surrogate) -> None:
 
 
 def workers() -> Iterator[Any]:
-    """Ways to hand a call to a worker, by name: each calls a function with an argument and returns what it says."""
+    """Ways to hand a call to a worker, by name: each calls a function with an argument and returns its result."""
 
     def executor(pool: Any) -> Callable[..., Any]:
         def call(function: Any, argument: Any) -> Any:
@@ -202,7 +202,7 @@ def test_a_small_call_does_not_wait_for_a_large_one(table: Surrogate) -> None:
 # --- processes ----------------------------------------------------------------------------------------
 
 
-_here: Surrogate | None = None  # what a forked child finds
+_here: Surrogate | None = None  # for a forked child
 
 
 def _ask(seed: int) -> bytes:
@@ -212,7 +212,7 @@ def _ask(seed: int) -> bytes:
 
 @pytest.fixture
 def inherited(table: Surrogate) -> Surrogate:
-    """The table after a large call, where a forked child finds it."""
+    """The table after a large call, stored for a forked child."""
     global _here
     table.mu_ratio(*points(N))
     _here = table
@@ -220,7 +220,7 @@ def inherited(table: Surrogate) -> Surrogate:
 
 
 def child(work: Callable[[], bytes]) -> bytes:
-    """What ``work`` gives in a forked child; the child has a minute."""
+    """The result of ``work`` in a forked child, within a minute."""
     read, write = os.pipe()
     number = os.fork()
     if number == 0:
@@ -318,7 +318,7 @@ def test_a_bundled_table_is_pickled_by_name_and_checksum(tmp_path: Path, reposit
     opened = Surrogate.open(1e-10, threads=3)
     data = pickle.dumps(opened)
     assert len(data) < 500
-    assert str(opened.path.parent).encode() not in data  # it may be installed elsewhere over there
+    assert str(opened.path.parent).encode() not in data  # its path may differ in the other process
     assert opened.checksum.encode() in data
     assert in_another_process(data, tmp_path, repository) == told(opened)
 

@@ -1,4 +1,4 @@
-"""The exact solver: against an independent quadruple-precision solver, a naive one, its own invariants and limits."""
+"""The exact solver: compared with an independent quadruple-precision solver, a naive one, invariants and limits."""
 
 import math
 from collections.abc import Callable
@@ -89,12 +89,12 @@ def test_naive_solver_agrees_to_its_own_error_which_halves_with_its_step(v: floa
     coarse, fine = (naive.mu_ratio(v, y, steps) - mu for steps in (8_000, 16_000))
     assert abs(fine) < 1e-4
     assert coarse / fine == pytest.approx(2.0, abs=0.03)
-    assert abs(2.0 * fine - coarse) < 2e-6  # what is left once the first-order error is extrapolated away
+    assert abs(2.0 * fine - coarse) < 2e-6  # error after extrapolation of the first-order term
 
 
 @pytest.mark.parametrize(("v", "y"), ORDINARY)
 def test_naive_orbit_is_antisymmetric_about_half_a_period(v: float, y: float, naive: ModuleType) -> None:
-    # the naive solver marches whole periods and knows nothing of the symmetry that the exact one relies on
+    # the naive solver marches whole periods and does not use the symmetry that the exact one uses
     orbit = naive.march(v, y, 4_000, naive.periods_until_steady(v, y))
     first, second = orbit[:2_000], orbit[2_000:]
     assert np.abs(second[:, 0] - first[:, 0]).max() < 1e-14
@@ -143,12 +143,12 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     stick_mean = integral(ux, start, stop)
     drive = v * stick_mean
     shaker = integral(lambda s: -y * math.sin(s) * uy(s), start, stop)
-    assert drive + shaker == pytest.approx(0.0, abs=1e-13 * (1.0 + y))  # the spring returns all it took
+    assert drive + shaker == pytest.approx(0.0, abs=1e-13 * (1.0 + y))  # the spring stores no net energy
 
     assert (stick_mean + out[SUM_UX]) / math.pi == pytest.approx(res[steady.MU_RATIO], abs=1e-15)
     assert (shaker + out[WORK]) / math.pi == pytest.approx(res[steady.POWER], abs=1e-13 * (1.0 + y))
     assert out[PATH] / math.pi == pytest.approx(res[steady.SLIP_SPEED], rel=1e-15)
-    # what drive and shaker put in is what friction takes out
+    # the work of drive and shaker equals the dissipation
     assert (drive + shaker + v * out[SUM_UX] + out[WORK]) / math.pi == pytest.approx(res[steady.SLIP_SPEED], rel=1e-12)
     # and slip ends, mirrored, exactly where stick started
     assert out[SIGMA] == pytest.approx(start, abs=1e-14)
@@ -193,7 +193,7 @@ def test_amplitudes_below_the_scaled_one_report_unscaled_speeds(v: float, y: flo
 
 
 def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
-    # the window of slip lasts sqrt(v~); down at 1e-96 a bisection of 100 steps no longer finds its end
+    # slip lasts sqrt(v~); at 1e-96 a bisection of 100 steps does not find its end
     for exponent in range(-200, -4, 4):
         v = 2.77 * 10.0**exponent
         found = solve(v, 0.8917)
@@ -209,7 +209,7 @@ def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
 def test_mu_rises_strictly_with_speed(y: float, sweep: Sweep) -> None:
     v = np.geomspace(1e-9, 1e5, 4000)
     solved = sweep.solve("full", v, np.full_like(v, y))
-    # neighbours differ by 0.8 % in v~, which near mu~ = 1 shows in the deficit alone
+    # neighbours differ by 0.8 % in v~, which near mu~ = 1 is visible only in 1 - mu~
     rising = np.where(solved["mu_ratio"] < 0.5, solved["mu_ratio"], -solved["deficit"])
     low, high = rising[:-1], rising[1:]
     both = (low > 0.0) == (high > 0.0)
@@ -285,7 +285,7 @@ def test_corner_follows_the_normal_form_in_every_direction(psi: float) -> None:
 
 
 def test_amplitude_excess_is_used_beyond_the_digits_of_the_amplitude() -> None:
-    # 1 + 1e-18 is 1 in double precision, and mu~ at v~ = 1e-27 tells the two apart
+    # 1 + 1e-18 is 1 in double precision, but mu~ at v~ = 1e-27 differs
     v, eta = 1e-27, 1e-18
     phi = math.cbrt(math.pi * v)
     for _ in range(60):
@@ -323,13 +323,13 @@ def test_dip_of_the_slip_speed_between_two_samples_is_seen(y: float, distance: f
     assert below.min_slip_speed < 0.0  # of the continuous orbit, which is therefore not admissible
     assert below.mu_ratio == pytest.approx(mu_crit, abs=distance)
     if distance <= 1e-8:
-        # stick changes mu~ by O(distance^2) only: the continuous orbit still has every digit
+        # stick changes mu~ by O(distance^2) only: the continuous orbit has all digits
         smooth = sweep.solve("continuous", np.array([crit * (1.0 - distance)]), np.array([y]))["mu_ratio"][0]
         assert below.mu_ratio == pytest.approx(smooth, rel=2e-15, abs=0.0)
 
 
 def test_border_points_between_the_samples_of_a_dense_cloud(sweep: Sweep) -> None:
-    """Beside the border, at distances down to the last digit, the sticking and the continuous orbit say the same."""
+    """Beside the border, at distances down to the last digit, the sticking and the continuous orbit agree."""
     rng = np.random.default_rng(11)
     y = log_uniform(rng, 1e-6, 1e7, 1500)
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
@@ -351,7 +351,7 @@ def test_border_points_between_the_samples_of_a_dense_cloud(sweep: Sweep) -> Non
     ],
 )
 def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> None:
-    # mu~ came out as -0.39 here, as success, or the section failed: its root and its edge are one to rounding
+    # mu~ was once -0.39 here, as "success", or the section failed: its root equals its edge to rounding
     found = solve(v, y)
     assert found.ok
     assert found.mu_ratio == pytest.approx(steady.border(y)[1], rel=1e-14)
@@ -397,7 +397,7 @@ def test_every_status_has_advice() -> None:
 
 
 def test_a_stick_phase_without_end_has_its_own_status() -> None:
-    # slip stops with the spring nearly across: half a swing of 2 y~ = 0.4 back cannot stretch it to the limit again
+    # slip stops with the spring nearly transverse: a stroke of 2 y~ = 0.4 cannot stretch it to the limit again
     w, out, orbit, _ = workspace()
     _, status = sections._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)
     assert status == NO_SLIP

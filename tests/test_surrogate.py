@@ -1,4 +1,4 @@
-"""The surrogate's manners: shapes, types, threads, pickles, xarray, and its answers where tables end or meet."""
+"""The surrogate: shapes, types, threads, pickles, xarray, and its answers at edges and seams of tables."""
 
 import json
 import math
@@ -107,7 +107,7 @@ def test_speeds_whose_square_overflows_still_follow_the_elliptic_integral(table:
 
 
 def test_bound_next_to_the_corner_is_small(table: Surrogate) -> None:
-    # one digit of y~ moves mu~ by at most the root of two digits, however steep the cusp is
+    # one digit of y~ changes mu~ by at most the root of two digits, also at the cusp
     v = np.geomspace(1e-300, 1e-9, 400)
     _, bound, _ = table.ratio_with_bound(v, 1.0)
     assert bound.max() <= 1e-7 + table.tolerance
@@ -153,7 +153,7 @@ def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: S
     assert np.array_equal(stick, table.stick_fraction(v, y))
     assert np.all(np.isfinite(of_power) & (of_power > 0.0))
     assert np.all((of_stick >= 0.0) & (of_stick <= math.sqrt(table.border.max_rel_error) + 20.0 * table.tolerance))
-    # for small amplitudes next to the power itself only what doubles cannot hold
+    # the bound is small relative to the power, except for denormal numbers
     ordinary = power > 1e-280
     assert np.all(of_power[ordinary] <= 1e-3 * power[ordinary])
     one = table.power_with_bound(float(v[0]), float(y[0]))
@@ -165,9 +165,9 @@ def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: S
 @pytest.mark.parametrize("y", [1.5, 2.0, 1e2, 1e5])
 @pytest.mark.parametrize("v", [1e4, 1e8, 1e50, 1e140, 1e160, 1e250])
 def test_power_at_large_speed_is_that_of_the_shaker_against_friction(table: Surrogate, v: float, y: float) -> None:
-    """p = y~^2/(2 v~) for y~ << v~, whatever digits a closed form would lose."""
+    """p = y~^2/(2 v~) for y~ << v~, where a closed form would lose digits."""
     if y > 1e-3 * v:
-        pytest.skip("not small beside the speed")
+        pytest.skip("the amplitude is not small compared with the speed")
     expected = 0.5 * y * (y / v)
     power, bound = table.power_with_bound(v, y)
     assert abs(power - expected) <= bound + expected * (1.0 / v**2 if v < 1e100 else 0.0) + expected * (y / v) ** 2
@@ -175,7 +175,7 @@ def test_power_at_large_speed_is_that_of_the_shaker_against_friction(table: Surr
 
 
 def test_powers_and_friction_balance(fine: Surrogate, sweep: Sweep) -> None:
-    # v~ mu~ + power is the slip path, which the exact solver knows to be at least v~ mu~ (the shaker never gains)
+    # v~ mu~ + power is the slip path; in the exact solver it is at least v~ mu~ (the shaker gains no work)
     rng = np.random.default_rng(12)
     v, y = log_uniform(rng, 1e-6, 1e4, 2000), log_uniform(rng, 1e-3, 1e5, 2000)
     solved = sweep.solve("full", v, y)
@@ -368,7 +368,7 @@ def test_threads_out_of_bounds_are_refused(tables_dir: Path, threads: Any) -> No
         Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=threads)
 
 
-def test_groups_of_arrays_are_there_where_they_are_asked_for(tables_dir: Path) -> None:
+def test_groups_of_arrays_are_returned_if_requested(tables_dir: Path) -> None:
     table = Surrogate.open(tables_dir / "mumacro-1e-7.nc")
     columns = {**CASE, "v0": np.array([0.0, 1e-3, 0.01])}
     plain = table.evaluate(**columns)
@@ -397,9 +397,7 @@ def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(tables
 
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}])
 @pytest.mark.parametrize("shape", [(0,), (0, 3)])
-def test_no_cases_have_no_answers_and_no_excuse(
-    tables_dir: Path, shape: tuple[int, ...], asked: dict[str, bool]
-) -> None:
+def test_empty_arrays_give_empty_answers(tables_dir: Path, shape: tuple[int, ...], asked: dict[str, bool]) -> None:
     table = Surrogate.open(tables_dir / "mumacro-1e-7.nc")
     found = table.evaluate(**{**CASE, "v0": np.empty(shape)}, **asked)
     assert found.mu_macro.shape == found.error_bound.shape == found.source.shape == shape

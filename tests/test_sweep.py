@@ -1,4 +1,4 @@
-"""Many solves at once: the same numbers however the work is cut, resumed where it stopped, and no silent hole."""
+"""Many solves at once: the same numbers for any division of the work, resumed after a stop, and no missing points."""
 
 import math
 from pathlib import Path
@@ -88,7 +88,7 @@ def test_finished_work_is_kept_and_taken_up_again(tmp_path: Path, monkeypatch: p
     with Sweep(1, checkpoint=folder) as sweep:
         monkeypatch.setattr(sweep, "_run", not_again)
         found = sweep.solve("full", v, y)
-        assert sweep.n_solves == 50  # what a build counts is the same, resumed or not
+        assert sweep.n_solves == 50  # the count is the same, resumed or not
         with pytest.raises(AssertionError, match="solved again"):
             sweep.solve("continuous", v, y)
         with pytest.raises(AssertionError, match="solved again"):

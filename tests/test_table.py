@@ -1,4 +1,4 @@
-"""The table file in detail: numbers that change, parts that are gone, writes that fail half-way."""
+"""The table file in detail: changed numbers, missing parts, failed writes."""
 
 import os
 import shutil
@@ -35,11 +35,11 @@ def test_a_byte_flipped_in_the_numbers_is_always_refused(copy: Path) -> None:
     corner = sound.blocks[CORNER]
     for numbers in (sound.border[0].values.tobytes(), sound.border[0].nodes.tobytes(), corner.a.tobytes()):
         place = whole.find(numbers)
-        assert place > 0  # a handful of numbers is stored as it is
+        assert place > 0  # a few numbers are stored uncompressed
         for offset in range(0, len(numbers), 7):
             changed = bytearray(whole)
             changed[place + offset] ^= 1 << (offset % 8)
-            copy.unlink()  # HDF5 may hold on to a file that it could not read; a new one is another file
+            copy.unlink()  # HDF5 may keep a file open that it could not read; so make a new file
             copy.write_bytes(changed)
             with pytest.raises(TableError, match=r"checksum|non-finite|are not those of this program"):
                 read_table(copy)
@@ -47,7 +47,7 @@ def test_a_byte_flipped_in_the_numbers_is_always_refused(copy: Path) -> None:
 
 @pytest.mark.slow
 def test_a_byte_flipped_anywhere_is_refused_or_changes_nothing(copy: Path) -> None:
-    """Headers, heaps and compressed numbers: what opens in spite of it holds the numbers of the sound table."""
+    """Headers, heaps and compressed numbers: a file that still opens has the numbers of the intact table."""
     whole, sound = TABLE.read_bytes(), read_table(TABLE)
     refused = 0
     for offset in range(0, len(whole), 631):
@@ -62,7 +62,7 @@ def test_a_byte_flipped_anywhere_is_refused_or_changes_nothing(copy: Path) -> No
         else:
             assert opened.attributes == sound.attributes
             _same_numbers(opened, sound)
-    # slack between the parts of the file changes no number
+    # unused bytes of the file change no number
     assert refused > 0.7 * len(whole) / 631
 
 
@@ -132,7 +132,7 @@ def test_attributes_of_a_block_are_needed_and_covered_by_the_checksum(copy: Path
 
 
 def foreign(path: Path, change: Callable[[Table], None]) -> Path:
-    """The sound table changed, at ``path``, with the checksum of what it holds now."""
+    """The intact table with a change, written to ``path`` with a matching checksum."""
     table = read_table(TABLE)
     change(table)
     write_table(table, path)
@@ -167,7 +167,7 @@ def test_nodes_of_another_border_are_refused_whatever_the_checksum(tmp_path: Pat
 def test_another_atlas_is_refused_whatever_the_checksum(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str, block: str
 ) -> None:
-    """A release with other charts writes a table and its checksum; this one refuses it and says what differs."""
+    """A release with other charts writes a table and its checksum; this one refuses it and names the difference."""
     index = NAMES.index(block)
     old = CHARTS[index]
     new, told = {
@@ -186,7 +186,7 @@ def test_another_atlas_is_refused_whatever_the_checksum(
         other.setattr(charts, "CHARTS", (*CHARTS[:index], new, *CHARTS[index + 1 :]))
         other.setattr(charts, "NAMES", tuple(chart.name for chart in charts.CHARTS))
         checksum = write_table(table, tmp_path / "other.nc")
-        assert read_table(tmp_path / "other.nc").attributes["content_sha256"] == checksum  # it is right there
+        assert read_table(tmp_path / "other.nc").attributes["content_sha256"] == checksum  # valid there
     with pytest.raises(TableError, match=told):
         read_table(tmp_path / "other.nc")
 
@@ -282,7 +282,7 @@ def test_a_file_larger_than_any_table_is_refused_unread(tmp_path: Path) -> None:
 
 
 def test_a_table_of_format_2_is_refused_by_its_version(tmp_path: Path) -> None:
-    """As releases before this one wrote them: three errors a block, two checksums, no ranges."""
+    """As written by earlier releases: three errors a block, two checksums, no ranges."""
     path = tmp_path / "old.nc"
     with netCDF4.Dataset(str(path), "w") as root:
         root.setncatts({"format_version": np.int32(2), "content_sha256": "0" * 64, "bounds_sha256": "0" * 64,
@@ -326,7 +326,7 @@ def test_the_same_numbers_give_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_a_write_that_fails_half_way_leaves_the_old_file_and_nothing_else(copy: Path) -> None:
-    """A limit on the size of files stands in for a full disc."""
+    """A limit on file sizes simulates a full disk."""
     resource = pytest.importorskip("resource")
     sound, before = read_table(copy), copy.read_bytes()
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -343,7 +343,7 @@ def test_a_write_that_fails_half_way_leaves_the_old_file_and_nothing_else(copy: 
 
 
 def _small_disc(path: Path) -> bool:
-    """Mount 64 kB of memory at ``path``; False where this user or machine may not."""
+    """Mount 64 kB of memory at ``path``; False if this user or machine does not allow it."""
     mount = shutil.which("mount")
     if mount is None:
         return False
@@ -355,7 +355,7 @@ def test_a_full_disc_gives_an_error_and_leaves_nothing(tmp_path: Path) -> None:
     disc = tmp_path / "disc"
     disc.mkdir()
     if not _small_disc(disc):
-        pytest.skip("no small file system may be mounted here")
+        pytest.skip("mounting a small file system is not permitted here")
     try:
         (disc / "before.txt").write_text("kept")
         with pytest.raises(TableError, match=r"new\.nc: cannot be written: No space left on device"):
@@ -383,7 +383,7 @@ def test_a_folder_as_output_is_refused(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["taken.nc"]
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is forbidden to this user")
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="this user may write everywhere")
 def test_a_folder_that_must_not_be_written_to(tmp_path: Path) -> None:
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o500)

@@ -1,4 +1,4 @@
-"""The table file: what it holds, what is refused, and builds that are killed."""
+"""The table file: its contents, refused files, and killed builds."""
 
 import os
 import signal
@@ -52,7 +52,7 @@ def test_a_person_plots_it_in_one_line(source):
 def test_the_plain_grid_is_solved(source, sweep):
     with xr.open_dataset(source) as data:
         solved = sweep.solve("full", data.v_tilde.values[:, None], data.y_tilde.values[None, :])
-        # to the digits that the file keeps, and the file says by how much it is off
+        # to the digits stored in the file, with the error stated there
         np.testing.assert_allclose(data.mu_ratio.values, solved["mu_ratio"], rtol=data.tolerance / STEPS, atol=0.0)
         assert np.all(np.abs(data.mu_ratio.values - solved["mu_ratio"]) <= data.error_estimate.values)
         stick = solved["stick_fraction"]

@@ -1,4 +1,4 @@
-"""Numbers that are rounded to the tolerance of their table: by how much, and that files hold them so."""
+"""Numbers rounded to the tolerance of their table: the rounding step, and the rounded values in files."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The committed tables as files: conventions, size, and what their numbers must look like to a reader."""
+"""The committed tables as files: conventions, size, and plausible numbers."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ import xarray as xr
 from builder.rounding import STEPS
 
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
-#: of format 3, as the netCDF library writes it
+#: format 3, written by the netCDF library
 BYTES = {"mumacro-1e-4": 130_000, "mumacro-1e-7": 210_000, "mumacro-1e-10": 350_000, "mumacro-1e-12": 430_000}
 SCRIPT = Path(sys.executable).parent / "compliance-checker"
 
@@ -33,7 +33,7 @@ def test_files_are_small(path: Path) -> None:
         variables: list[h5py.Dataset] = []
         root.visititems(lambda _, item: variables.append(item) if isinstance(item, h5py.Dataset) else None)
         numbers = sum(variable.id.get_storage_size() for variable in variables)
-    # names, units, links, groups: what the file holds beside its numbers
+    # names, units, links, groups: contents other than numbers
     assert path.stat().st_size - numbers <= 2_300 * len(variables)
 
 
@@ -42,7 +42,7 @@ def test_plain_grid_reads_like_the_surface(path: Path) -> None:
     with xr.open_dataset(path) as data:
         mu = data.mu_ratio.values
         assert np.all((mu > 0.0) & (mu <= 1.0))
-        assert np.all(np.diff(mu, axis=0) >= -1e-15)  # along v~; in the static limit neighbours are one to rounding
+        assert np.all(np.diff(mu, axis=0) >= -1e-15)  # along v~; in the static limit neighbours are equal to rounding
         assert np.all(np.diff(mu, axis=1) <= 1e-15)
         stick = data.stick_fraction.values
         sliding = data.v_tilde.values[:, None] >= data.v_tilde_crit.values

@@ -1,4 +1,4 @@
-"""tables/README.md says what the committed tables say of themselves."""
+"""tables/README.md agrees with the metadata of the committed tables."""
 
 import re
 from pathlib import Path

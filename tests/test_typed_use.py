@@ -1,4 +1,4 @@
-"""What the documentation shows is so: examples of docstrings run, and a user's typed program passes the checker."""
+"""The documentation is correct: examples of docstrings run, and a user's typed program passes the checker."""
 
 import doctest
 import importlib
@@ -13,7 +13,7 @@ import pytest
 import mumacro
 
 LEFT_OUT = {"mumacro.__main__"}
-for package in ("jax", "torch"):  # hundreds of megabytes, which no test needs but their own
+for package in ("jax", "torch"):  # hundreds of megabytes, needed only by their own tests
     if importlib.util.find_spec(package) is None:
         LEFT_OUT |= {f"mumacro.{package}", f"mumacro.interop.{package}"}
 MODULES = sorted(

@@ -171,7 +171,7 @@ def test_a_wrong_sens_or_vec_is_invalid_input(client, wrong):
 
 
 def test_an_infinite_slope_is_invalid_output(client):
-    # y~ = 1 to the last bit: the friction law starts as the cube root of the speed
+    # y~ = 1 to the last bit: mu_macro grows with the cube root of the speed
     body = {"name": "mu_macro", "input": [[1.0, 1.0, 1.0, 1.0, 1.0, 0.0]]}
     assert ask(client, "Evaluate", body).json() == {"output": [[0.0]]}
     refused(ask(client, "Gradient", {**body, **WRT, "sens": [1.0]}), "InvalidOutput", 500)

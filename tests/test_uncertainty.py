@@ -1,4 +1,4 @@
-"""Gradient and power against the full model: its solves at random inputs, a time integration."""
+"""Gradient and power compared with the full model: solves at random inputs, a time integration."""
 
 import math
 
@@ -17,7 +17,7 @@ PLACES = {
 
 
 def full_model(columns):
-    """mu_macro [-] of the full model for columns (n,) of the six inputs: no table, no surrogate."""
+    """mu_macro [-] of the full model for columns (n,) of the six inputs, without a table."""
     mu0, load, k, y0, omega, v0 = columns
     length = mu0 * load / k
     places = zip((v0 / (length * omega)).tolist(), (y0 / length).tolist(), strict=True)
@@ -26,7 +26,7 @@ def full_model(columns):
 
 @pytest.mark.parametrize("place", PLACES)
 def test_first_order_uncertainty_agrees_with_the_full_model(surrogate, sweep, place):
-    """The standard deviation of mu_macro to first order, against that of solves at random inputs."""
+    """The standard deviation of mu_macro to first order, compared with solves at random inputs."""
     case = {**CASE, **PLACES[place]}
     share = {"mu0": 0.004, "Fz": 0.003, "k": 0.004, "y0": 0.003, "omega": 0.002, "v0": 0.005}
     std = {name: share[name] * value for name, value in case.items()}
@@ -62,7 +62,7 @@ def test_the_power_is_that_of_a_plain_time_integration(surrogate, naive, place):
     means = []
     for steps in (20_000, 40_000):
         orbit = naive.march(v, y, steps, periods)
-        # a step ends with what the displacement during it did: velocities at its middle, elongations at both ends
+        # midpoint rule: velocities at the middle of a step, elongations at both ends
         tau = 2.0 * math.pi * (np.arange(steps) + 0.5) / steps
         before = np.roll(orbit, 1, axis=0)
         middle = 0.5 * (orbit + before)

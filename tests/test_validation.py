@@ -1,4 +1,4 @@
-"""validation.md, model.md and validity.md hold what their scripts measure; nothing of the paper is left out."""
+"""validation.md, model.md and validity.md contain their scripts' results; the paper is covered completely."""
 
 import importlib
 import re
@@ -19,7 +19,7 @@ NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
 
 
 def load(name: str) -> ModuleType:
-    """A script of benchmarks/ as a module, with its neighbours importable and the path as it was afterwards."""
+    """A script of benchmarks/ as a module, the folder is on the path only during the import."""
     sys.path.insert(0, str(ROOT / "benchmarks"))
     try:
         return importlib.import_module(name)
@@ -50,7 +50,7 @@ def test_a_section_is_what_is_measured(script: dict[str, Callable[[], str]], sec
         parts(text) for text in (script[section](), measuring.read_section(section, page))
     )
     assert words.split() == printed_words.split()
-    # rounding of the last digit shown; differences of rounding size are noise themselves
+    # rounding of the last digit shown; differences of rounding size are noise
     assert numbers == pytest.approx(printed, rel=0.06, abs=2e-11)
 
 
@@ -82,5 +82,5 @@ def test_the_statements_between_the_tables() -> None:
     y = np.linspace(0.05, 1.0, 20)
     top = np.array([border(float(a))[1] for a in y])
     assert np.abs(closed_forms.critical_next(y) / top - 1.0).max() == pytest.approx(0.0024, rel=0.02)
-    # mu~ goes on to 1 around v~ = 1: the loss halves there
+    # mu~ approaches 1 around v~ = 1: there 1 - mu~ halves
     assert solve(1.0, 0.1).deficit / (1.0 - border(0.1)[1]) == pytest.approx(0.5, abs=0.002)

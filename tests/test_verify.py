@@ -1,4 +1,4 @@
-"""The verifier must find what is wrong with a table; a judge that always says yes proves nothing."""
+"""The verifier must find the faults of a wrong table."""
 
 import copy
 import math
@@ -90,7 +90,7 @@ def test_a_jump_at_a_seam_is_found(sound: Surrogate) -> None:
 
 def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
     assert monotony(sound, n=2000, lines=40) <= 1e-7
-    # mu~ too high below the border: it falls where v~ rises across it
+    # mu~ is too high below the border: it falls as v~ crosses the border upwards
     assert monotony(damaged("stick_slip_mid_2", 1.01), n=2000, lines=40) >= 1e-3
 
 
@@ -104,7 +104,7 @@ def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None
         assert errors.relative <= 10.0 * sound.tolerance
     wrong = block_errors(damaged("corner", 1.0 + 1e-5), sweep, 200, seed=1)[NAMES.index("corner")]
     assert wrong.errors[MU, 0] == pytest.approx(1e-5, rel=0.3)
-    assert wrong.errors[MU, 1:].max() > 1e-6  # the slopes of what is off by a factor are off by the same factor
+    assert wrong.errors[MU, 1:].max() > 1e-6  # the slopes are wrong by the same factor
 
 
 def test_report_of_power_stick_fraction_and_slopes(sound: Surrogate, sweep: Sweep) -> None:

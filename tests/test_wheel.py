@@ -1,4 +1,4 @@
-"""The wheel in an environment of its own, without the checkout: what ``pip install mumacro`` gives."""
+"""The wheel in a separate environment, without the checkout: the result of ``pip install mumacro``."""
 
 import importlib.metadata
 import json
@@ -19,13 +19,13 @@ CORE = ("numpy", "numba", "llvmlite", "h5py")
 
 
 class Installed:
-    """A virtual environment that holds the wheel and what it needs, and nothing of the checkout."""
+    """A virtual environment with the wheel and its dependencies, without the checkout."""
 
     def __init__(self, folder: Path, wheel: Path) -> None:
         self.folder = folder
         venv.create(folder / "venv", with_pip=True)
         self.bin = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
-        # the versions that are tested here, most likely still in pip's cache
+        # the tested versions, probably in pip's cache
         pins = folder / "pins.txt"
         pins.write_text("".join(f"{name}=={importlib.metadata.version(name)}\n" for name in CORE))
         self.run("python", "-m", "pip", "--disable-pip-version-check", "install", "-q", "-c", str(pins), str(wheel))
@@ -56,7 +56,7 @@ def installed(wheel, tmp_path_factory):
     return Installed(tmp_path_factory.mktemp("bare"), wheel)
 
 
-def test_a_question_is_answered_with_the_bits_of_the_checkout(installed):
+def test_a_case_is_answered_with_the_bits_of_the_checkout(installed):
     answer = json.loads(installed.run("mumacro", CASE, "--json"))
     assert answer["mu_macro"] == Surrogate.open().evaluate(_case()).mu_macro
     assert answer["table"]["id"] == Surrogate.open().id
