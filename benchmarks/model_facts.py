@@ -39,8 +39,8 @@ def g(x: float) -> str:
     return quantity(float(x), 2)
 
 
-def _block_error(index: int, n: int, s: Surrogate, sweep: Sweep) -> float:
-    """Largest error of the n x n interpolant of the block's tabulated function, on random points of its rectangle."""
+def _block_errors(index: int, s: Surrogate, sweep: Sweep) -> list[float]:
+    """Largest errors of the n x n interpolants of the block's tabulated function, on random points of its rectangle."""
     chart = CHARTS[index]
     kind = "continuous" if chart.regime == CONTINUOUS else "full"
 
@@ -52,13 +52,17 @@ def _block_error(index: int, n: int, s: Surrogate, sweep: Sweep) -> float:
     axes = (chart.a, chart.b)
     a, b = (rng.uniform(axis.low + 1e-3 * (axis.high - axis.low), axis.high, POINTS) for axis in axes)
     b = np.minimum(b, chart.b.high - 1e-3 * (chart.b.high - chart.b.low))
-    grid = [nodes(n, axis.low, axis.high) for axis in axes]
-    c = chebyshev_coefficients(values(grid[0][:, None], grid[1][None, :]))
-    left, right = (
-        interpolation_matrix(n, (2.0 * x - axis.low - axis.high) / (axis.high - axis.low))
-        for x, axis in zip((a, b), axes, strict=True)
-    )
-    return float(np.abs(np.einsum("pi,ij,pj->p", left, c, right) - values(a, b)).max())
+    exact = values(a, b)
+    errors = []
+    for n in SIZES:
+        grid = [nodes(n, axis.low, axis.high) for axis in axes]
+        c = chebyshev_coefficients(values(grid[0][:, None], grid[1][None, :]))
+        left, right = (
+            interpolation_matrix(n, (2.0 * x - axis.low - axis.high) / (axis.high - axis.low))
+            for x, axis in zip((a, b), axes, strict=True)
+        )
+        errors.append(float(np.abs(np.einsum("pi,ij,pj->p", left, c, right) - exact).max()))
+    return errors
 
 
 def blocks() -> str:
@@ -68,8 +72,11 @@ def blocks() -> str:
     with Sweep(1) as sweep:
         for index, name in enumerate(NAMES):
             progress(name)
-            rows.append([name, *(g(_block_error(index, n, s, sweep)) for n in SIZES)])
-    return markdown(("block", *(f"{n} x {n}" for n in SIZES)), rows)
+            rows.append([name, *map(g, _block_errors(index, s, sweep))])
+    return (
+        "Largest error of the tabulated quantity of a block, interpolated between n x n Chebyshev nodes, on "
+        f"{POINTS:,} random points of its rectangle:\n\n"
+    ) + markdown(("block", *(f"{n} x {n}" for n in SIZES)), rows)
 
 
 def limits() -> str:

@@ -299,13 +299,14 @@ LARGE = (1.6, 2.4, 4.0, 8.0, 16.0, 40.0, 80.0, 1e4, 1e8)
 def slow_angle() -> str:
     """Eq. (34): the largest error of the angle, at large y~."""
     rows = []
+    y = 16.0
     for factor in (10.0, 5.0, 2.0, 1.0, 0.5):
-        y = 16.0
         v = factor * math.sqrt(y)
         tau, theta, _ = orbit(v, y)
         off = np.abs(np.arctan(y / v * np.cos(tau)) - theta)
         rows.append([f"{factor:g}", quantity(float(off.max())), quantity(y / v**2)])
-    return markdown(["v~/sqrt(y~)", "theta of (34) off by [rad]", "y~/v~^2"], rows)
+    table_ = markdown(["v~/sqrt(y~)", "theta of (34) off by [rad]", "y~/v~^2"], rows)
+    return f"y~ = {y:g}:\n\n{table_}"
 
 
 def large_amplitudes() -> str:
@@ -343,9 +344,10 @@ def _first(x: Array, miss: Array, level: float) -> str:
 def summary() -> str:
     """Sec. 7, the order of use: (38), (39), (40), (28) below y~ = 1, (37) above."""
     rows = []
+    slowest = 1e-3
     for y in (0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 2.0, 8.0, 80.0):
         crit = float(table().v_tilde_crit(y))
-        v = np.concatenate([[0.0], crit * np.geomspace(1e-3, 1.0, 2001), crit * np.geomspace(1.0, 1e4, 801)])
+        v = np.concatenate([[0.0], crit * np.geomspace(slowest, 1.0, 2001), crit * np.geomspace(1.0, 1e4, 801)])
         mu = table().mu_ratio(v, y)
         low = float(closed_forms.static_limit(y))
         if y < 1.0:
@@ -359,7 +361,7 @@ def summary() -> str:
         name = "(38), (39), (40), (28)" if y < 1.0 else "(37)"
         rows.append([f"{y:g}", name, *cells, quantity(float(np.abs(law - mu).max()))])
     header = ["y~", "law", "stick-slip, off by [%]", "continuous, off by [%]", "absolute, all speeds"]
-    return markdown(header, rows, 2)
+    return f"Stick-slip from {slowest:g} v~crit up:\n\n{markdown(header, rows, 2)}"
 
 
 SECTIONS: dict[str, Callable[[], str]] = {

@@ -100,13 +100,3 @@ def test_a_bad_value_is_named(call, field) -> None:
     with pytest.raises(InputError) as caught:
         call()
     assert caught.value.field == field
-
-
-def test_the_numbers_of_the_validity_page() -> None:
-    contact = ball_on_flat(5e-3, 10.0, STEEL, STEEL)
-    stiffer = contact.k_normal / contact.k
-    assert stiffer == pytest.approx(1.21, abs=0.005)
-    for y, change in ((1.0, 0.004), (100.0, 0.36)):  # of the normal force, for an inclination of 0.01 and mu0 = 0.3
-        assert stiffer * 0.3 * 0.01 * y == pytest.approx(change, rel=0.1)
-    assert 2.0 * math.pi * 20e3 * 70e-6 / 3200.0 == pytest.approx(0.003, abs=3e-4)
-    assert in_series(1.0, 10.0) == pytest.approx(0.91, abs=0.001)

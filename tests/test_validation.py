@@ -1,17 +1,16 @@
-"""validation.md, model.md and validity.md contain their scripts' results; the paper is covered completely."""
+"""validation.md, model.md, validity.md and hard-cases.md contain their scripts' results; the paper is covered."""
 
 import importlib
+import math
 import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 
 from builder.steady import border, solve
-from mumacro import closed_forms
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "validation.md"
@@ -30,28 +29,46 @@ def load(name: str) -> ModuleType:
 validation = load("validation")
 model_facts = load("model_facts")
 validity = load("validity")
+hard_cases = load("hard_cases")
 measuring = load("measuring")
 
 
-def parts(text: str) -> tuple[str, list[float]]:
+def parts(text: str) -> tuple[str, list[str]]:
     """The words and the numbers of a section."""
-    return NUMBER.sub("#", text).replace("-", ""), [float(x.replace(",", "")) for x in NUMBER.findall(text)]
+    return NUMBER.sub("#", text).replace("-", ""), [x.replace(",", "") for x in NUMBER.findall(text)]
 
 
-MEASURED = [(validation.SECTIONS, name, PAGE) for name in validation.SECTIONS]
-# "blocks" takes minutes: it interpolates every block of the table at five sizes
-MEASURED += [(validity.SECTIONS, name, validity.PAGE) for name in validity.SECTIONS]
-MEASURED += [(model_facts.CASES, name, model_facts.PAGE) for name in model_facts.CASES if name != "blocks"]
+def agree(found: str, printed: str) -> bool:
+    """Whether two numbers agree but for the last digit shown; a number of rounding size is noise itself."""
+    (a, b), digits = map(float, (found, printed)), 0
+    for text in (found, printed):
+        digits = max(digits, len(text.split("e")[0].lstrip("+-0.").replace(".", "")))
+    if digits < 4 and max(abs(a), abs(b)) < 2e-11:
+        return max(abs(a), abs(b)) < 5e-15 or 0.1 < a / b < 10.0
+    return math.isclose(a, b, rel_tol=0.06 if digits < 3 else 1.5 * 10.0 ** (1 - digits))
 
 
-@pytest.mark.parametrize(("script", "section", "page"), MEASURED, ids=[name for _, name, _ in MEASURED])
+SCRIPTS = (
+    (validation.SECTIONS, PAGE),
+    (validity.SECTIONS, validity.PAGE),
+    (model_facts.CASES, model_facts.PAGE),
+    (hard_cases.CASES, hard_cases.PAGE),
+)
+SLOW = {"blocks", "stale_cache"}  # 60,000 solves; three processes that compile
+MEASURED = [
+    pytest.param(script, name, page, id=f"{page.stem}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
+    for script, page in SCRIPTS
+    for name in script
+]
+
+
+@pytest.mark.parametrize(("script", "section", "page"), MEASURED)
 def test_a_section_is_what_is_measured(script: dict[str, Callable[[], str]], section: str, page: Path) -> None:
     (words, numbers), (printed_words, printed) = (
         parts(text) for text in (script[section](), measuring.read_section(section, page))
     )
     assert words.split() == printed_words.split()
-    # rounding of the last digit shown; differences of rounding size are noise
-    assert numbers == pytest.approx(printed, rel=0.06, abs=2e-11)
+    assert [pair for pair in zip(numbers, printed, strict=True) if not agree(*pair)] == []
 
 
 @pytest.mark.parametrize(
@@ -71,16 +88,6 @@ def test_every_figure_is_on_the_page() -> None:
     assert len(drawn) == 8
 
 
-def test_the_statements_between_the_tables() -> None:
-    # the border meets the line of small angles
-    for y, side in ((1.055, 1.0), (1.065, -1.0)):
-        assert side * (np.hypot(1.0, border(y)[0]) - y) > 0.0
-    # from where on (23) is better than (24)
-    for y, better in ((0.57, False), (0.59, True)):
-        exact = border(y)[0]
-        assert (abs(closed_forms.border_23(y) - exact) < abs(closed_forms.border_24(y) - exact)) == better
-    y = np.linspace(0.05, 1.0, 20)
-    top = np.array([border(float(a))[1] for a in y])
-    assert np.abs(closed_forms.critical_next(y) / top - 1.0).max() == pytest.approx(0.0024, rel=0.02)
-    # mu~ approaches 1 around v~ = 1: there 1 - mu~ halves
+def test_the_loss_halves_at_the_second_step() -> None:
+    # mu~ approaches 1 around v~ = 1
     assert solve(1.0, 0.1).deficit / (1.0 - border(0.1)[1]) == pytest.approx(0.5, abs=0.002)
