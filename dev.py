@@ -29,6 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -250,9 +251,9 @@ def stale_locks() -> list[str]:
     return [name for name in LOCKS if f"# inputs: {inputs_digest()}" not in lock_path(name).read_text("utf-8")]
 
 
-def build_docs(folder: str | Path) -> int:
+def docs_command(folder: str | Path) -> tuple[str | Path, ...]:
     """Build the site into a folder; a warning, such as a link that leads nowhere, is an error."""
-    return run(BIN / "sphinx-build", "-W", "--keep-going", "-q", "docs", folder, env=environment())
+    return BIN / "sphinx-build", "-W", "--keep-going", "-q", "docs", folder
 
 
 def build_page(folder: str) -> int:
@@ -265,61 +266,59 @@ def build_page(folder: str) -> int:
     return code or run(*python, "service.static_page", table, module, folder, env=environment())
 
 
-def check_packages() -> list[str]:
-    """Build what would be uploaded, into a temporary folder, and check it; return the names of what failed."""
-    failed = []
+def passes(title: str, tool: str | Path, *arguments: str | Path) -> bool:
+    """Run one check of the environment's tools, then print its output at once."""
+    words = [str(BIN / tool), *map(str, arguments)]
+    done = subprocess.run(  # noqa: S603 - every command is written in this file
+        words, cwd=ROOT, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+    )
+    print(f"--- {title}\n{done.stdout}", end="", flush=True)
+    return done.returncode == 0
+
+
+def documentation_builds() -> bool:
+    """Build the site into a temporary folder."""
     with tempfile.TemporaryDirectory() as folder:
-        print("--- wheel and sdist", flush=True)
-        if run(BIN / "hatchling", "build", "-d", folder, env=environment(), quiet=True):
-            return ["wheel and sdist"]
+        return passes("documentation", *docs_command(folder))
+
+
+def packages_pass() -> bool:
+    """Build what would be uploaded, into a temporary folder, and check it."""
+    with tempfile.TemporaryDirectory() as folder:
+        if not passes("wheel and sdist", "hatchling", "build", "-d", folder):
+            return False
         built = sorted(Path(folder).iterdir())
-        commands: dict[str, tuple[str | Path, ...]] = {
-            "twine": ("twine", "check", "--strict", *built),
-            "check-wheel-contents": ("check-wheel-contents", *(path for path in built if path.suffix == ".whl")),
-        }
-        for title, (tool, *arguments) in commands.items():
-            print(f"--- {title}", flush=True)
-            if run(BIN / tool, *arguments, env=environment()):
-                failed.append(title)
-    return failed
+        wheels = [path for path in built if path.suffix == ".whl"]
+        good = passes("twine", "twine", "check", "--strict", *built)
+        return passes("check-wheel-contents", "check-wheel-contents", *wheels) and good
 
 
 def check() -> list[str]:
-    """Run every check but pytest, all of them even when one fails; return the names of those that failed."""
+    """Run every check but pytest, one on each processor; return the names of those that failed."""
     if stale := stale_locks():
         raise FailedError(
             f"requirements/{' and '.join(stale)}.txt no longer match pyproject.toml: run python3 dev.py lock"
         )
     ensure("dev")
     tables = sorted((ROOT / "tables").glob("*.nc"))
+    if not tables:
+        raise FailedError("no *.nc in tables/")
     commands: dict[str, tuple[str | Path, ...]] = {
-        "ruff check": ("ruff", "check", "."),
-        "ruff format": ("ruff", "format", "--check", "."),
         "mypy": ("mypy",),
         "mypy of dev.py": ("mypy", "dev.py"),
+        "CF conventions": ("compliance-checker", "--test=cf:1.11", *tables),
+        "ruff check": ("ruff", "check", "."),
+        "ruff format": ("ruff", "format", "--check", "."),
         "import-linter": ("lint-imports",),
         "validate-pyproject": ("validate-pyproject", "pyproject.toml"),
         "codespell": ("codespell",),
         "interrogate": ("interrogate", "mumacro", "builder", "service"),
         "sp-repo-review": ("sp-repo-review", "--show", "err", "."),
-        "CF conventions": (
-            *("compliance-checker", "--test=cf:1.11"),
-            *tables,
-        ),
     }
-    failed = []
-    for title, (tool, *arguments) in commands.items():
-        print(f"--- {title}", flush=True)
-        if tool == "compliance-checker" and not tables:
-            print("no *.nc in tables/")
-            failed.append(title)
-        elif run(BIN / tool, *arguments, env=environment()):
-            failed.append(title)
-    print("--- documentation", flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        if build_docs(folder):
-            failed.append("documentation")
-    return failed + check_packages()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # the longest first
+        results = {"documentation": pool.submit(documentation_builds), "packages": pool.submit(packages_pass)}
+        results |= {title: pool.submit(passes, title, *words) for title, words in commands.items()}
+    return [title for title, result in results.items() if not result.result()]
 
 
 def test(arguments: list[str]) -> int:
@@ -429,7 +428,7 @@ def main(arguments: list[str]) -> int:
             return len(failed)
         if word == "docs" and not rest:
             ensure("dev")
-            code = build_docs("build/docs")
+            code = run(*docs_command("build/docs"), env=environment())
             print("The site is in build/docs: open build/docs/index.html" if code == 0 else "FAILED: see above")
             return code
         if word == "page" and not rest:

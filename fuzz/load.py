@@ -2,6 +2,8 @@
 
     python fuzz/load.py [--only mixed_load] [--share 0.05] [--write]
 
+The section large_bodies needs wrk.
+
 Clients and service share this machine, so that "capacity" is that of both together.  Requests are sent at
 random moments, whether or not earlier ones are answered (an open loop), and a wait is counted from the moment at which
 a request should have been sent.
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -319,6 +322,83 @@ def overload(share: float) -> str:
     return f"{markdown(('kind', 'responses', *WAITS), rows)}\n\n{text}\n\n{reporting.took(started)}"
 
 
+_WRK = """
+local file = io.open("%s", "rb")
+wrk.method, wrk.path, wrk.body = "POST", "/v1/mu-macro/batch", file:read("*a")
+wrk.headers["Content-Type"] = "application/json"
+"""
+
+
+async def probe(port: int, question: Question, seen: Seen) -> tuple[float, float]:
+    """Request ``/livez``, then a batch, on a new connection; seconds of each."""
+    client, begun = Caller(port), time.perf_counter()
+    alive = float("inf")
+    try:
+        await client.ask(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+        alive = time.perf_counter() - begun
+        seen.note(question, 0.0, await client.ask(question.text))
+    except FAULT as error:
+        seen.fault(error)
+    client.close()
+    return alive, time.perf_counter() - begun - alive
+
+
+async def probe_beside(process: subprocess.Popen[str], port: int, question: Question, seen: Seen) -> list[float]:
+    """Seconds of requests of ``/livez`` while the process runs."""
+    waits = []
+    while process.poll() is None:
+        waits.append((await probe(port, question, seen))[0])
+        await asyncio.sleep(0.02)
+    return waits
+
+
+def large_bodies(share: float) -> str:
+    """Large bodies from many connections that never pause.  wrk sends them: Python would be slower than the service."""
+    started = time.perf_counter()
+    seconds = max(OVERLOAD_S * share, 3.0)
+    sent, checked = questions({"batch": 1}, 2, 20_000)
+    body = sent.text.partition(b"\r\n\r\n")[2]
+    rows, bad = [], []
+    with tempfile.TemporaryDirectory() as folder, serving(CLIENT_TIMEOUT_S=30) as server:
+        script, file = Path(folder) / "large.lua", Path(folder) / "body"
+        file.write_bytes(body)
+        script.write_text(_WRK % file)
+        expected = answers(server, [checked])
+        quiet = min(asyncio.run(probe(server.port, checked, Seen(expected)))[1] for _ in range(10))
+        for connections in (8, 32, 200):
+            words = ["wrk", "-t1", f"-c{connections}", f"-d{seconds:.0f}s", "--timeout", "30s", "-s", str(script)]
+            words.append(f"http://127.0.0.1:{server.port}")
+            wrk = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            seen = Seen(expected)
+            waits = asyncio.run(probe_beside(wrk, server.port, checked, seen))
+            ended, recovery = time.perf_counter(), float("inf")
+            while recovery == float("inf") and time.perf_counter() - ended < 60.0:
+                after = Seen(expected)
+                took = asyncio.run(probe(server.port, checked, after))[1]
+                if after.statuses[200] and after.verdict == "held" and took < 2.0 * quiet + 0.01:
+                    recovery = time.perf_counter() - ended
+            text = wrk.communicate()[0]
+            counts = [re.search(f"{words}", text) for words in (r"(\d+) requests in", r"3xx responses: (\d+)")]
+            everything, refused = (int(found[1]) if found else 0 for found in counts)
+            faults = re.search(r"Socket errors: (.*)", text)
+            rows.append([
+                str(connections), f"{(everything - refused) / seconds:,.0f}", f"{refused / seconds:,.0f}",
+                faults[1] if faults else "none", f"{seen.statuses[200] - seen.wrong} / {seen.wrong}",
+                f"{1e3 * np.median(waits):,.0f} / {1e3 * max(waits):,.0f}", f"{recovery:.2f}",
+            ])  # fmt: skip
+            if faults or seen.verdict != "held" or recovery > 5.0 or not everything:
+                bad.append(f"{connections} connections: {seen.verdict}")
+        peak, code = server.memory("VmHWM"), server.stop()
+    head = (
+        "connections", "answered [1/s]", "refused with 503 [1/s]", "connections broken", "batches right / wrong",
+        "/livez, median / longest [ms]", "recovery [s]",
+    )  # fmt: skip
+    text = f"Bodies of {len(body) / 1e3:.0f} kB. Memory at most {peak:.0f} MB, exit code {code}."
+    if bad or code:
+        text += f" FAILED: {bad}"
+    return f"{markdown(head, rows)}\n\n{text}\n\n{reporting.took(started)}"
+
+
 def attacks(share: float) -> str:
     """The longest wait for ``/livez`` during each attack, measured by tests/test_service_attacks.py."""
     started = time.perf_counter()
@@ -342,7 +422,7 @@ def attacks(share: float) -> str:
     return f"{markdown(head, rows, 2)}\n\n{reporting.took(started)}"
 
 
-SECTIONS = {"mixed_load": mixed_load, "overload": overload, "attacks": attacks}
+SECTIONS = {"mixed_load": mixed_load, "overload": overload, "large_bodies": large_bodies, "attacks": attacks}
 
 if __name__ == "__main__":
     reporting.report(__doc__ or "", SECTIONS)
