@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 IMAGE=${IMAGE:-localhost/mumacro:test}
 SUITE=bookworm                           # Debian 12 carries Python 3.11
-DEBIAN_BASE=localhost/python:3.11-slim
+DEBIAN_BASE=localhost/python:3.11-slim DEBIAN_BUILD_BASE=localhost/python:3.11   # as the official images: the second has binutils
 READY_S=60
 
 ((BASH_VERSINFO[0] >= 5)) || { echo "skipped: bash 5 is needed"; exit 0; }
@@ -67,16 +67,19 @@ say "Engine: $("$engine" --version)"
 # --- base image ---------------------------------------------------------------------------------------
 
 if [[ -z ${BASE:-} && ${#runtime_flags[@]} -gt 0 ]]; then
-    BASE=$DEBIAN_BASE
-    if ! podman image exists "$BASE"; then
-        say "Making $BASE from Debian's packages"
+    BASE=$DEBIAN_BASE BUILD_BASE=$DEBIAN_BUILD_BASE
+    if ! podman image exists "$BASE" || ! podman image exists "$BUILD_BASE"; then
+        say "Making $BUILD_BASE and $BASE from Debian's packages"
         # shellcheck disable=SC2016  # apt's own placeholder
         # The mirror that this machine already uses; empty means debootstrap's own default.
         mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Identifier: Packages' "Codename: $SUITE" 2>/dev/null | head -n 1)
-        debootstrap --variant=minbase --include=python3,python3-venv,ca-certificates "$SUITE" "$work/root" \
+        debootstrap --variant=minbase --include=python3,python3-venv,ca-certificates,binutils "$SUITE" "$work/root" \
             ${mirror:+"$mirror"} >"$work/debootstrap.log" 2>&1 </dev/null \
             || { tail -n 5 "$work/debootstrap.log"; skip "debootstrap could not make a base image"; }
         rm -rf "$work"/root/var/cache/apt/archives/*.deb "$work"/root/var/lib/apt/lists/* "$work"/root/usr/share/{doc,man,locale}/*
+        tar -C "$work/root" -c . | podman import --quiet - "$BUILD_BASE" >/dev/null
+        chroot "$work/root" apt-get purge -y binutils-common libbinutils libctf-nobfd0 libgprofng0 libjansson4 \
+            >"$work/purge.log" 2>&1 </dev/null || { tail -n 5 "$work/purge.log"; skip "binutils could not be removed"; }
         tar -C "$work/root" -c . | podman import --quiet - "$BASE" >/dev/null
     fi
 fi
@@ -117,13 +120,30 @@ PYTHON
 say "Building $IMAGE"
 started=$SECONDS
 replaced=$("$engine" image inspect --format '{{.Id}}' "$IMAGE" 2>/dev/null || true)
-"$engine" build "${build_flags[@]}" ${BASE:+--build-arg "BASE=$BASE"} --tag "$IMAGE" \
+"$engine" build "${build_flags[@]}" ${BASE:+--build-arg "BASE=$BASE"} ${BUILD_BASE:+--build-arg "BUILD_BASE=$BUILD_BASE"} \
+    --tag "$IMAGE" \
     --secret "id=pip.conf,src=$work/pip.conf" --secret "id=ca.pem,src=$work/ca.pem" . \
     >"$work/build.log" 2>&1 </dev/null || { tail -n 30 "$work/build.log" >&2; fail "the image does not build"; }
 say "Built in $((SECONDS - started)) s"
 if [[ -n $replaced && $replaced != "$("$engine" image inspect --format '{{.Id}}' "$IMAGE")" ]]; then
     "$engine" image rm "$replaced" >/dev/null 2>&1 || true   # else every run leaves one nameless image behind
 fi
+
+# --- what the image says of itself ---------------------------------------------------------------------
+
+"$engine" image inspect "$IMAGE" | python3 -c '
+import json, sys
+config = json.load(sys.stdin)[0]["Config"]
+promised = {
+    "User": "10001:10001", "ExposedPorts": {"8000/tcp": {}}, "Entrypoint": None, "Cmd": ["python", "-m", "service"],
+    "WorkingDir": "/app", "StopSignal": "SIGTERM", "Volumes": None,
+}
+wrong = {name: config.get(name) for name, value in promised.items() if (config.get(name) or None) != value}
+secret = [one for one in config["Env"] if any(word in one.upper() for word in ("PIP_", "PROXY", "KEY", "TOKEN", "PASSWORD"))]
+if wrong or secret:
+    sys.exit(f"not as promised: {wrong} {secret}")
+' || fail "the image says something else of itself than promised"
+say "ok  user, port, command, folder, stop signal; no volume, no key in the environment"
 
 # --- run ----------------------------------------------------------------------------------------------
 
@@ -150,19 +170,22 @@ born=$(date +%s.%N)
 inside() { "$engine" exec "$container" "$@"; }
 port=${port:-$("$engine" port "$container" 8000/tcp | head -n 1 | sed 's/.*://')}
 
-get() {  # path -> body; fails unless the status is 200
-    python3 - "$port" "$1" <<'PYTHON'
+ask() {  # path, JSON to post or nothing -> body; fails unless the status is 200
+    python3 - "$port" "$@" <<'PYTHON'
 import http.client, sys
 
-connection = http.client.HTTPConnection("127.0.0.1", int(sys.argv[1]), timeout=10)
-connection.request("GET", sys.argv[2])
+connection = http.client.HTTPConnection("127.0.0.1", int(sys.argv[1]), timeout=60)
+if len(sys.argv) > 3:
+    connection.request("POST", sys.argv[2], sys.argv[3], {"Content-Type": "application/json"})
+else:
+    connection.request("GET", sys.argv[2])
 reply = connection.getresponse()
 print(reply.read().decode())
 sys.exit(reply.status != 200)
 PYTHON
 }
 
-until get /readyz >/dev/null 2>&1; do
+until ask /readyz >/dev/null 2>&1; do
     [[ $("$engine" inspect --format '{{.State.Running}}' "$container") == true ]] \
         || { "$engine" logs "$container" >&2; fail "the service ended by itself"; }
     (($(date +%s) - ${born%.*} < READY_S)) || { "$engine" logs "$container" >&2; fail "not ready after $READY_S s"; }
@@ -176,9 +199,14 @@ if [[ $engine == podman ]]; then podman healthcheck run "$container" >/dev/null;
     || fail "the health check fails"
 say "ok  health check"
 
-answer=$(get '/v1/mu-macro?mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1.3e5&v0=0.01') || fail "the query was answered with: $answer"
-python3 -c 'import json, sys; assert 0 <= json.loads(sys.argv[1])["mu_macro"] <= 0.3' "$answer" || fail "wrong answer: $answer"
+case='"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5'
+answer=$(ask /v1/mu-macro "{$case, \"v0\": 0.01}") || fail "the question was answered with: $answer"
+# The example of README.md.
+python3 -c 'import json, sys; assert abs(json.loads(sys.argv[1])["mu_macro"] - 0.24001) < 1e-5' "$answer" || fail "wrong answer: $answer"
+[[ $(ask '/v1/mu-macro?mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1.3e5&v0=0.01') == "$answer" ]] || fail "a query is answered otherwise"
 say "ok  answers: $answer"
+for path in /livez /metrics / /docs; do ask "$path" >/dev/null || fail "$path does not answer"; done
+say "ok  /livez, /metrics, both pages"
 
 user=$(inside python -c 'import os; print(os.getuid())')
 [[ $user != 0 ]] || fail "it runs as root"
@@ -187,41 +215,73 @@ say "ok  runs as user $user"
 for folder in / /app /tmp; do
     if inside python -c "open('${folder%/}/probe', 'w')" 2>/dev/null; then fail "it can write to $folder"; fi
 done
-say "ok  cannot write to /, /app, /tmp"
+# By owner and mode, because a read-only root hides them: without one, nothing else may change either.
+inside python -c '
+import os, stat, sys
+uid, gid, wrong = os.getuid(), os.getgid(), []
+for top, folders, files in os.walk("/"):
+    if top == "/":
+        folders[:] = [name for name in folders if name not in ("dev", "proc", "sys")]
+    for path in (top, *(os.path.join(top, name) for name in files)):
+        status = os.lstat(path)
+        mode = status.st_mode
+        if stat.S_ISLNK(mode):
+            continue
+        own = (status.st_uid == uid and mode & 0o200) or (status.st_gid == gid and mode & 0o020)
+        shared = mode & 0o002 and not (stat.S_ISDIR(mode) and mode & stat.S_ISVTX)
+        # In /app not by the group either: some clusters put every user into group 0.
+        if own or shared or (path.startswith("/app") and mode & 0o020):
+            wrong.append(f"{path} can be written")
+        if path.startswith("/app") and not os.access(path, os.R_OK):
+            wrong.append(f"{path} cannot be read")
+if wrong:
+    sys.exit("\n".join(wrong[:20]))
+' || fail "modes of files"
+say "ok  nothing can be written but the base's folders for temporary files, everything in /app can be read"
 
-if inside python -c 'import builder' 2>/dev/null; then fail "the solver is in the image"; fi
-if inside python -c 'import pip' 2>/dev/null; then fail "pip is in the image's environment"; fi
-say "ok  no solver, no pip"
+for absent in builder tests pip setuptools; do
+    if inside python -c "import $absent" 2>/dev/null; then fail "$absent is in the image's environment"; fi
+done
+say "ok  no solver, no tests, no pip"
 
 # Every kernel must come from the image, for whatever mix of numbers and columns a caller sends.
-batch() {  # JSON -> fails unless the status is 200
-    python3 - "$port" "$1" <<'PYTHON'
-import http.client, sys
-
-connection = http.client.HTTPConnection("127.0.0.1", int(sys.argv[1]), timeout=60)
-connection.request("POST", "/v1/mu-macro/batch", sys.argv[2], {"Content-Type": "application/json"})
-reply = connection.getresponse()
-body = reply.read().decode()
-if reply.status != 200:
-    sys.exit(body)
-PYTHON
-}
-case='"mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5'
-batch "{$case, \"v0\": [0.01]}" && batch "{$case, \"v0\": [0.01, 0.1, 1.0]}" && batch "[{$case, \"v0\": 0.01}, {$case, \"v0\": 0}]" \
-    && batch '{"mu0": [0.3, 0.2], "Fz": [10, 9], "k": [1e6, 2e6], "y0": [2e-6, 0], "omega": [1e5, 2e5], "v0": [0.01, 0.1]}' \
-    || fail "a batch was refused"
-loads=$("$engine" exec --env NUMBA_DEBUG_CACHE=1 "$container" python -m service warm --tables tables 2>&1)
-if late=$({ "$engine" logs "$container" 2>&1; echo "$loads"; } | grep 'compiled while serving'); then
-    fail "not every kernel is in the image: $late"
-fi
-loaded=$(grep -c 'data loaded' <<<"$loads") || fail "no kernel was loaded from the image's cache"
-say "ok  $loaded kernels loaded from the image, none compiled while serving"
+for body in "{$case, \"v0\": [0.01]}" "{$case, \"v0\": [0.01, 0.1, 1.0]}" "[{$case, \"v0\": 0.01}, {$case, \"v0\": 0}]" \
+    '{"mu0": [0.3, 0.2], "Fz": [10, 9], "k": [1e6, 2e6], "y0": [2e-6, 0], "omega": [1e5, 2e5], "v0": [0.01, 0.1]}'; do
+    answer=$(ask /v1/mu-macro/batch "$body") || fail "a batch was answered with: $answer"
+done
+every='"include": ["gradient", "power", "stick_fraction", "regime_certain"]'
+ask /v1/mu-macro "{$case, \"v0\": 0.01, $every}" >/dev/null || fail "a question with everything included is refused"
+ask /v1/law '{"along": "v0", "start": 1e-4, "stop": 10, "points": 201, "mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}' >/dev/null \
+    || fail "a law is refused"
+ask /v1/solve-for '{"unknown": "y0", "target": [0.2, 0.15], "mu0": 0.3, "Fz": 10, "k": 1e6, "omega": 1.3e5, "v0": 0.01}' >/dev/null \
+    || fail "an inverse question is refused"
+# A kernel that is compiled while serving cannot be stored on the read-only root, and the service says so.
+if late=$("$engine" logs "$container" 2>&1 | grep 'compiled kernels'); then fail "not every kernel is in the image: $late"; fi
+# numba tells of every compilation; this loads the tables as the start does.
+kernels=$(inside python -c '
+import pathlib, sys
+from numba.core import event
+from service.__main__ import main
+with event.install_recorder("numba:compile") as heard:
+    code = main(["warm"])
+if code or heard.buffer:
+    sys.exit(f"exit code {code}; compiled: " + ", ".join(str(one.data["dispatcher"]) for _, one in heard.buffer))
+print(sum(1 for _ in pathlib.Path("cache").glob("*/*.kernel")))
+') || fail "not every kernel is in the image"
+say "ok  the image has $kernels kernels; none is compiled at the start or while serving"
 
 memory=$(inside python -c '
 import os, pathlib
 own = str(os.getpid())
 pages = [p.read_text() for p in pathlib.Path("/proc").glob("[0-9]*/status") if p.parent.name != own]
 print(sum(int(line.split()[1]) for text in pages for line in text.splitlines() if line.startswith("VmRSS")) // 1024)')
+packages=$(inside python -c '
+import collections, pathlib, sysconfig
+root, sizes = pathlib.Path(sysconfig.get_path("purelib")), collections.Counter()
+for path in root.rglob("*"):
+    if path.is_file() and not path.is_symlink():
+        sizes[path.relative_to(root).parts[0]] += path.stat().st_size / 1e6
+print("\n".join(f"{size:7.1f}  {name}" for name, size in sizes.most_common(10)), f"{sizes.total():7.1f}  all", sep="\n")')
 
 "$engine" stop -t 30 "$container" >"$work/stop.log" 2>&1 || { cat "$work/stop.log" >&2; fail "it does not stop"; }
 code=$("$engine" inspect --format '{{.State.ExitCode}}' "$container")
@@ -232,3 +292,5 @@ size=$("$engine" image inspect --format '{{.Size}}' "$IMAGE")
 base_size=
 [[ -n ${BASE:-} ]] && base_size=$("$engine" image inspect --format '{{.Size}}' "$BASE" 2>/dev/null || true)
 say "image $((size / 1000000)) MB${base_size:+ (base $((base_size / 1000000)) MB)}, resident memory $memory MB, ready after $ready s"
+say "largest packages [MB]:"
+say "$packages"

@@ -88,6 +88,8 @@ def gradients(
 
     def work(part: slice) -> None:
         six: Any = [np.ascontiguousarray(np.broadcast_to(c, mu.shape)[part]) for c in columns]
+        for column in six:  # all or none: a kernel is compiled anew for every mix
+            column.flags.writeable = False
         found: Any = (*six, mu[part], bound[part], source[part], v[part], y[part], *data, out[part])
         dimensional.gradients(*found)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mpmath import ellipk, mpf, pi, workdps
 
 from builder.steady import solve
-from mumacro import InputError, Surrogate
+from mumacro import InputError, Surrogate, dimensional
 from mumacro.dimensional import (
     BOUNDS,
     FIELDS,
@@ -456,3 +456,10 @@ def test_columns_of_different_lengths_are_refused(table: Surrogate) -> None:
     with pytest.raises(InputError, match="columns of one length"):
         table.evaluate_columns(one, one, one, one, one, np.ones((2, 1)))
     assert table.evaluate_columns(one, one, one, one, one, np.empty(0))[0].shape == (0,)
+
+
+def test_one_compiled_kernel_serves_every_mix_of_numbers_and_columns(table):
+    for name in FIELDS:
+        for columns in ({name: [PLAIN[name]] * 3}, {other: [PLAIN[other]] * 2 for other in FIELDS if other != name}):
+            table.evaluate(**{**PLAIN, **columns}, gradient=True)
+    assert len(dimensional.gradients.signatures) == 1

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -71,3 +73,16 @@ def test_anything_else_is_not_accepted(text):
 
 def test_too_many_cases_are_reported():
     assert read(json.dumps(CASE), room=1)[0] == NO_ROOM
+
+
+def test_no_request_waits_for_a_kernel_of_the_reader(repository):
+    code = """
+from service import app, numbers
+from service.settings import load_settings
+from service.tables import Tables
+app.load(Tables(load_settings().tables))
+print([len(one.signatures) for one in (numbers._object, numbers._spread)])
+"""
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, cwd=repository, capture_output=True, text=True, check=False)
+    assert done.stdout == "[1, 1]\n", done.stderr
