@@ -157,7 +157,8 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
         title="mumacro",
         version=__version__,
         lifespan=_lifespan,
-        docs_url=None,  # FastAPI's own pages load their assets from a CDN; routes/docs.py has ours
+        openapi_url=None,  # routes/docs.py has the description, so that a thread makes it,
+        docs_url=None,  # and the page: the one of FastAPI loads its assets from a CDN
         redoc_url=None,
         redirect_slashes=False,
         root_path=settings.root_path,
@@ -221,7 +222,7 @@ async def _answer_http(request: Request, error: Exception) -> Response:
 
 
 def _allowed_methods(path: str) -> str:
-    methods: set[str] = {"GET", "HEAD"} if path == "/openapi.json" or path.startswith("/guide") else set()
+    methods: set[str] = {"GET", "HEAD"} if path.startswith("/guide") else set()
     for router in _ROUTERS:
         for route in router.routes:
             if isinstance(route, APIRoute) and route.path == path:

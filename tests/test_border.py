@@ -24,6 +24,7 @@ def test_solved_border_meets_the_reference_to_the_last_digit(reference_border: A
         assert ratio == pytest.approx(mu, rel=0.0, abs=3e-16)
 
 
+@pytest.mark.slow
 def test_solved_border_is_finite_and_rises_everywhere(sweep: Sweep) -> None:
     y = np.geomspace(1e-8, 1e8, 4_000)
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]

@@ -16,6 +16,8 @@ from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, MU, POWER, QUANTITIES, REGIME_OF_SOURCE, STICK
 from mumacro.dimensional import FIELDS
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
 KINDS = [name for name, _, _ in CASES]

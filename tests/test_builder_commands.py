@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 
 def test_solve_prints_the_steady_cycle(run_builder):
     done = run_builder("solve", "--v", 0.1, "--y", 0.5)

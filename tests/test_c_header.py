@@ -17,6 +17,8 @@ from builder.export import export_table
 from mumacro import Surrogate, charts
 from mumacro.dimensional import BOUNDS, FIELDS
 
+pytestmark = pytest.mark.slow
+
 SOURCES = Path(__file__).parent / "c"
 CASE = (0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01)
 MAIN = """\

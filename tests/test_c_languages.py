@@ -9,6 +9,8 @@ from builder.export import export_table
 from mumacro import Surrogate
 from mumacro.dimensional import FIELDS
 
+pytestmark = pytest.mark.slow
+
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 V0 = [1e-6, 1e-3, 0.01, 0.0711, 0.5, 20.0]
 

@@ -226,6 +226,7 @@ def test_export_is_that_of_the_builder(capsys, tmp_path, tables_dir):
     assert out.read_text().startswith("v_tilde,")
 
 
+@pytest.mark.slow
 def test_a_closed_output_pipe_is_no_error(repository):
     command = [sys.executable, "-m", "mumacro", "law", CASE.replace("v0=0.01", ""), "--from", "1e-4", "--to", "1"]
     process = subprocess.Popen(

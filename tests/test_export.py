@@ -19,6 +19,8 @@ from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table, 
 from mumacro.errors import TableError
 from mumacro.table import read_table
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def path(tables_dir):

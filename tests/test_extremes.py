@@ -27,6 +27,8 @@ from builder.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer, second_order
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 TINY = 2.3e-308  # below it doubles have fewer digits
 

@@ -13,6 +13,8 @@ from builder import cycle
 from builder.cycle import CASES, steady_cycle
 from builder.figures import FIGURES, FiguresError, draw_figures
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def drawn(run_builder, tmp_path_factory) -> Path:

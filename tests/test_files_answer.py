@@ -32,6 +32,7 @@ DOUBLES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(*[DOUBLES] * 6), min_size=1, max_size=40))
 def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows):

@@ -14,6 +14,8 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.csv  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
@@ -405,7 +407,6 @@ def test_a_stopped_run_goes_on_with_the_same_bytes(tmp_path, table, kind, stop_a
     assert len(left(tmp_path)) == 5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parquet", "csv"])
 def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path, repository, kind):
     source = write(cases(400_000), tmp_path / f"cases.{kind}")

@@ -12,6 +12,8 @@ from builder.export import export_table
 from mumacro import Surrogate
 from mumacro.dimensional import FIELDS
 
+pytestmark = pytest.mark.slow
+
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 FORMATS = {"fmu": 2, "fmu3": 3}
 

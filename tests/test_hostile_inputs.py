@@ -234,6 +234,7 @@ print("survived")
 """
 
 
+@pytest.mark.slow
 def test_random_bits_do_no_harm(repository: Path) -> None:
     """In a separate process, which would crash if a kernel read invalid memory."""
     command = [sys.executable, "-X", "faulthandler", "-W", "error", "-c", SCRIPT]

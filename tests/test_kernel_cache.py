@@ -14,6 +14,8 @@ import pytest
 
 from mumacro import kernel_cache
 
+pytestmark = pytest.mark.slow
+
 posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system has no owners of that kind")
 root = pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root may give files away")
 

@@ -270,6 +270,7 @@ def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surr
     assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [False, True, False]
 
 
+@pytest.mark.slow
 def test_a_graph_is_small_and_travels_to_workers(table: Surrogate) -> None:
     da = pytest.importorskip("dask.array")
     v0 = da.from_array(columns()["v0"], chunks=10)

@@ -13,6 +13,8 @@ from service.routes import docs
 from service.routes import page as page_route
 from service.routes.page import ASSETS, POLICY
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_page_comes_with_a_strict_policy(client):
     page = client.get("/")

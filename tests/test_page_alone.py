@@ -13,6 +13,8 @@ from mumacro import Surrogate
 from mumacro.dimensional import FIELDS
 from service.static_page import PageError, main, write_page
 
+pytestmark = pytest.mark.slow
+
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 

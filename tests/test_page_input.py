@@ -7,6 +7,8 @@ from urllib.parse import quote
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 READ = {  # (field, unit, text): SI value, or part of the message
     ("y0", "µm", "5 mm"): 5e-3,
     ("y0", "µm", "5mm"): 5e-3,

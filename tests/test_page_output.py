@@ -11,6 +11,8 @@ from mumacro.closed_forms import border_23, border_24, border_26, border_27
 from mumacro.law import APPROXIMATIONS
 from service.routes.page import ASSETS
 
+pytestmark = pytest.mark.slow
+
 
 def test_it_loads_and_shows_the_known_value(open_page, surrogate, live_server, case):
     page = open_page(new=True)

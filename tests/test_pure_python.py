@@ -45,6 +45,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_plain_python_equals_the_compiled_code(repository: Path) -> None:
     table = repository / "tables" / "mumacro-1e-10.nc"
     done = subprocess.run(

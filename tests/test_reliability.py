@@ -14,6 +14,8 @@ from builder.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.writing import BusyError, alone_in, write_whole
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -142,7 +144,6 @@ def test_scaling_at_constant_groups_changes_nothing(table: Surrogate) -> None:
     assert by_powers_of_two.broken == by_any_factor.broken == 0
 
 
-@pytest.mark.slow
 def test_another_processor_answers_within_the_bounds() -> None:
     """Guaranteed across processors: both bounds and the source, but not the bits."""
     here, there = answers.across_processors(20_000, 1e-12)
@@ -169,8 +170,8 @@ def test_number_strings_give_the_bits_of_float_or_are_refused(tmp_path: Path, wh
     [
         "disk full while a table is written",
         "no permission to write a table",
-        pytest.param("no permission to write eval's output", marks=pytest.mark.slow),
-        pytest.param("a clock that steps", marks=pytest.mark.slow),
+        "no permission to write eval's output",
+        "a clock that steps",
     ],
 )
 def test_a_fault_loses_no_data(name: str) -> None:
@@ -237,7 +238,6 @@ def test_a_file_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.Monkey
 # --- the service --------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_strange_requests_are_answered_or_refused() -> None:
     found = strange.strange_requests(0.003)
     assert "FAILED" not in found, found

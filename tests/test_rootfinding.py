@@ -143,6 +143,7 @@ def test_an_ordinary_target_takes_few_evaluations(surrogate, monkeypatch):
     assert sum(calls) <= 6 * 1000
 
 
+@pytest.mark.slow
 def test_the_comparison_of_methods_runs(repository):
     command = [sys.executable, "benchmarks/inverse.py", "--quick", "--rounds", "1"]
     done = subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=300, check=False)

@@ -105,6 +105,7 @@ def is_refused_in_its_place(response):
 
 
 # UM-Bridge has its own error format and statuses, including 500 InvalidOutput; test_umbridge.py has its rules.
+@pytest.mark.slow
 @SCHEMA.exclude(tag="UM-Bridge 1.0").parametrize()
 @settings(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_every_answer_is_as_described(case, live_server):

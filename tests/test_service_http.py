@@ -142,6 +142,7 @@ def test_without_the_key_there_is_no_answer(closed, case, problem, headers):
         assert response.headers["www-authenticate"] == "Bearer"
 
 
+@pytest.mark.slow
 def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed):
     open_to_all = {"/livez", "/readyz", "/healthz", "/", "/docs", "/static/page/names.json"}
     open_to_all |= {f"/static/page/{name}" for name in PAGE_ASSETS} | {f"/static/swagger-ui/{name}" for name in ASSETS}

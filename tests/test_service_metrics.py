@@ -12,6 +12,8 @@ from service.app import create_app
 from service.metrics import ROUTES
 from service.settings import Settings
 
+pytestmark = pytest.mark.slow
+
 PATH = "/v1/mu-macro"
 PATIENCE_S = 60
 

@@ -30,6 +30,7 @@ def test_every_double_is_read_exactly(values):
     assert all(np.array_equal(column, np.array(values)) for column in columns)
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(text=st.from_regex(r"-?(0|[1-9][0-9]{0,15})(\\.[0-9]{1,20})?([eE][+-]?[0-9]{1,3})?", fullmatch=True))
 def test_accepted_numbers_are_those_that_python_reads(text):

@@ -202,6 +202,7 @@ def test_an_arrow_name_that_is_no_text_is_refused(client, case, problem):
     problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 400)
 
 
+@pytest.mark.slow
 def test_a_damaged_arrow_stream_is_answered_or_refused(client, case):
     whole = stream_of(pa.record_batch({**{name: [value] * 3 for name, value in case.items()}, "k": [1e6, None, 1e5]}))
     lies = (b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\0\0\0\0", b"\0\0\0\1")

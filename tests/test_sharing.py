@@ -21,6 +21,8 @@ from mumacro import InputError, Surrogate, TableError, batch
 from mumacro.processors import processors
 from mumacro.table import read_table
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}

@@ -310,6 +310,7 @@ def test_the_regions_are_those_of_the_atlas() -> None:
     assert {name: {number(x) for x in re.findall(NUMBER, where)} for name, where in told} == expected
 
 
+@pytest.mark.slow
 def test_the_errors_of_the_headline_are_those_of_the_tables(sweep) -> None:
     lines = [line for line in rows("README.md", "headline") if line["method"].startswith("mumacro")]
     assert len(lines) == 4

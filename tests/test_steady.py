@@ -328,6 +328,7 @@ def test_dip_of_the_slip_speed_between_two_samples_is_seen(y: float, distance: f
         assert below.mu_ratio == pytest.approx(smooth, rel=2e-15, abs=0.0)
 
 
+@pytest.mark.slow
 def test_border_points_between_the_samples_of_a_dense_cloud(sweep: Sweep) -> None:
     """Beside the border, at distances down to the last digit, the sticking and the continuous orbit agree."""
     rng = np.random.default_rng(11)

@@ -30,6 +30,7 @@ def copy(tmp_path: Path) -> Path:
     return Path(shutil.copy(TABLE, tmp_path / "copy.nc"))
 
 
+@pytest.mark.slow
 def test_a_byte_flipped_in_the_numbers_is_always_refused(copy: Path) -> None:
     whole, sound = TABLE.read_bytes(), read_table(TABLE)
     corner = sound.blocks[CORNER]

@@ -17,6 +17,7 @@ BYTES = {"mumacro-1e-4": 130_000, "mumacro-1e-7": 210_000, "mumacro-1e-10": 350_
 SCRIPT = Path(sys.executable).parent / "compliance-checker"
 
 
+@pytest.mark.slow
 def test_tables_follow_the_cf_conventions() -> None:
     assert len(TABLES) >= 2
     # the checker brings its own table of standard names: no network

@@ -82,6 +82,7 @@ def test_there_are_examples() -> None:
     } <= shown  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_typed_program_passes_the_strict_checker_and_runs(tmp_path: Path, repository: Path) -> None:
     program = tmp_path / "shaken.py"
     program.write_text(PROGRAM)
@@ -95,6 +96,7 @@ def test_a_typed_program_passes_the_strict_checker_and_runs(tmp_path: Path, repo
     assert done.stdout.startswith("0.240012 stick_slip ")
 
 
+@pytest.mark.slow
 def test_a_program_with_a_wrong_name_does_not_pass(tmp_path: Path, repository: Path) -> None:
     program = tmp_path / "wrong.py"
     program.write_text("from mumacro import Surrogate\n\nSurrogate.open().mu_rato(0.1, 0.5)\nSurrogate.open([1])\n")

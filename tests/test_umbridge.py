@@ -13,6 +13,8 @@ from mumacro.dimensional import FIELDS
 from service.app import create_app
 from service.settings import Settings
 
+pytestmark = pytest.mark.slow
+
 POSTS = ("ModelInfo", "InputSizes", "OutputSizes", "Evaluate", "Gradient", "ApplyJacobian", "ApplyHessian")
 MODELS = ("mu_macro", "mu_macro_log10")
 POINT = [0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]

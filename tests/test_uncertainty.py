@@ -54,6 +54,7 @@ def test_the_gradient_is_that_of_the_full_model(surrogate, place):
         assert gradient[name] * value == pytest.approx(slope, rel=1e-7, abs=3e-10), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 def test_the_power_is_that_of_a_plain_time_integration(surrogate, naive, place):
     answer = surrogate.evaluate({**CASE, **PLACES[place]})

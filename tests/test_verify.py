@@ -14,6 +14,8 @@ from mumacro import Surrogate
 from mumacro.charts import CHARTS, MU, NAMES, POWER, QUANTITIES, SOURCES, STICK
 from mumacro.table import Table, read_table
 
+pytestmark = pytest.mark.slow
+
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-7.nc"
 
 
