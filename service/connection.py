@@ -174,7 +174,8 @@ class Connection(asyncio.Protocol):
         self._now: _Exchange | None = None  # the request that is being answered
         self._coming: _Exchange | None = None  # the one whose body is being read
         self._in_head = False
-        self._url, self._headers, self._expects = b"", list[tuple[bytes, bytes]](), False
+        self._url, self._headers = b"", list[tuple[bytes, bytes]]()
+        self._expects, self._hosts = False, 0
         self._idle_bytes = 0  # since the last head, or piece of a body, was complete
         self._moved = False
         self._stopping = False
@@ -315,7 +316,7 @@ class Connection(asyncio.Protocol):
     def on_message_begin(self) -> None:
         """The parser's: a request begins."""
         self._in_head = True
-        self._url, self._headers, self._expects = b"", [], False
+        self._url, self._headers, self._expects, self._hosts = b"", [], False, 0
 
     def on_url(self, url: bytes) -> None:
         """The parser's: a piece of the target."""
@@ -325,14 +326,21 @@ class Connection(asyncio.Protocol):
         """The parser's: a field of the head, or one behind the body, which nobody sees."""
         if self._in_head:
             name = name.lower()
-            if name == b"expect" and value.lower() == b"100-continue":
-                self._expects = True
+            if name == b"host":
+                self._hosts += 1
+            elif name == b"expect":
+                self._expects = value.lower() == b"100-continue"
+            elif name == b"transfer-encoding" and value.lower() != b"chunked":
+                raise ValueError("an unknown transfer coding")
             self._headers.append((name, value))
 
     def on_headers_complete(self) -> None:
         """The parser's: the head is complete."""
         self._in_head, self._moved = False, True
         url, parser = self._url, self._parser
+        version = parser.get_http_version()
+        if version != "1.1" and version != "1.0" or self._hosts != 1 and (self._hosts or version == "1.1"):
+            raise ValueError("another version of HTTP, or not one Host")  # the parser reports it like its own errors
         if url.startswith(b"/") and b"#" not in url:
             path, _, query = url.partition(b"?")
         else:
@@ -341,7 +349,6 @@ class Connection(asyncio.Protocol):
         text = path.decode("ascii")
         if "%" in text:
             text = unquote(text)
-        version = parser.get_http_version()
         root: str = self._fixed["root_path"]
         scope = {
             **self._fixed,

@@ -32,8 +32,9 @@ def load(name: str) -> ModuleType:
         sys.path[:] = before
 
 
-tables, hostile, faults, answers, strings, traffic, restarts, strange = map(
-    load, ("tables", "hostile_tables", "faults", "answers", "number_strings", "load", "restarts", "strange")
+tables, hostile, faults, answers, strings, traffic, restarts, strange, framing = map(
+    load,
+    ("tables", "hostile_tables", "faults", "answers", "number_strings", "load", "restarts", "strange", "parsers"),
 )
 
 
@@ -238,13 +239,19 @@ def test_a_file_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.Monkey
 # --- the service --------------------------------------------------------------------------------------
 
 
+def test_no_request_is_seen_where_h11_sees_none_or_another() -> None:
+    assert "FAILED" not in framing.parsers(0.003)
+
+
 def test_strange_requests_are_answered_or_refused() -> None:
     found = strange.strange_requests(0.003)
     assert "FAILED" not in found, found
 
 
 @pytest.mark.parametrize(
-    "script", [tables, faults, answers, strings, traffic, restarts, strange], ids=lambda script: script.__name__
+    "script",
+    [tables, faults, answers, strings, traffic, restarts, strange, framing],
+    ids=lambda script: script.__name__,
 )
 def test_every_section_of_a_script_is_on_the_page_and_nothing_failed(script: ModuleType) -> None:
     page = PAGE.read_text("utf-8")
