@@ -1,7 +1,7 @@
-"""Plain numeric columns, compiled: JSON text straight into arrays, without the interpreter's lock.
+"""Compiled reader of plain numeric columns: from JSON text to arrays, without the interpreter's lock.
 
-Accepts only the ordinary: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one number,
-``null`` for ``k``.  Everything else is read by :mod:`service.formats.columns`.  Why no library is used here:
+It accepts only ordinary columns: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one
+number, ``null`` for ``k``.  :mod:`service.formats.columns` reads everything else.  Why no library is used here:
 docs/decisions/0011-wire.md.
 
 Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at a gigabyte per second", Software:
@@ -73,7 +73,7 @@ def _double(w: np.uint64, q: int) -> tuple[np.uint64, bool]:
         return _0, True
     if q > _LARGEST:
         return _0, False
-    # The exponent of w as a double tells its length, or one more where w was rounded up to a power of two.
+    # The exponent of w as a double gives its length, or one more where w was rounded up to a power of two.
     shift = max(1086 - int(np.float64(w).view(np.int64) >> 52), 0)
     w = w << _U(shift)
     if w < _SIGN:
@@ -281,23 +281,23 @@ def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: in
 
 @_compiled
 def _spread(words: NDArray[np.uint64], first: int, size: int, listed: int) -> None:
-    """Repeat what holds for all cases."""
+    """Repeat the values that hold for all cases."""
     for row in range(6):
         if not listed >> row & 1:
             words[row, first : first + size] = words[row, first]
 
 
 def read_columns(text: Bytes, start: int, stop: int, columns: Array, first: int = 0) -> int:
-    """Read text[start:stop], behind which stands one byte that is no part of it, from case ``first`` on.
+    """Read text[start:stop], which one more byte must follow, into the columns from case ``first`` on.
 
     Parameters
     ----------
     text : NDArray[uint8]
-        Ends in a 0 byte, or in what stops a number.
+        Ends in a 0 byte, or in another byte that ends a number.
     start, stop : int
-        White space in front is skipped; the one behind has to be cut off.
+        White space at the start is skipped; at the end there must be none.
     columns : ndarray
-        Shape (6, room); gets the six inputs, k = inf for rigid contact.
+        Shape (6, room); filled with the six inputs, k = inf for rigid contact.
     first : int
 
     Returns

@@ -1,4 +1,4 @@
-"""UM-Bridge 1.0: two models, reading of requests, answers and errors.  Of HTTP it knows only the status codes.
+"""UM-Bridge 1.0: two models, reading of requests, answers and errors.  Routes are in :mod:`service.routes.umbridge`.
 
 Rules of the protocol that are easily missed:
 
@@ -36,7 +36,7 @@ Reply = dict[str, Any]
 
 
 class UmBridgeError(Exception):
-    """A request that has no answer, in the protocol's own terms."""
+    """A request that has no answer; ``kind`` is the protocol's name of the error."""
 
     def __init__(self, kind: str, message: str) -> None:
         self.kind = kind
@@ -77,7 +77,7 @@ def model_of(body: Any) -> str:
 
 
 def _numbers(value: Any, name: str, size: int, scalar: bool = False) -> list[float]:
-    """``value`` as ``size`` finite numbers; a lone number stands for all of them where ``scalar`` allows it."""
+    """``value`` as ``size`` finite numbers; with ``scalar``, one number may replace the list."""
     if scalar and not isinstance(value, list):
         value = [value] * size
     if not isinstance(value, list):
