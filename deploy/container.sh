@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Build the image, run it the way production should (unprivileged, read-only root, no capabilities, little
-# memory), and prove on the running container what the Dockerfile promises.
+# Build the image, run it as in production (unprivileged, read-only root, no capabilities, little memory), and
+# test the properties that the Dockerfile states on the running container.
 #
 #   bash deploy/container.sh
 #
-# With a Docker engine, that is used, or else podman.  On Debian as root it needs neither engine nor image
-# registry: podman comes from the distribution's packages, and so does the base image.  Anywhere else it says
-# "skipped: ..." and exits 0; a promise that does not hold exits 1.  The image stays behind as $IMAGE.
+# It uses a Docker engine, else podman.  On Debian as root it needs neither an engine nor an image registry: it
+# installs podman from the distribution's packages and makes the base image from them.  Anywhere else it prints
+# "skipped: ..." and exits 0.  If a test fails it exits 1.  The image remains as $IMAGE.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -83,8 +83,8 @@ fi
 
 # --- build --------------------------------------------------------------------------------------------
 
-# What this machine's pip is told about its network, as build secrets.  Local folders stay out: the build
-# does not see them.
+# The network settings of this machine's pip, as build secrets.  Local folders are left out: the build has no
+# access to them.
 : >"$work/pip.conf"; : >"$work/ca.pem"; chmod 600 "$work/pip.conf"
 python3 - "$work" <<'PYTHON'
 import ast, os, pathlib, shutil, subprocess, sys
@@ -122,7 +122,7 @@ replaced=$("$engine" image inspect --format '{{.Id}}' "$IMAGE" 2>/dev/null || tr
     >"$work/build.log" 2>&1 </dev/null || { tail -n 30 "$work/build.log" >&2; fail "the image does not build"; }
 say "Built in $((SECONDS - started)) s"
 if [[ -n $replaced && $replaced != "$("$engine" image inspect --format '{{.Id}}' "$IMAGE")" ]]; then
-    "$engine" image rm "$replaced" >/dev/null 2>&1 || true   # else every run leaves one nameless image behind
+    "$engine" image rm "$replaced" >/dev/null 2>&1 || true   # else every run leaves one image without a name
 fi
 
 # --- run ----------------------------------------------------------------------------------------------
@@ -132,8 +132,8 @@ if [[ ${network_flags[*]} == "--network host" ]]; then
     network_flags+=(--env MUMACRO_HOST=127.0.0.1 --env "MUMACRO_PORT=$port")   # host network: loopback only
 fi
 
-# A kernel may refuse limits (no cgroup controller, no right to raise one).  Those flags are dropped one at a
-# time, loudly; what proves the image (user, read-only root, no capabilities) is never dropped.
+# A kernel may refuse limits (no cgroup controller, no right to raise one).  Those flags are dropped one by one,
+# with a message; the flags that are tested (user, read-only root, no capabilities) are never dropped.
 limits=(--memory=300m --ulimit=nofile=4096:4096 --ulimit=nproc=8192:8192)
 while :; do
     if container=$("$engine" "${runtime_flags[@]}" run --detach "${network_flags[@]}" --read-only \
@@ -170,7 +170,7 @@ until get /readyz >/dev/null 2>&1; do
 done
 ready=$(python3 -c "import time; print(f'{time.time() - $born:.1f}')")
 
-# --- proofs -------------------------------------------------------------------------------------------
+# --- tests --------------------------------------------------------------------------------------------
 
 if [[ $engine == podman ]]; then podman healthcheck run "$container" >/dev/null; else inside python -m service healthcheck >/dev/null; fi \
     || fail "the health check fails"
@@ -193,7 +193,7 @@ if inside python -c 'import builder' 2>/dev/null; then fail "the solver is in th
 if inside python -c 'import pip' 2>/dev/null; then fail "pip is in the image's environment"; fi
 say "ok  no solver, no pip"
 
-# Every kernel must come from the image, for whatever mix of numbers and columns a caller sends.
+# Every kernel must come from the image, for every mix of numbers and columns in a request.
 batch() {  # JSON -> fails unless the status is 200
     python3 - "$port" "$1" <<'PYTHON'
 import http.client, sys
