@@ -116,7 +116,7 @@ def _space(text: Bytes, i: int) -> int:
 
 @_inlined
 def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
-    """(w followed by the digits at ``i``, index behind them)."""
+    """(w followed by the digits at ``i``, index after them)."""
     while i + 8 <= text.size:
         eight = _0
         for j in range(8):  # the compiler makes one load of it
@@ -138,7 +138,7 @@ def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
 
 @_inlined
 def _number(text: Bytes, i: int) -> tuple[np.uint64, int]:
-    """(bits of the JSON number at ``i``, index behind it), or (0, -1) for anything else."""
+    """(bits of the JSON number at ``i``, index after it), or (0, -1) for anything else."""
     start = i
     negative = text[_U(i)] == 45
     if negative:
@@ -188,7 +188,7 @@ def _is_null(text: Bytes, i: int) -> bool:
 
 @_compiled
 def _list(text: Bytes, i: int, row: NDArray[np.uint64], nullable: bool) -> tuple[int, int]:
-    """(index behind the list whose first entry is due at ``i``, entries), or (-1, _); (-2, _): no room."""
+    """(index after the list whose first entry is expected at ``i``, entries), or (-1, _); (-2, _): no room."""
     n = 0
     i = _space(text, i)
     if text[_U(i)] == 93:
@@ -213,7 +213,7 @@ def _list(text: Bytes, i: int, row: NDArray[np.uint64], nullable: bool) -> tuple
 
 @_inlined
 def _field(text: Bytes, i: int) -> tuple[int, int]:
-    """(index of the name in quotes at ``i``, index behind it), or (-1, i)."""
+    """(index of the name in quotes at ``i``, index after it), or (-1, i)."""
     if text[_U(i)] != 34:
         return -1, i
     word, shift, j = _0, _0, i + 1
@@ -273,7 +273,7 @@ def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: in
             return 0, 0, 0
     i += 1
     while i < stop and (text[_U(i)] == 32 or text[_U(i)] == 13 or text[_U(i)] == 9 or text[_U(i)] == 10):
-        i += 1  # not beyond stop: what stands there may be a newline and the next line
+        i += 1  # not beyond stop: there may be a newline and the next line
     if i != stop or listed == 0 or seen & 63 != 63:
         return 0, 0, 0
     return size, listed, seen >> 6

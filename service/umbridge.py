@@ -5,7 +5,7 @@ Rules of the protocol that are easily missed:
 - An error is ``{"error": {"type", "message"}}`` with 400 or 500 and nothing else; a reply has no keys beyond its own.
 - The model's name is checked first.
 - ``config`` may be missing, null, or an empty list (that is how R writes an empty one).  These models have no options.
-- Clients that unbox vectors of one element send a scalar ``sens``.  A scalar ``vec`` stands for every component.
+- Clients that unbox vectors of one element send a scalar ``sens``.  A scalar ``vec`` is used for every component.
 - An answer is never NaN or infinite: JSON has no such numbers, and clients would read them as friction.
 
 ``mu_macro_log10`` takes the decimal logarithms of the inputs: one client rounds inputs to four decimals, which would
