@@ -1,27 +1,27 @@
-# The service and what it needs to answer, nothing else: no solver, no tests, no compiler, no pip.
+# The service and the packages that it needs: no solver, no tests, no compiler, no pip.
 #
 #   docker build -t mumacro .
 #   docker run --read-only --cap-drop=all -p 127.0.0.1:8000:8000 mumacro
 #
-# BASE may be any image with a `python3` of 3.11 or newer.  BUILD_BASE, if it is another one, must have the same
-# Python at the same path and the same C library: the environment that is made in it points at that interpreter.
-# It must be able to make a virtual environment; BASE then needs neither that nor a shell.
+# BASE may be any image with a `python3` of 3.11 or newer.  BUILD_BASE, if it is another image, must have the same
+# Python at the same path and the same C library: the environment made in it has the path of its interpreter.
+# BUILD_BASE must be able to make a virtual environment; BASE needs neither that nor a shell.
 ARG BASE=python:3.11-slim
 ARG BUILD_BASE=${BASE}
 
 FROM ${BUILD_BASE} AS build
 WORKDIR /app
-# A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and because it
-# moves into the next stage as one folder.
+# A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and because it is
+# copied to the next stage as one folder.
 RUN python3 -m venv venv
 COPY requirements/service.txt requirements/
-# A network with its own certificate authority or package index passes them as the two secrets; they are
-# optional, and neither ends up in a layer.
+# A network with its own certificate authority or package index passes them as the two secrets.  They are
+# optional, and neither is stored in a layer.
 RUN --mount=type=secret,id=pip.conf,target=/etc/pip.conf \
     --mount=type=secret,id=ca.pem,target=/etc/pip-ca.pem \
     venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes \
         -r requirements/service.txt
-# Other projects' tests are a tenth of the environment.
+# The tests of other projects are a tenth of the environment.
 RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' -prune -exec rm -rf {} + \
 # Sources and headers for compilers, and stubs for type checkers.
     && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' -o -name '*.p[xy][xdi]' \) -delete \
@@ -38,8 +38,8 @@ COPY mumacro mumacro
 COPY service service
 COPY tables tables
 # The kernels are compiled here, once.  A file of compiled code is named after the processor, so they are
-# compiled for the baseline of the architecture: an image runs on machines other than the one that built it.
-# Whoever the container runs as may read everything here, whatever the umask of the checkout, and change nothing.
+# compiled for the baseline of the architecture: the image also runs on other machines than the one that built it.
+# Every user of the container may read all files here, whatever the umask of the checkout; no user may write them.
 # Measured on one core, a million points, against code for the building machine's own processor: 25 % slower for
 # dimensionless points, 3 % for dimensional ones.
 ENV NUMBA_CPU_NAME=generic \

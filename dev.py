@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The one entry for everything that needs an environment: try it, test it, serve it, pin it.
+"""Commands that need an environment: demo, tests, checks, documentation, service, locks.
 
-    python3 dev.py demo            start the service, ask it one real question, stop it
+    python3 dev.py demo            start the service, send it one request, stop it
     python3 dev.py test [ARGS]     every check, then every test (ARGS go to pytest)
     python3 dev.py test --quick    every check, then the tests that are not marked slow
     python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
-    python3 dev.py serve [ARGS]    run the service until it is told to stop
+    python3 dev.py serve [ARGS]    run the service until a signal stops it
     python3 dev.py page            the page as a folder for any static host, in build/page; needs zig, or clang and lld
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
@@ -48,7 +48,7 @@ NEWER_NAMES = ("python3.13", "python3.12", "python3.11")
 # environment for "dev" can stand in for one for "service".
 SETS = {"service": ("build", "service"), "dev": ("dev",)}
 LOCKS = ("dev", "service", "build")  # in the order of making: the first constrains the others
-UV = "uv==0.13.8"  # pins the resolver too: two people who lock on one day get one file
+UV = "uv==0.13.8"  # pins the resolver too: two people who lock on the same day get the same file
 
 CASE = {"mu0": "0.3", "Fz": "10", "k": "1e6", "y0": "2e-6", "omega": "1.3e5", "v0": "0.01"}
 UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
@@ -79,7 +79,7 @@ def run(*command: str | Path, env: dict[str, str] | None = None, quiet: bool = F
 
 
 def works(python: str | Path) -> bool:
-    """Whether that interpreter starts; a name on the PATH or a file in ``.venv`` may lead nowhere."""
+    """Whether that interpreter starts; a name on the PATH or a link in ``.venv`` may be broken."""
     try:
         done = subprocess.run([str(python), "-c", ""], capture_output=True, check=False)  # noqa: S603 - fixed words
     except OSError:
@@ -88,7 +88,7 @@ def works(python: str | Path) -> bool:
 
 
 def environment() -> dict[str, str]:
-    """The caller's variables with ``.venv`` in front; what would leak other packages in is left out."""
+    """The environment variables with ``.venv`` first; without those that would add other packages."""
     env = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
     env["VIRTUAL_ENV"] = str(VENV)
     env["NUMBA_CACHE_DIR"] = str(KERNELS)
@@ -105,7 +105,7 @@ def digest(set_name: str) -> str:
 
 
 def installed() -> dict[str, str]:
-    """Digests of the sets that ``.venv`` holds; empty when it is absent, broken or half made."""
+    """Digests of the sets that ``.venv`` holds; empty if it is absent, broken or incomplete."""
     try:
         marker = json.loads(MARKER.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -114,12 +114,12 @@ def installed() -> dict[str, str]:
 
 
 def ensure(set_name: str) -> None:
-    """Make ``.venv`` hold the locked set, at the least cost that is still exact."""
+    """Install the locked set into ``.venv``; do nothing if it is there already."""
     have = installed()
     current = [name for name in SETS if have.get(name) == digest(name)]
     if set_name in current or "dev" in current:
         return
-    if not current:  # absent, or made from locks that have changed since: what they dropped must go too
+    if not current:  # absent, or made from older locks: packages that they dropped must be removed too
         print(f"Making {VENV} with Python {sys.version.split()[0]}", flush=True)
         if run(sys.executable, "-m", "venv", "--clear", VENV, quiet=True):
             raise FailedError(
@@ -131,7 +131,7 @@ def ensure(set_name: str) -> None:
     titles = " and ".join(path.relative_to(ROOT).as_posix() for path in locks)
     print(f"Installing {titles} (a minute or two)", flush=True)
     started = time.monotonic()
-    # Without compiling: Python does that for what is imported, a third of the files and of the time.
+    # Without compiling: Python compiles files on import, only a third of them.
     pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--no-compile")
     files = [word for path in locks for word in ("-r", path)]
     if run(*pip, "--require-hashes", *files, env=environment(), quiet=True):
@@ -192,12 +192,12 @@ def stop(server: subprocess.Popen[bytes]) -> None:
 
 
 def demo() -> int:
-    """Start the service on a free loopback port, ask one question over HTTP, stop it."""
+    """Start the service on a free loopback port, send one request, stop it."""
     ensure("service")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
-    # The demo shows the defaults, not the settings of the caller's shell.
+    # The demo uses the defaults, not the settings of the user's shell.
     env = {name: value for name, value in environment().items() if not name.startswith("MUMACRO_")}
     env |= {"MUMACRO_HOST": "127.0.0.1", "MUMACRO_PORT": str(port)}
     announce_kernels()
@@ -247,12 +247,12 @@ def serve(arguments: list[str]) -> int:
 
 
 def stale_locks() -> list[str]:
-    """The lock files that were made from other requirements than pyproject.toml now has."""
+    """The lock files that were made from other requirements than those of pyproject.toml now."""
     return [name for name in LOCKS if f"# inputs: {inputs_digest()}" not in lock_path(name).read_text("utf-8")]
 
 
 def docs_command(folder: str | Path) -> tuple[str | Path, ...]:
-    """Build the site into a folder; a warning, such as a link that leads nowhere, is an error."""
+    """Build the site into a folder; a warning, such as a broken link, is an error."""
     return BIN / "sphinx-build", "-W", "--keep-going", "-q", "docs", folder
 
 
@@ -283,7 +283,7 @@ def documentation_builds() -> bool:
 
 
 def packages_pass() -> bool:
-    """Build what would be uploaded, into a temporary folder, and check it."""
+    """Build the distributions in a temporary folder and check them."""
     with tempfile.TemporaryDirectory() as folder:
         if not passes("wheel and sdist", "hatchling", "build", "-d", folder):
             return False
@@ -341,13 +341,13 @@ def test(arguments: list[str]) -> int:
 
 
 def project_table() -> dict[str, Any]:
-    import tomllib  # not at the top: an interpreter too old for it must still reach the hint in main()
+    import tomllib  # not at the top: an interpreter without it must still reach the message in main()
 
     return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 
 
 def inputs_digest() -> str:
-    """Stamp of everything in pyproject.toml that the locks depend on; stands in their second line."""
+    """Digest of everything in pyproject.toml that the locks depend on; it is in their second line."""
     table = project_table()
     project = table["project"]
     names = ("requires-python", "dependencies", "optional-dependencies")
@@ -369,7 +369,7 @@ def lock(arguments: list[str]) -> int:
         if run(bin_ / PYTHON.name, "-m", "pip", "--disable-pip-version-check", "install", UV, quiet=True):
             raise FailedError(f"pip could not install {UV} (see above)")
         build = Path(folder) / "build.in"
-        # editables is what hatchling asks for when it installs in place.
+        # hatchling needs editables to install in place.
         build.write_text("\n".join([*project_table()["build-system"]["requires"], "editables"]), "utf-8")
         sources: dict[str, list[str | Path]] = {
             "dev": ["pyproject.toml", "--extra", "dev", build],
@@ -403,7 +403,7 @@ def lock(arguments: list[str]) -> int:
 
 
 def use_a_newer_python() -> None:
-    """On an interpreter that is too old, go on in a newer one if the machine has it."""
+    """On an interpreter that is too old, continue in a newer one if the machine has it."""
     for name in NEWER_NAMES:
         other = shutil.which(name)
         if other and works(other):
@@ -413,7 +413,7 @@ def use_a_newer_python() -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Do what the first word says; 2 when it says nothing known."""
+    """Run the command that the first argument names; 2 if it is unknown."""
     word, rest = (arguments[0], arguments[1:]) if arguments else ("", [])
     try:
         if sys.version_info < OLDEST:

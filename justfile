@@ -23,7 +23,7 @@ fix:
     {{python}} dev.py exec ruff check --fix .
     {{python}} dev.py exec ruff format .
 
-# Run the service until it is told to stop
+# Run the service until a signal stops it
 serve *ARGS:
     {{python}} dev.py serve {{ARGS}}
 

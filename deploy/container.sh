@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Build the image, run it the way production should (unprivileged, read-only root, no capabilities, little
-# memory), and prove on the running container what the Dockerfile promises.
+# Build the image, run it as in production (unprivileged, read-only root, no capabilities, little memory), and
+# test the properties that the Dockerfile states on the running container.
 #
 #   bash deploy/container.sh
 #
-# With a Docker engine, that is used, or else podman.  On Debian as root it needs neither engine nor image
-# registry: podman comes from the distribution's packages, and so does the base image.  Anywhere else it says
-# "skipped: ..." and exits 0; a promise that does not hold exits 1.  The image stays behind as $IMAGE.
+# It uses a Docker engine, else podman.  On Debian as root it needs neither an engine nor an image registry: it
+# installs podman from the distribution's packages and makes the base image from them.  Anywhere else it prints
+# "skipped: ..." and exits 0.  If a test fails it exits 1.  The image remains as $IMAGE.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -86,8 +86,8 @@ fi
 
 # --- build --------------------------------------------------------------------------------------------
 
-# What this machine's pip is told about its network, as build secrets.  Local folders stay out: the build
-# does not see them.
+# The network settings of this machine's pip, as build secrets.  Local folders are left out: the build has no
+# access to them.
 : >"$work/pip.conf"; : >"$work/ca.pem"; chmod 600 "$work/pip.conf"
 python3 - "$work" <<'PYTHON'
 import ast, os, pathlib, shutil, subprocess, sys
@@ -126,7 +126,7 @@ replaced=$("$engine" image inspect --format '{{.Id}}' "$IMAGE" 2>/dev/null || tr
     >"$work/build.log" 2>&1 </dev/null || { tail -n 30 "$work/build.log" >&2; fail "the image does not build"; }
 say "Built in $((SECONDS - started)) s"
 if [[ -n $replaced && $replaced != "$("$engine" image inspect --format '{{.Id}}' "$IMAGE")" ]]; then
-    "$engine" image rm "$replaced" >/dev/null 2>&1 || true   # else every run leaves one nameless image behind
+    "$engine" image rm "$replaced" >/dev/null 2>&1 || true   # else every run leaves one image without a name
 fi
 
 # --- what the image says of itself ---------------------------------------------------------------------
@@ -152,8 +152,8 @@ if [[ ${network_flags[*]} == "--network host" ]]; then
     network_flags+=(--env MUMACRO_HOST=127.0.0.1 --env "MUMACRO_PORT=$port")   # host network: loopback only
 fi
 
-# A kernel may refuse limits (no cgroup controller, no right to raise one).  Those flags are dropped one at a
-# time, loudly; what proves the image (user, read-only root, no capabilities) is never dropped.
+# A kernel may refuse limits (no cgroup controller, no right to raise one).  Those flags are dropped one by one,
+# with a message; the flags that are tested (user, read-only root, no capabilities) are never dropped.
 limits=(--memory=300m --ulimit=nofile=4096:4096 --ulimit=nproc=8192:8192)
 while :; do
     if container=$("$engine" "${runtime_flags[@]}" run --detach "${network_flags[@]}" --read-only \
@@ -193,7 +193,7 @@ until ask /readyz >/dev/null 2>&1; do
 done
 ready=$(python3 -c "import time; print(f'{time.time() - $born:.1f}')")
 
-# --- proofs -------------------------------------------------------------------------------------------
+# --- tests --------------------------------------------------------------------------------------------
 
 if [[ $engine == podman ]]; then podman healthcheck run "$container" >/dev/null; else inside python -m service healthcheck >/dev/null; fi \
     || fail "the health check fails"
@@ -250,14 +250,14 @@ for body in "{$case, \"v0\": [0.01]}" "{$case, \"v0\": [0.01, 0.1, 1.0]}" "[{$ca
     answer=$(ask /v1/mu-macro/batch "$body") || fail "a batch was answered with: $answer"
 done
 every='"include": ["gradient", "power", "stick_fraction", "regime_certain"]'
-ask /v1/mu-macro "{$case, \"v0\": 0.01, $every}" >/dev/null || fail "a question with everything included is refused"
+ask /v1/mu-macro "{$case, \"v0\": 0.01, $every}" >/dev/null || fail "a request with everything included is refused"
 ask /v1/law '{"along": "v0", "start": 1e-4, "stop": 10, "points": 201, "mu0": 0.3, "Fz": 10, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}' >/dev/null \
     || fail "a law is refused"
 ask /v1/solve-for '{"unknown": "y0", "target": [0.2, 0.15], "mu0": 0.3, "Fz": 10, "k": 1e6, "omega": 1.3e5, "v0": 0.01}' >/dev/null \
-    || fail "an inverse question is refused"
+    || fail "an inverse problem is refused"
 # A kernel that is compiled while serving cannot be stored on the read-only root, and the service says so.
 if late=$("$engine" logs "$container" 2>&1 | grep 'compiled kernels'); then fail "not every kernel is in the image: $late"; fi
-# numba tells of every compilation; this loads the tables as the start does.
+# numba reports every compilation; this loads the tables as the start does.
 kernels=$(inside python -c '
 import pathlib, sys
 from numba.core import event

@@ -1,8 +1,8 @@
 """``python -m service``: serve (from an installed wheel: ``mumacro serve``).
-``python -m service healthcheck``: ask a running service whether it is ready.
-``python -m service warm``: load the tables once, so that kernels are compiled and kept.
+``python -m service healthcheck``: check whether a running service is ready.
+``python -m service warm``: load the tables once, so that kernels are compiled and stored.
 
-Exit codes: 0 stopped on request (or ready), 1 could not run (or not ready), 2 bad setting or argument.
+Exit codes: 0 stopped by a signal (or ready), 1 could not run (or not ready), 2 bad setting or argument.
 """
 
 import argparse
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in _OPTIONS:
         value = getattr(chosen, name)
         if value is not None:
-            # Through the environment, so that worker processes see what was chosen here.
+            # In the environment, so that worker processes get the same settings.
             os.environ[PREFIX + name.upper()] = value
     try:
         settings = load_settings()
@@ -76,9 +76,9 @@ def _stop(_signal: int, _frame: FrameType | None) -> None:
 
 
 def _serve(settings: Settings) -> int:
-    # The server shuts down gracefully, then raises the signal once more, which by default would end the process
-    # with the signal's own exit status.  A stop that was asked for is a success.
-    # Set before the slow imports: as a container's first process this one would ignore the signal until then.
+    # The server shuts down gracefully, then raises the signal again, which by default would end the process with the
+    # signal's exit status.  A requested stop is a success: exit code 0.
+    # Set before the slow imports: the first process of a container ignores a signal that has no handler.
     signal.signal(signal.SIGTERM, _stop)
 
     # Imported here: a health check must not load the server and the kernels.
@@ -96,7 +96,7 @@ def _serve(settings: Settings) -> int:
     try:
         with shared_folder() if settings.workers > 1 else nullcontext():
             uvicorn.run(
-                # By name, so that only the processes that serve import it, not the one that watches over several.
+                # By name, so that only worker processes import it, and not their parent.
                 f"{__package__}.app:create_app",
                 factory=True,
                 http=f"{__package__}.connection:Connection",

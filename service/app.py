@@ -1,7 +1,7 @@
-"""The application: ``create_app(settings)`` puts settings, tables, middleware, handlers and routes together.
+"""The application: ``create_app(settings)`` builds it from settings, tables, middleware, handlers and routes.
 
-Nothing happens at import.  ``uvicorn --factory service.app:create_app`` works: without an argument the settings
-come from the environment.
+The import of this module does no work.  ``uvicorn --factory service.app:create_app`` works: without an argument the
+settings are read from the environment.
 """
 
 import asyncio
@@ -53,12 +53,12 @@ _ROUTERS = (
 )  # fmt: skip
 # The pages are the same for everyone and hold no number. They ask for the key and send it with every request.
 _OPEN_PATHS = HEALTH_PATHS | page.OPEN_PATHS | docs.OPEN_PATHS
-_NICENESS = 5  # of threads for batches: a third of the weight
+_NICENESS = 5  # of threads for batches: a third of the usual share of a processor
 _log = logging.getLogger("mumacro.app")
 
 
 def _stand_back() -> None:
-    """Lower the priority of this thread, so that short requests are answered first.  Only Linux has it for threads."""
+    """Lower the priority of this thread, so that short requests are answered first.  Linux only."""
     if sys.platform == "linux":
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
@@ -90,10 +90,10 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
     try:
         await loop.run_in_executor(threads, _load_more, tables)
     except Exception:
-        _log.exception("not everything could be loaded")
+        _log.exception("some compiled code could not be loaded")
     if threading.current_thread() is threading.main_thread():
-        # Each full garbage collection looks at a hundred thousand objects of the libraries.  It takes about fifty
-        # milliseconds, in which no request is answered.  Frozen objects are left out.
+        # A full garbage collection visits a hundred thousand objects of the libraries.  It takes about fifty
+        # milliseconds, in which no request is answered.  It does not visit frozen objects.
         gc.collect()
         gc.freeze()
 
@@ -109,7 +109,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     threads = ThreadPoolExecutor(count, thread_name_prefix="batch", initializer=_stand_back)
     state.work.threads = threads
     state.access_log.start()
-    # A separate thread: it does not wait behind batches and keeps its priority.
+    # A separate thread: it does not wait for batches and keeps its priority.
     start = ThreadPoolExecutor(1, thread_name_prefix="start")
     starting = asyncio.create_task(_start(app, start))
     sharing = asyncio.create_task(state.metrics.share())
@@ -157,8 +157,8 @@ def create_app(settings: Settings | None = None, *, wait: bool = False) -> FastA
         title="mumacro",
         version=__version__,
         lifespan=_lifespan,
-        openapi_url=None,  # routes/docs.py has the description, so that a thread makes it,
-        docs_url=None,  # and the page: the one of FastAPI loads its assets from a CDN
+        openapi_url=None,  # routes/docs.py has it, made in a thread,
+        docs_url=None,  # and a page: FastAPI's own pages load their assets from a CDN
         redoc_url=None,
         redirect_slashes=False,
         root_path=settings.root_path,
@@ -197,7 +197,7 @@ def _guide_paths(folder: Path | None) -> set[str]:
 
 
 async def _answer_invalid(request: Request, error: Exception) -> Response:
-    """Answer 400 or 422 where FastAPI found something wrong."""
+    """Answer 400 or 422 where FastAPI refused the body or the query."""
     assert isinstance(error, RequestValidationError)  # noqa: S101  (what it is registered for)
     return await answer_problem(request, invalid_request(path_of(request.scope), error.errors()))
 

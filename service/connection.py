@@ -1,8 +1,8 @@
-"""HTTP/1.1 on one connection: bytes to ASGI and back, one request after another, every part of it bounded.
+"""HTTP/1.1 on one connection: bytes to ASGI and back, one request after another, with a limit on every part.
 
-uvicorn takes it by its documented ``http`` parameter; the parser is llhttp (httptools).  uvicorn's own protocol over
-the same parser takes heads of any size, queues pipelined requests without a limit, waits for ever for the rest of a
-head, and takes half as long again for a request: docs/decisions/0011-wire.md.
+uvicorn gets this class by its documented ``http`` parameter; the parser is llhttp (httptools).  uvicorn's own protocol
+over the same parser has no limit on the size of a head, on the number of pipelined requests and on the wait for the
+rest of a head.  It also takes half as long again for a request: docs/decisions/0011-wire.md.
 """
 
 import asyncio
@@ -21,15 +21,15 @@ from .guard import BATCH_PATH, CLOSE, path_of
 
 __all__ = ["Connection"]
 
-MAX_HEAD = 64 * 1024  # bytes of a request's head, and of whatever else holds no body
-_HEADS = 16 * 1024  # bytes that are parsed at a time between requests: so few pipelined ones are queued at once
+MAX_HEAD = 64 * 1024  # bytes of a request's head, and of anything else that is not a body
+_HEADS = 16 * 1024  # bytes that are parsed at a time between requests: limits the queue of pipelined requests
 _BODIES = 64 * 1024  # and within a body
-_AHEAD = 256 * 1024  # bytes that are held for later before the socket is no longer read
+_AHEAD = 256 * 1024  # bytes that wait to be parsed; above this the socket is not read
 _UNREAD = 64 * 1024  # bytes of a body that the application has not taken yet
-_TOGETHER = 64 * 1024  # bytes of a body that are copied behind the head: one write to the socket instead of two
-_LINGER_S = 5.0  # how long the rest of an unwanted body is read, so that the caller sees the answer and no reset,
-_LINGER = 32 * 1024 * 1024  # and how much of it
-_LAST_S = 0.25  # how long a stopping service still takes a request on a connection that is open
+_TOGETHER = 64 * 1024  # bytes of a body that are copied after the head: one write to the socket instead of two
+_LINGER_S = 5.0  # how long the rest of an unused body is read, so that the client gets the answer and not a reset,
+_LINGER = 32 * 1024 * 1024  # and how many bytes of it
+_LAST_S = 0.25  # how long a stopping service still accepts a request on an open connection
 _STATUS = {status.value: f"HTTP/1.1 {status.value} {status.phrase}\r\n".encode() for status in HTTPStatus}
 _END = b"\r\n"
 _log = logging.getLogger("mumacro.error")
@@ -50,18 +50,18 @@ class _Exchange:
 
     def __init__(self, connection: "Connection", scope: Scope, keep: bool, expects: bool) -> None:
         self.connection, self.scope = connection, scope
-        self.keep = keep  # whether the connection goes on after it
-        self.expects = expects  # whether the caller waits for "100 Continue"
+        self.keep = keep  # whether the connection stays open after it
+        self.expects = expects  # whether the client waits for "100 Continue"
         self.body, self.more = b"", True
         self.taken = False  # whether the application has all of the body
         self.started = self.answered = self.gone = False
         self.head = b""  # of an answer of known length: written together with its first piece
-        self.left = 0.0  # bytes of the answer that are announced and not written; infinite: sent in chunks
+        self.left = 0.0  # bytes of Content-Length that are not written yet; infinite: sent in chunks
         self.waiter: asyncio.Future[None] | None = None
         self.task: asyncio.Task[None] | None = None
 
     async def run(self, app: ASGIApp) -> None:
-        """Have it answered."""
+        """Let the application answer the request."""
         try:
             await app(self.scope, self.receive, self.send)
         except Exception:
@@ -70,12 +70,12 @@ class _Exchange:
             self.connection.finished(self)
 
     def wake(self) -> None:
-        """There is something to receive."""
+        """Wake ``receive``: there is a message."""
         if self.waiter is not None and not self.waiter.done():
             self.waiter.set_result(None)
 
     async def receive(self) -> Message:
-        """The next piece of the body, or that the caller has left."""
+        """The next piece of the body, or the message that the client has disconnected."""
         if self.expects and not self.started:
             self.expects = False
             self.connection.write(b"HTTP/1.1 100 Continue\r\n\r\n")
@@ -95,7 +95,7 @@ class _Exchange:
         Raises
         ------
         RuntimeError
-            Messages out of order, a header that would break the head, or another length than was announced.
+            Messages out of order, a line break or a zero byte in a header, or another length than Content-Length.
         """
         if self.connection.stalled is not None and not self.gone:
             await self.connection.stalled.wait()
@@ -169,24 +169,24 @@ class Connection(asyncio.Protocol):
         self._parser = httptools.HttpRequestParser(self)
         self._transport: Any = None
         self._fixed: dict[str, Any] = {}  # of every scope
-        self._held = bytearray()  # what came while an earlier request was unanswered
+        self._held = bytearray()  # bytes that arrived while an earlier request was unanswered
         self._queue: deque[_Exchange] = deque()  # requests that are parsed and wait for their turn
         self._now: _Exchange | None = None  # the request that is being answered
-        self._coming: _Exchange | None = None  # the one whose body is being read
+        self._coming: _Exchange | None = None  # the request whose body is being read
         self._in_head = False
         self._url, self._headers = b"", list[tuple[bytes, bytes]]()
         self._expects, self._hosts = False, 0
         self._idle_bytes = 0  # since the last head, or piece of a body, was complete
         self._moved = False
         self._stopping = False
-        self._deaf = False  # whether what comes is thrown away
+        self._deaf = False  # whether received bytes are discarded
         self._paused = False
-        self.stalled: asyncio.Event | None = None  # while the caller does not read
+        self.stalled: asyncio.Event | None = None  # while the client does not read
         self._clock: asyncio.TimerHandle | None = None
         self._idle_clock: asyncio.TimerHandle | None = None
         self._idle_since = 0.0
 
-    # --- the socket's side ----------------------------------------------------------------------------
+    # --- callbacks of the transport -------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin."""
@@ -222,7 +222,7 @@ class Connection(asyncio.Protocol):
         self.resume_writing()
 
     def eof_received(self) -> bool:
-        """The caller sends no more: answer what is complete, then close.  False lets the transport close at once."""
+        """The client sends no more: answer complete requests, then close.  False: the transport closes at once."""
         self._deaf = True
         now = self._now
         if now is None or now.answered or now.gone or self._coming is now:
@@ -233,19 +233,19 @@ class Connection(asyncio.Protocol):
         return True
 
     def pause_writing(self) -> None:
-        """Give the caller some time to read."""
+        """The client reads too slowly: start its time limit."""
         self.stalled = asyncio.Event()
         self._watch(self.timeout_s)
 
     def resume_writing(self) -> None:
-        """The caller reads."""
+        """The client reads again."""
         if self.stalled is not None:
             self.stalled.set()
             self.stalled = None
             self._unwatch()
 
     def shutdown(self) -> None:
-        """Answer what has been asked and what is on its way, then close; uvicorn calls it."""
+        """Answer the requests that have arrived or arrive within a short time, then close; uvicorn calls it."""
         self._stopping = True
         if self._is_idle:
             self._loop.call_later(_LAST_S, self._close_unused)
@@ -261,7 +261,7 @@ class Connection(asyncio.Protocol):
             self._transport.close()
 
     def data_received(self, data: bytes) -> None:
-        """Parse what belongs to the request that is being answered, or begins one; hold the rest."""
+        """Parse bytes of the request that is being answered or begins; hold those of later requests."""
         if self._deaf:
             self._idle_bytes += len(data)
             if self._idle_bytes > _LINGER:
@@ -279,7 +279,7 @@ class Connection(asyncio.Protocol):
         return self._now is None or self._coming is self._now
 
     def _go_on(self) -> None:
-        """Parse what is held, as far as somebody wants it."""
+        """Parse held bytes until a request waits for an earlier answer."""
         while self._held and not self._deaf and self._is_wanted:
             size = _HEADS if self._coming is None else _BODIES
             piece = bytes(self._held[:size])
@@ -291,7 +291,7 @@ class Connection(asyncio.Protocol):
         self._moved = False
         try:
             self._parser.feed_data(data)
-        except httptools.HttpParserUpgrade:  # what follows would be another protocol's
+        except httptools.HttpParserUpgrade:  # the following bytes would be another protocol
             self._last().keep = False
             self._deaf = True
         except httptools.HttpParserError:
@@ -314,16 +314,16 @@ class Connection(asyncio.Protocol):
         self.regulate()
 
     def on_message_begin(self) -> None:
-        """The parser's: a request begins."""
+        """Callback of the parser: a request begins."""
         self._in_head = True
         self._url, self._headers, self._expects, self._hosts = b"", [], False, 0
 
     def on_url(self, url: bytes) -> None:
-        """The parser's: a piece of the target."""
+        """Callback of the parser: a piece of the target."""
         self._url += url
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """The parser's: a field of the head, or one behind the body, which nobody sees."""
+        """Callback of the parser: a header field, or a trailer field, which is ignored."""
         if self._in_head:
             name = name.lower()
             if name == b"host":
@@ -335,11 +335,11 @@ class Connection(asyncio.Protocol):
             self._headers.append((name, value))
 
     def on_headers_complete(self) -> None:
-        """The parser's: the head is complete."""
+        """Callback of the parser: the head is complete."""
         self._in_head, self._moved = False, True
         url, parser = self._url, self._parser
         version = parser.get_http_version()
-        if version != "1.1" and version != "1.0" or self._hosts != 1 and (self._hosts or version == "1.1"):
+        if (version != "1.1" and version != "1.0") or (self._hosts != 1 and (self._hosts or version == "1.1")):
             raise ValueError("another version of HTTP, or not one Host")  # the parser reports it like its own errors
         if url.startswith(b"/") and b"#" not in url:
             path, _, query = url.partition(b"?")
@@ -368,7 +368,7 @@ class Connection(asyncio.Protocol):
             self._queue.append(exchange)
 
     def on_body(self, body: bytes) -> None:
-        """The parser's: a piece of the body."""
+        """Callback of the parser: a piece of the body."""
         self._moved = True
         exchange = self._coming
         if exchange is not None and not exchange.answered:
@@ -376,7 +376,7 @@ class Connection(asyncio.Protocol):
             exchange.wake()
 
     def on_message_complete(self) -> None:
-        """The parser's: the request is complete."""
+        """Callback of the parser: the request is complete."""
         self._moved = True
         exchange, self._coming = self._coming, None
         if exchange is not None:
@@ -401,7 +401,7 @@ class Connection(asyncio.Protocol):
         self._server.total_requests += 1
         if not exchange.keep:
             self._close(unread=exchange.more)
-        elif exchange.more:  # the rest of its body comes first
+        elif exchange.more:  # first read the rest of its body
             self._watch(self.timeout_s)
             self.regulate()
         else:
@@ -414,7 +414,7 @@ class Connection(asyncio.Protocol):
         if not (exchange.answered or exchange.gone):
             exchange.gone = True
             if exchange.started:
-                self._transport.abort()  # nothing but that can say that the answer is not complete
+                self._transport.abort()  # the only way to show that the answer is not complete
             else:
                 self._queue.clear()
                 self._break(500)
@@ -430,11 +430,11 @@ class Connection(asyncio.Protocol):
         return self._queue[-1] if self._queue else self._now
 
     def _break(self, status: int) -> None:
-        """Say that no sense can be made of what comes, unless an answer has begun, and close."""
+        """Answer with an error status, unless an answer has begun, and close."""
         self._deaf = True
         now = self._now
         if self._queue or (now is not None and not now.answered and not now.gone and self._coming is not now):
-            self._last().keep = False  # what was asked in good order is answered
+            self._last().keep = False  # complete requests are answered first
             return
         if now is not None and now.started and not now.answered:
             self._transport.abort()
@@ -446,7 +446,7 @@ class Connection(asyncio.Protocol):
         self._close(unread=True)
 
     def _close(self, *, unread: bool) -> None:
-        """Close behind what is written; where more may come, once the caller has seen the answer."""
+        """Close after the written bytes; if the client may still send, after it has read the answer."""
         self._deaf = True
         if not unread and not self._held:
             self._transport.close()
@@ -463,7 +463,7 @@ class Connection(asyncio.Protocol):
             self._transport.write(data)
 
     def defaults(self) -> bytes:
-        """The fields that the server adds to every answer: the date."""
+        """The header fields that the server adds to every answer: the date."""
         fields = self._server.default_headers
         known, text = Connection._default_fields
         if fields is not known:  # a new list every second
@@ -474,7 +474,7 @@ class Connection(asyncio.Protocol):
     # --- bounds ---------------------------------------------------------------------------------------
 
     def regulate(self) -> None:
-        """Read the socket only while there is room for what comes."""
+        """Read the socket only while there is room in the buffers."""
         coming = self._coming
         full = len(self._held) > _AHEAD or (
             coming is not None and not coming.answered and len(coming.body) > _UNREAD
@@ -491,7 +491,7 @@ class Connection(asyncio.Protocol):
         self._idle_since = self._loop.time()
 
     def _close_idle(self) -> None:
-        """Close if nothing was asked for as long as a connection is kept; else look again then."""
+        """Close after the keep-alive time without a request; else set the timer again."""
         kept: float = self._config.timeout_keep_alive
         left = kept if self._now is not None else self._idle_since + kept - self._loop.time()
         if left <= 0.0:
@@ -519,5 +519,5 @@ def _address(found: Any) -> tuple[str, int] | None:
 
 
 def _keeps_time(scope: Scope) -> bool:
-    """Whether the application itself watches how long the body takes: batches do."""
+    """Whether the application itself limits the time of the body: batches do."""
     return path_of(scope).startswith(BATCH_PATH)

@@ -100,7 +100,7 @@ class FieldFault:
 
 
 class RequestError(MumacroError):
-    """A request that cannot be answered.  The subclass says why; PROBLEMS says what HTTP calls it."""
+    """A request that cannot be answered.  The subclass is the reason; PROBLEMS has its HTTP status."""
 
     def __init__(
         self,
@@ -141,7 +141,7 @@ class InvalidFieldsError(RequestError):
 
 
 class NotReadyError(RequestError):
-    """No table can answer yet, or any more."""
+    """The tables are not loaded, or they are no longer valid."""
 
 
 class OverloadedError(RequestError):
@@ -149,7 +149,7 @@ class OverloadedError(RequestError):
 
 
 class SlowClientError(RequestError):
-    """The caller sends or takes nothing for too long."""
+    """The client sent or read too slowly."""
 
 
 class TookTooLongError(RequestError):
@@ -158,7 +158,7 @@ class TookTooLongError(RequestError):
 
 @dataclass(frozen=True)
 class Kind:
-    """What HTTP calls an exception."""
+    """Status, type and title of the response to an exception."""
 
     status: int
     slug: str
@@ -226,7 +226,7 @@ def problem_response(
 
 
 def problem_of(error: Exception, path: str) -> Response:
-    """Turn any exception into a problem response.  What is not in the table says nothing about itself."""
+    """Turn any exception into a problem response.  That of an exception outside of PROBLEMS has no details."""
     kind = _kind_of(error)
     if isinstance(error, RequestError):
         return problem_response(path, kind, error.detail, error.faults, error.headers, error.members)
@@ -248,20 +248,20 @@ async def answer_problem(request: Request, error: Exception) -> Response:
     return problem_of(error, request.url.path)
 
 
-# --- pydantic's list of errors -> ours ----------------------------------------------------------------
+# --- errors of pydantic -> faults ---------------------------------------------------------------------
 
 _KNOWN_BOUNDS = {**BOUNDS, "tolerance": "finite and > 0"} | {f"std_{name}": "finite and >= 0" for name in INPUTS}
 
 
 def refusal(faults: Sequence[FieldFault]) -> InvalidFieldsError:
-    """The error that tells of all of these."""
+    """The error that reports all of these faults."""
     first = faults[0]
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return InvalidFieldsError(f"{safe_value(first.field)}: {first.reason}{more}", faults)
 
 
 def missing_inputs(given: Container[str], rigid: str) -> list[FieldFault]:
-    """What a batch with these inputs lacks, or has twofold; ``rigid`` is how its format writes rigid contact."""
+    """Faults of a batch with these inputs: missing ones, or omega and f; ``rigid`` is how its format writes k = inf."""
     reasons = {"k": STATE_K.format(rigid=rigid), "omega": STATE_OMEGA}
     optional = ("omega", "f") if "f" in given else ("f",)
     faults = [
@@ -277,7 +277,7 @@ def missing_inputs(given: Container[str], rigid: str) -> list[FieldFault]:
 def faults_of(
     entries: Iterable[Mapping[str, Any]], place: str, known: Sequence[str], bounds: Mapping[str, str] | None = None
 ) -> list[FieldFault]:
-    """Pydantic's entries as faults, one a place.
+    """Pydantic's entries as faults, one per location.
 
     Parameters
     ----------
@@ -286,21 +286,21 @@ def faults_of(
     place : str
         "pointer" (JSON body) or "parameter" (query).
     known : sequence of str
-        What the model's fields are called.
+        Names of the model's fields.
     bounds : mapping, optional
-        What fields other than the inputs must be.
+        Bounds of fields other than the inputs.
     """
     found: dict[tuple[str | int, ...], FieldFault] = {}
     all_bounds = {**_KNOWN_BOUNDS, **(bounds or {})}
     for entry in entries:
-        # a union reports each of its branches; their names are no place in the body
+        # a union reports each of its branches; their names are not part of the path in the body
         loc: tuple[str | int, ...] = entry["loc"]
         path = tuple(step for i, step in enumerate(loc) if i == 0 or isinstance(step, int) or _is_member(loc, i))
         kind, value = entry["type"], entry.get("input")
         context = entry.get("ctx") or {}
         if place == "parameter" and path[:1] == ("std",):
             path = (f"std_{path[1]}" if len(path) > 1 else "std",)
-        if kind == "relation":  # between fields: the model says which one is to be mended
+        if kind == "relation":  # between fields: the model names the one to change
             field = context["field"]
             if loc == ("std",):
                 path = ("std", field) if place == "pointer" else (f"std_{field}",)
@@ -317,7 +317,7 @@ def faults_of(
         elif kind == "extra_forbidden":
             name = str(path[-1])
             names = known if len(path) == 1 else INPUTS
-            reason = unknown_name(name, names) if len(found) < MAX_FIELD_FAULTS else "unknown field"  # no more are told
+            reason = unknown_name(name, names) if len(found) < MAX_FIELD_FAULTS else "unknown field"  # not reported
             fault = FieldFault(name, reason, value, place=place, path=path)
         else:
             name = str(path[0]) if path else "body"
@@ -329,7 +329,7 @@ def faults_of(
 
 
 def _is_member(loc: tuple[str | int, ...], index: int) -> bool:
-    """Whether a text in a location names a member of an object, such as std.mu0, and no branch of a union."""
+    """Whether a text in a location is the name of a member, such as std.mu0, and not of a branch of a union."""
     return index == 1 and loc[0] == "std"
 
 
@@ -337,9 +337,9 @@ def _reason(kind: str, name: str, value: object, message: str, bounds: Mapping[s
     plain = name.removeprefix("std_")
     if name == "k" and isinstance(value, str) and value.strip().lower() in ("", "null", "none", "inf", "infinity"):
         return (
-            "must be a number; say rigid for rigid contact"
+            "must be a number; write rigid for rigid contact"
             if place == "parameter"
-            else ('must be a number; say null or "rigid" for rigid contact')
+            else ('must be a number; write null or "rigid" for rigid contact')
         )
     if plain in INPUTS or name == "tolerance":
         text_of_none = isinstance(value, str) and value.strip().lower().lstrip("+-") in ("nan", "inf", "infinity")
@@ -348,7 +348,7 @@ def _reason(kind: str, name: str, value: object, message: str, bounds: Mapping[s
         return number_hint(value, plain)
     if name == "include":
         names = message.partition("be ")[2].replace(" or ", ", ").replace("'", "")
-        return f"must be a list of names out of: {names}" if names else "must be a list of names, each once"
+        return f"must be a list of names from: {names}" if names else "must be a list of names, each once"
     if name == "std" and kind in ("float_type", "greater_than_equal", "finite_number"):
         return "must be finite and >= 0"
     if kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
@@ -361,7 +361,7 @@ _FIELDS_AT: dict[str, tuple[str, ...]] = {}
 
 
 def accepts(path: str, names: Iterable[str]) -> None:
-    """Say which fields a path takes, for refusals that list them."""
+    """Register the fields that a path takes; error messages list them."""
     _FIELDS_AT[path] = tuple(names)
 
 
@@ -371,7 +371,7 @@ def names_at(path: str) -> tuple[str, ...]:
 
 
 def invalid_request(path: str, entries: Sequence[Mapping[str, Any]]) -> RequestError:
-    """The error for what FastAPI found wrong with a body or a query."""
+    """The error for a body or a query that FastAPI refused."""
     for entry in entries:
         if entry["type"] == "model_attributes_type" and tuple(entry["loc"]) == ("body",) and entry["input"] == b"":
             return MalformedBodyError("the body is empty")

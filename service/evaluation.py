@@ -1,4 +1,4 @@
-"""Cases -> answers, one or many.  Only what is asked for is computed."""
+"""Cases -> answers, one or many.  Only requested quantities are computed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,9 +45,9 @@ class Batch:
     size : int
     columns : list of ndarray
         The six inputs in the order of FIELDS, (size,) or (1,) where one value holds for all; k = inf is rigid contact.
-        What is no number is NaN.
+        An entry that is not a number is NaN.
     reasons : dict of int to Reason
-        Why a case could not be read, for the first MAX_ERRORS a column at least.  Such a case has a NaN.
+        Why a case could not be read, at least for the first MAX_ERRORS per column.  Such a case has a NaN.
     listed : bool
         Whether any input came as a list.
     """

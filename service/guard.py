@@ -1,7 +1,8 @@
-"""What a request may cost before anybody looks at it: key, head, body, places, time.
+"""Limits that hold before a request is evaluated: API key, headers, body size, slots for large requests, time.
 
-Everything is bounded by work: bodies of single questions to 64 KiB, large bodies and streams by places, threads and
-batches by what their cases cost.  The caller's moves are bounded by time.
+The body of a single case has up to 64 KiB.  Large bodies and streams need a slot; the number of slots is a setting.
+The estimated computing time decides whether a request needs a slot and a thread.  Every wait for the client has a time
+limit.
 """
 
 import asyncio
@@ -35,15 +36,15 @@ T = TypeVar("T")
 
 CASE_PATH = "/v1/mu-macro"
 BATCH_PATH = "/v1/mu-macro/batch"
-SMALL_BODY = 64 * 1024  # bytes of a body that needs no place
-AT_ONCE = 4000.0  # times a plain case that are computed without a thread: under half a millisecond
-#: what an answer says when the rest of its question is not read
+SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
+AT_ONCE = 4000.0  # largest cost without a thread, in times of a plain case: under half a millisecond
+#: header of a response that is sent before the whole request was read
 CLOSE = {"Connection": "close"}
 _ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"if-none-match", b"x-request-id")
 
 
 def path_of(scope: Scope) -> str:
-    """The path within this application: without what a proxy puts in front of it."""
+    """The path within this application: without the prefix of a proxy."""
     path: str = scope["path"]
     root: str = scope.get("root_path", "")
     return path.removeprefix(root) if root else path
@@ -65,7 +66,7 @@ class Keys:
         return bool(self._keys)
 
     def holder(self, headers: Mapping[bytes, bytes]) -> str | None:
-        """Whose key a request carries; None: no known one."""
+        """The name of the holder of the request's key; None: no known key."""
         if not self._keys:
             return None
         offered = headers.get(b"x-api-key")
@@ -73,22 +74,22 @@ class Keys:
             scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
             offered = credentials.strip() if scheme.lower() == b"bearer" else b""
         found = None
-        for key, name in self._keys:  # all of them: how long it takes tells nothing
+        for key, name in self._keys:  # compares all keys: the time does not depend on the key sent
             if secrets.compare_digest(offered, key):
                 found = name
         return found
 
 
 class Guard:
-    """Middleware: refuses what is not a request for this service before its body is read.
+    """Middleware: refuses invalid requests before their body is read.
 
     Parameters
     ----------
     keys : Keys
     open_paths : frozenset of str
-        Need no key.
+        Paths that need no key.
     max_bytes : int
-        Of a body; single questions may have up to 64 KiB of it.
+        Largest body; that of a single case is at most 64 KiB.
     """
 
     def __init__(self, app: ASGIApp, keys: Keys, open_paths: frozenset[str], max_bytes: int) -> None:
@@ -98,7 +99,7 @@ class Guard:
         self._open_paths = open_paths
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run one request, or refuse it."""
+        """Pass one request on, or refuse it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -107,7 +108,7 @@ class Guard:
             if len(headers) != len(scope["headers"]):
                 _refuse_repeated(scope)
             if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
-                # Its body would be taken for another protocol's.
+                # The body would be read as another protocol.
                 raise MalformedBodyError("this service does not upgrade connections: send no Upgrade", headers=CLOSE)
             path = path_of(scope)
             if self._keys and path not in self._open_paths:
@@ -140,7 +141,7 @@ def _refuse_repeated(scope: Scope) -> None:
 
 
 def _limited(headers: Mapping[bytes, bytes], receive: Receive, limit: int) -> Receive:
-    """A ``receive`` that takes no body over 64 KiB: single questions have none."""
+    """A ``receive`` that refuses a body above the limit."""
     length = headers.get(b"content-length", b"0")
     if not length.isdigit() or len(length) > 9 or int(length) > limit:
         raise _too_large(limit)
@@ -161,7 +162,7 @@ def _limited(headers: Mapping[bytes, bytes], receive: Receive, limit: int) -> Re
 
 
 def _too_large(limit: int) -> BodyTooLargeError:
-    # The rest of the body is not wanted: without "close" the server would go on reading it.
+    # The rest of the body is not used: without "close" the server would read all of it.
     return BodyTooLargeError(
         f"the body may have up to {limit} bytes; send many cases to {BATCH_PATH}",
         headers=CLOSE, max_bytes=limit,
@@ -169,7 +170,7 @@ def _too_large(limit: int) -> BodyTooLargeError:
 
 
 def check_media_type(headers: Mapping[str, str], known: Mapping[str, str]) -> str:
-    """Which of the known media types (alias -> type) a body has; one without a type is of the first.
+    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first.
 
     Raises
     ------
@@ -192,7 +193,10 @@ def check_media_type(headers: Mapping[str, str], known: Mapping[str, str]) -> st
 
 
 class Work:
-    """Places for large questions, and the threads that answer them."""
+    """Slots for large requests, and the threads that compute their answers.
+
+    A slot is the right to run one large request.  A process has ``MUMACRO_MAX_BATCHES`` slots.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -201,12 +205,12 @@ class Work:
 
     @asynccontextmanager
     async def place(self) -> AsyncIterator[None]:
-        """Hold a place.
+        """Hold a slot.
 
         Raises
         ------
         OverloadedError
-            None is free.
+            No slot is free.
         """
         self.take()
         try:
@@ -215,19 +219,19 @@ class Work:
             self.used -= 1
 
     def take(self) -> None:
-        """Take a place; whoever does gives it back by ``used -= 1``."""
+        """Take a slot; the code that called this gives it back by ``used -= 1``."""
         if self.used >= self._settings.max_batches:
-            raise OverloadedError(f"{self.used} large questions are being answered already", headers=CLOSE)
+            raise OverloadedError(f"{self.used} large requests are being answered already", headers=CLOSE)
         self.used += 1
 
     async def run(self, work: Callable[[], T], cost: float = float("inf")) -> T:
-        """Do the work at once if it is small, else in a thread, so that nobody waits for it."""
+        """Do the work at once if it is small, else in a thread, so that it delays no other request."""
         if cost <= AT_ONCE or self.threads is None:
             return work()
         return await asyncio.get_running_loop().run_in_executor(self.threads, work)
 
     async def run_in_place(self, work: Callable[[], T]) -> T:
-        """Do the work in a thread and a place, which it keeps until it is done, however long its caller waits.
+        """Do the work in a thread and a slot.  It keeps the slot until it is done, even if the client has left.
 
         Raises
         ------
@@ -248,7 +252,7 @@ class Work:
             task.exception()
 
     async def client(self, move: Awaitable[T], until: float | None = None) -> T:
-        """Wait for the caller's move, until then or for as long as a caller may take.
+        """Wait for the client to send or to read, until the given time or for the client timeout.
 
         Raises
         ------
@@ -260,10 +264,10 @@ class Work:
             async with asyncio.timeout_at(loop.time() + limit if until is None else until):
                 return await move
         except TimeoutError:
-            raise SlowClientError(f"a caller may take up to {limit} s", headers=CLOSE) from None
+            raise SlowClientError(f"a client may take up to {limit} s", headers=CLOSE) from None
 
     def took_too_long(self) -> TookTooLongError:
-        """The time of a request is over."""
+        """The error for a request beyond the time limit."""
         return TookTooLongError(f"a request may take up to {self._settings.time_limit_s} s", headers=CLOSE)
 
     async def message(self, receive: Receive, until: float | None = None) -> Message:

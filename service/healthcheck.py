@@ -1,4 +1,4 @@
-"""Asks a running service on this machine whether it is ready.  A container needs no other program for its check."""
+"""Checks whether a service on this machine is ready.  A container needs no other program for its health check."""
 
 import urllib.error
 import urllib.request
@@ -11,7 +11,7 @@ _ANY_ADDRESS = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}  # noqa: S
 
 
 def loopback_url(settings: Settings) -> str:
-    """Return the URL of /readyz as seen from the machine that the service runs on."""
+    """Return the URL of /readyz on the machine that the service runs on."""
     host = _ANY_ADDRESS.get(settings.host, settings.host)
     if ":" in host:
         host = f"[{host}]"
@@ -19,7 +19,7 @@ def loopback_url(settings: Settings) -> str:
 
 
 def is_ready(url: str, timeout_s: float = 3.0) -> bool:
-    """Do one GET, past any proxy; True for status 200."""
+    """Do one GET without a proxy; True for status 200."""
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with opener.open(url, timeout=timeout_s) as response:

@@ -1,6 +1,6 @@
-"""The library as the service uses it: every use of its inner parts stands here and nowhere else.
+"""The service's interface to the library: only this module uses internal parts of mumacro.
 
-Routes, formats and quantities import names of inputs, units, bounds and codes from this module, too.
+Routes, formats and quantities also import names of inputs, units, bounds and codes from here.
 """
 
 import math
@@ -46,7 +46,7 @@ class Details:
     length_scale : ndarray
         l0 = mu0 Fz/k [m], (n,); 0 for rigid contact.
     gradient, gradient_bound : dict of str to ndarray
-        d mu_macro / d input and the bound of its absolute error, (n,) by name of the input; empty if not asked for.
+        d mu_macro / d input and the bound of its absolute error, (n,) by name of the input; empty if not requested.
         NaN: no such slope (k of rigid contact), or no bound in this table.
     """
 
@@ -76,7 +76,7 @@ class Kernel:
         return self.surrogate.evaluate_columns(mu0, fz, k, y0, omega, v0, n=n)
 
     def details(self, columns: Mapping[str, Array], gradient: bool) -> Details:
-        """Groups and, if asked for, slopes of legal cases; six columns (n,), k = inf is rigid."""
+        """Groups and, if requested, slopes of legal cases; six columns (n,), k = inf is rigid."""
         given: dict[str, Any] = dict(columns)
         answer = self.surrogate.evaluate(**given, gradient=gradient, groups=True)
         slopes, bounds = dict(answer.gradient or {}), dict(answer.gradient_bound or {})
@@ -87,7 +87,7 @@ class Kernel:
 
     @property
     def checksum(self) -> str:
-        """Checksum of all that answers depend on."""
+        """Checksum of everything that answers depend on."""
         return self.surrogate.checksum
 
     @property

@@ -31,10 +31,10 @@ request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,128}", re.ASCII)
 
 _FLUSH_AFTER_S = 0.05
-_MOST_WAITING = 1 << 20  # characters of lines that wait to be written; what comes while there are more is dropped
+_MOST_WAITING = 1 << 20  # characters of lines that wait to be written; further lines are dropped
 _LAST_S = 1.0  # how long the end of the process waits for them
-_MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is whatever the caller says
-# Lines of the most frequent requests are written without a record; their texts hold nothing that JSON escapes.
+_MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
+# Lines of the most frequent requests are written without a LogRecord; their texts need no escape in JSON.
 _KNOWN, _METHODS = frozenset({"/v1/mu-macro", "/v1/mu-macro/batch"}), frozenset({"GET", "POST"})
 _stem, _number = os.urandom(8).hex(), 0
 
@@ -43,14 +43,14 @@ def new_request_id() -> str:
     """A fresh id of 32 hex digits: unique, not secret."""
     global _stem, _number
     if _number == 0 or _number >= 1 << 64:
-        # Drawn anew in every process, however it was made.
+        # New in every process, however it was started.
         _stem, _number = os.urandom(8).hex(), int.from_bytes(os.urandom(7)) + 1
     _number += 1
     return f"{_stem}{_number:016x}"
 
 
 def accept_request_id(offered: bytes | None) -> str:
-    """The caller's id when it is well formed, else a fresh one of 32 hex digits."""
+    """The client's id if it is well formed, else a fresh one of 32 hex digits."""
     if offered is not None:
         text = offered.decode("latin-1")
         if _ID.fullmatch(text):
@@ -62,7 +62,7 @@ class JsonFormatter(logging.Formatter):
     """One record, one line of JSON: time, level, logger, message, request_id, the record's ``fields``."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the record as JSON.  Line breaks in it are escaped, so that nobody can forge a line."""
+        """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
         line: dict[str, Any] = {
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
@@ -78,13 +78,13 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(line, default=str)
 
 
-# time, request id, what stands between it and the duration, seconds, client, holder of the key; texts free of what JSON
-# escapes, but for the client
+# time, request id, text between it and the duration, seconds, client, holder of the key; only the client may need an
+# escape in JSON
 Entry = tuple[float, str, str, float, str | None, str | None]
 
 
 def _access_text(method: str, path: str, status: int) -> str:
-    """What stands in a request's line between its id and its duration."""
+    """The text of a request's line between its id and its duration."""
     return f'", "method": "{method}", "path": "{path}", "status": {status}, "duration_ms": '
 
 
@@ -110,9 +110,9 @@ def _access_lines(entries: list[Entry]) -> str:
 
 
 class _Writer:
-    """A stream whose writes never wait: a thread hands the texts on.
+    """A stream whose ``write`` never waits: a thread writes the texts to the file.
 
-    Where nobody reads the other end of a pipe, lines are dropped and counted; the service goes on.
+    If the reader of a pipe stalls, lines are dropped and counted; requests are not delayed.
     """
 
     def __init__(self, number: int) -> None:
@@ -124,7 +124,7 @@ class _Writer:
         self._thread.start()
 
     def write(self, text: str) -> None:
-        """Take whole lines."""
+        """Queue whole lines."""
         if self._given - self._taken > _MOST_WAITING:
             self._dropped += text.count("\n")
             return
@@ -132,7 +132,7 @@ class _Writer:
         self._texts.put(text)
 
     def flush(self) -> None:
-        """Do nothing: texts are written as they come."""
+        """Do nothing: the thread writes texts at once."""
 
     def close(self) -> None:
         """Wait a moment until all is written."""
@@ -146,7 +146,7 @@ class _Writer:
             self._put(text or "")
             self._taken += len(text or "")
             if self._dropped > told and (text is None or self._texts.empty()):
-                message = f"{self._dropped - told} lines of the log were dropped: nobody read what was written"
+                message = f"{self._dropped - told} lines of the log were dropped: standard output was not read in time"
                 told = self._dropped
                 fields = {"name": __name__, "levelname": "WARNING", "msg": message}
                 self._put(JsonFormatter().format(logging.makeLogRecord(fields)) + "\n")
@@ -154,7 +154,7 @@ class _Writer:
                 return
 
     def _put(self, text: str) -> None:
-        # By the file's number: an object of Python would hold its lock while it waits, also at the process's end.
+        # By file descriptor: a Python file object would hold its lock while it waits, also when the process ends.
         rest = memoryview(text.encode("utf-8", "backslashreplace"))
         with suppress(OSError):  # the reader is gone
             while rest:
@@ -167,7 +167,7 @@ class LineHandler(logging.StreamHandler[Any]):
     Parameters
     ----------
     stream : file
-        With a file number, which is what is written to.
+        With a file descriptor; the lines are written to it.
     """
 
     def __init__(self, stream: Any) -> None:
@@ -175,7 +175,7 @@ class LineHandler(logging.StreamHandler[Any]):
         self._entries: list[Entry] = []
 
     def close(self) -> None:
-        """Write what waits, as far as somebody reads it."""
+        """Write the waiting lines; give up after a second if nothing reads them."""
         self.flush()
         self.stream.close()
         super().close()
@@ -187,13 +187,13 @@ class LineHandler(logging.StreamHandler[Any]):
         self._entries.append(entry)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write what waits, then the record."""
+        """Write the waiting lines, then the record."""
         if self._entries:
             self.flush()
         super().emit(record)
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write the waiting lines."""
         with self.lock or nullcontext():
             entries, self._entries = self._entries, []
             if entries:
@@ -208,7 +208,7 @@ class _Texts(dict[tuple[str, str, int], str]):
 
 
 class AccessLog:
-    """Lines of the logger ``mumacro.access`` without the cost of a record, where this module configured the logs."""
+    """Lines of the logger ``mumacro.access``, without the cost of a LogRecord if this module configured the logs."""
 
     def __init__(self) -> None:
         self._log = logging.getLogger("mumacro.access")
@@ -216,7 +216,7 @@ class AccessLog:
         self._texts = _Texts()
 
     def start(self) -> None:
-        """Find the handler that the lines go to."""
+        """Find the handler that writes the lines."""
         found = [handler for handler in logging.getLogger().handlers if isinstance(handler, LineHandler)]
         straight = found and self._log.propagate and not self._log.handlers and self._log.isEnabledFor(logging.INFO)
         self._put = found[0].put if straight else None

@@ -1,8 +1,8 @@
-"""Counters of one worker, and their sum over all workers for ``/metrics``.
+"""Counters of one worker process, and their sum over all workers for ``/metrics``.
 
-Counting adds to a list of numbers, which is cheap enough for every request.  Several workers write copies of their
-lists to a folder that the parent process made.  The worker that answers ``/metrics`` adds them up.  The copy of a
-worker that has ended stays, so that no counter falls.
+The counters are a list of numbers.  Several workers write copies of their lists to a folder that the parent process
+made.  The worker that answers ``/metrics`` adds them.  The copy of a worker that has ended stays, so that no counter
+decreases.
 """
 
 import asyncio
@@ -45,7 +45,7 @@ _CASES = _DURATIONS + len(ROUTES) * _WIDTH
 _PER_TABLE = len(SOURCES) + 1  # by source; bad cases
 _SHARE_EVERY_S = 0.25
 
-#: (route, method, status) -> where requests, and where durations, of the kind are counted
+#: (route, method, status) -> index of the counter of requests, and of the histogram of durations
 _PLACES = {
     (route, method, status): (_REQUESTS + (r * len(METHODS) + m) * len(STATUSES) + s, _DURATIONS + r * _WIDTH)
     for route, r in _ROUTE.items()
@@ -55,12 +55,12 @@ _PLACES = {
 
 
 def first_cell(table: int) -> int:
-    """Where cases of the first source of a table are counted; the others follow, bad cases are last."""
+    """Index of the counter of a table's first source; the other sources follow, bad cases are last."""
     return _CASES + table * _PER_TABLE
 
 
 class Metrics:
-    """What one worker counted."""
+    """Counters of one worker process."""
 
     def __init__(self) -> None:
         self.cells: list[float] = [0.0] * _CASES
@@ -95,7 +95,7 @@ class Metrics:
         self.cells[first + _PER_TABLE - 1] += bad
 
     async def share(self) -> None:
-        """Write a copy to the shared folder, if there is one, again and again."""
+        """Write a copy to the shared folder, if there is one, every quarter of a second."""
         while True:
             self.save()
             await asyncio.sleep(_SHARE_EVERY_S)
@@ -110,7 +110,7 @@ class Metrics:
             draft.write_bytes(array("d", self._saved).tobytes())
             draft.replace(self._file)
         except OSError:
-            self._saved = []  # the folder is gone or full; the next time may do better
+            self._saved = []  # the folder is gone or full; the next call tries again
 
     def total(self) -> list[float]:
         """Sum over all workers; the copies of the others are at most a quarter of a second old."""
@@ -132,7 +132,7 @@ class Metrics:
         return cells
 
     def collect(self) -> Iterator[Any]:
-        """Yield the families of metrics, in the form that prometheus_client's registries ask for."""
+        """Yield the families of metrics, in the form that a registry of prometheus_client needs."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
 
         cells = self.total()

@@ -1,7 +1,7 @@
 """Pure ASGI middleware: the record of a request, and compression.
 
-Outermost first: CORS (if set), SingleCase, RequestRecord, Guard, Compression, then the router.  What is added with
-``app.add_middleware`` stands before all of them.
+Outermost first: CORS (if set), SingleCase, RequestRecord, Guard, Compression, then the router.  Middleware added with
+``app.add_middleware`` is outside all of them.
 """
 
 import logging
@@ -20,7 +20,7 @@ from .tables import Tables
 
 __all__ = ["COMPRESS_FROM", "HEALTH_PATHS", "NOSNIFF", "Compression", "RequestRecord"]
 
-#: bytes of an answer that is worth packing
+#: least size of an answer that is compressed [bytes]
 COMPRESS_FROM = 16 * 1024
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 NOSNIFF = (b"x-content-type-options", b"nosniff")
@@ -30,10 +30,10 @@ _errors = logging.getLogger("mumacro.error")
 
 
 class RequestRecord:
-    """Gives a request its id, writes its line into the log, counts it, and is the last net under an exception.
+    """Gives a request its id, logs and counts it, and answers 500 for an exception that nothing else handled.
 
-    While the service is stopping it says ``Connection: close``, so that no caller sends a question to a connection
-    that is about to end.
+    While the service is stopping, responses have ``Connection: close``, so that no client sends a request on a
+    connection that is about to end.
     """
 
     def __init__(self, app: ASGIApp, metrics: Metrics, log: AccessLog, tables: Tables) -> None:
@@ -71,7 +71,7 @@ class RequestRecord:
         try:
             await self.app(scope, receive, send_marked)
         except ClientDisconnect:
-            status = 499  # the customary number for a caller who left before the answer
+            status = 499  # the usual status for a client that disconnected before the answer
         except Exception as error:
             _errors.exception("unexpected error", extra={"fields": {"path": scope["path"]}})
             if status == 0:
@@ -92,9 +92,9 @@ class RequestRecord:
 
 
 class Compression:
-    """Packs large answers with gzip for callers who want it; never the table's file, whose tag is of its bytes.
+    """Compresses large answers with gzip if the client accepts it; never the table file, whose ETag is of its bytes.
 
-    With Intel's library: at a few per cent of the time that zlib takes, and to the same size.
+    Intel's library takes a few per cent of the time of zlib, at the same size.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -111,7 +111,7 @@ class Compression:
 
 
 class _Packed:
-    """A ``send`` that packs what is worth it; the start waits for the first piece, which tells."""
+    """A ``send`` that compresses large answers; it holds the head until the first piece shows the size."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
@@ -144,7 +144,7 @@ class _Packed:
 
 
 def _wants_gzip(offers: str) -> bool:
-    """Whether who sent these words as Accept-Encoding takes gzip."""
+    """Whether this value of Accept-Encoding accepts gzip."""
     wanted = {}
     for offer in offers.lower().split(","):
         name, _, weight = offer.partition(";")

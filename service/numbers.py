@@ -1,7 +1,7 @@
-"""Plain numeric columns, compiled: JSON text straight into arrays, without the interpreter's lock.
+"""Compiled reader of plain numeric columns: from JSON text to arrays, without the interpreter's lock.
 
-Accepts only the ordinary: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one number,
-``null`` for ``k``.  Everything else is read by :mod:`service.formats.columns`.  Why no library is used here:
+It accepts only ordinary columns: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one
+number, ``null`` for ``k``.  :mod:`service.formats.columns` reads everything else.  Why no library is used here:
 docs/decisions/0011-wire.md.
 
 Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at a gigabyte per second", Software:
@@ -73,7 +73,7 @@ def _double(w: np.uint64, q: int) -> tuple[np.uint64, bool]:
         return _0, True
     if q > _LARGEST:
         return _0, False
-    # The exponent of w as a double tells its length, or one more where w was rounded up to a power of two.
+    # The exponent of w as a double gives its length, or one more where w was rounded up to a power of two.
     shift = max(1086 - int(np.float64(w).view(np.int64) >> 52), 0)
     w = w << _U(shift)
     if w < _SIGN:
@@ -116,7 +116,7 @@ def _space(text: Bytes, i: int) -> int:
 
 @_inlined
 def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
-    """(w followed by the digits at ``i``, index behind them)."""
+    """(w followed by the digits at ``i``, index after them)."""
     while i + 8 <= text.size:
         eight = _0
         for j in range(8):  # the compiler makes one load of it
@@ -138,7 +138,7 @@ def _digits(text: Bytes, i: int, w: np.uint64) -> tuple[np.uint64, int]:
 
 @_inlined
 def _number(text: Bytes, i: int) -> tuple[np.uint64, int]:
-    """(bits of the JSON number at ``i``, index behind it), or (0, -1) for anything else."""
+    """(bits of the JSON number at ``i``, index after it), or (0, -1) for anything else."""
     start = i
     negative = text[_U(i)] == 45
     if negative:
@@ -188,7 +188,7 @@ def _is_null(text: Bytes, i: int) -> bool:
 
 @_compiled
 def _list(text: Bytes, i: int, row: NDArray[np.uint64], nullable: bool) -> tuple[int, int]:
-    """(index behind the list whose first entry is due at ``i``, entries), or (-1, _); (-2, _): no room."""
+    """(index after the list whose first entry is expected at ``i``, entries), or (-1, _); (-2, _): no room."""
     n = 0
     i = _space(text, i)
     if text[_U(i)] == 93:
@@ -213,7 +213,7 @@ def _list(text: Bytes, i: int, row: NDArray[np.uint64], nullable: bool) -> tuple
 
 @_inlined
 def _field(text: Bytes, i: int) -> tuple[int, int]:
-    """(index of the name in quotes at ``i``, index behind it), or (-1, i)."""
+    """(index of the name in quotes at ``i``, index after it), or (-1, i)."""
     if text[_U(i)] != 34:
         return -1, i
     word, shift, j = _0, _0, i + 1
@@ -273,7 +273,7 @@ def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: in
             return 0, 0, 0
     i += 1
     while i < stop and (text[_U(i)] == 32 or text[_U(i)] == 13 or text[_U(i)] == 9 or text[_U(i)] == 10):
-        i += 1  # not beyond stop: what stands there may be a newline and the next line
+        i += 1  # not beyond stop: there may be a newline and the next line
     if i != stop or listed == 0 or seen & 63 != 63:
         return 0, 0, 0
     return size, listed, seen >> 6
@@ -281,23 +281,23 @@ def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: in
 
 @_compiled
 def _spread(words: NDArray[np.uint64], first: int, size: int, listed: int) -> None:
-    """Repeat what holds for all cases."""
+    """Repeat the values that hold for all cases."""
     for row in range(6):
         if not listed >> row & 1:
             words[row, first : first + size] = words[row, first]
 
 
 def read_columns(text: Bytes, start: int, stop: int, columns: Array, first: int = 0) -> int:
-    """Read text[start:stop], behind which stands one byte that is no part of it, from case ``first`` on.
+    """Read text[start:stop], which one more byte must follow, into the columns from case ``first`` on.
 
     Parameters
     ----------
     text : NDArray[uint8]
-        Ends in a 0 byte, or in what stops a number.
+        Ends in a 0 byte, or in another byte that ends a number.
     start, stop : int
-        White space in front is skipped; the one behind has to be cut off.
+        White space at the start is skipped; at the end there must be none.
     columns : ndarray
-        Shape (6, room); gets the six inputs, k = inf for rigid contact.
+        Shape (6, room); filled with the six inputs, k = inf for rigid contact.
     first : int
 
     Returns

@@ -30,8 +30,8 @@ _WHY = {
     503: "Not ready or overloaded; see Retry-After",
 }
 _ID = {"description": "The request's id, as in the log", "schema": {"type": "string"}}
-_RETRY = {"description": "Seconds after which to ask again", "schema": {"type": "integer"}}
-#: headers of an answer that may be kept
+_RETRY = {"description": "Seconds after which to send the request again", "schema": {"type": "integer"}}
+#: headers of an answer that may be cached
 ANSWER_HEADERS = {
     "ETag": {"description": "The tag of this answer, for If-None-Match", "schema": {"type": "string"}},
     "Cache-Control": {"description": "How long, and by whom, the answer may be cached", "schema": {"type": "string"}},
@@ -66,7 +66,7 @@ def batch_operation(forms: Sequence[Format]) -> dict[str, Any]:
                 content[entry.media_type] = {**known, "schema": {"oneOf": [*one_of, described["schema"]]}}
     return {
         "body": {"required": True, "content": body},
-        "answer": {"description": "The answers, in the form of the question", "content": answer},
+        "answer": {"description": "The answers, in the format of the request", "content": answer},
     }
 
 
@@ -81,7 +81,7 @@ def umbridge_body(example: dict[str, Any]) -> dict[str, Any]:
 
 
 def describe_umbridge(example: dict[str, Any] | None = None) -> dict[int | str, dict[str, Any]]:
-    """Describe the answers of a UM-Bridge call: the protocol has its own form of errors, 400 and 500."""
+    """Describe the answers of a UM-Bridge call: the protocol defines its own errors, 400 and 500."""
     text = {"type": "string"}
     error = {
         "type": "object",
@@ -119,7 +119,7 @@ def install(app: FastAPI, *, keys: bool) -> None:
             _, definitions = models_json_schema(wanted, ref_template=_REF)  # type: ignore[arg-type]
             components = description.setdefault("components", {})
             schemas = components.setdefault("schemas", {})
-            for name in ("HTTPValidationError", "ValidationError"):  # the framework's own form of 422, not ours
+            for name in ("HTTPValidationError", "ValidationError"):  # FastAPI's form of 422, which is not used
                 schemas.pop(name, None)
             schemas.update({name: schema for name, schema in definitions["$defs"].items() if name not in schemas})
             _with_headers(description["paths"])

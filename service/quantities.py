@@ -1,7 +1,7 @@
-"""What ``include`` can add to an answer: one registry.
+"""The registry of quantities that ``include`` can add to an answer.
 
-A quantity is one entry here: its name, its parts with units and texts, what it costs, and how it is computed.  JSON,
-CSV, Arrow, the models of answers and so OpenAPI, the costs that decide on admission, and the warm-up follow from it.
+A quantity is one entry: its name, its parts with units and texts, its cost, and how it is computed.  JSON, CSV, Arrow,
+the models of answers, OpenAPI, the estimated cost of a request and the warm-up use the registry.
 
 Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations"
 (Friction, 2018).
@@ -38,7 +38,7 @@ class Part:
 
 @dataclass
 class Cases:
-    """Legal cases that quantities are computed for: six columns (n,), k = inf is rigid, and what is known of them."""
+    """Legal cases that quantities are computed for: six columns (n,), k = inf is rigid, and their default answers."""
 
     kernel: Kernel
     columns: Mapping[str, Array]
@@ -50,7 +50,7 @@ class Cases:
 
     @cached_property
     def details(self) -> Details:
-        """Groups, and slopes where some quantity asked for needs them."""
+        """Groups, and slopes if a requested quantity needs them."""
         return self.kernel.details(self.columns, self.slopes)
 
     @cached_property
@@ -74,11 +74,11 @@ class Quantity:
     ----------
     name : str
     text : str
-        What it is, in one sentence.
+        Its meaning, in one sentence.
     parts : tuple of Part
         The columns that it adds.
     compute : callable
-        From :class:`Cases` to one column (n,) a part, in their order; NaN where there is no value.
+        From :class:`Cases` to one column (n,) per part, in their order; NaN where there is no value.
     cost : float
         Time of a case, in times of a plain answer.
     slopes : bool
@@ -97,7 +97,7 @@ QUANTITIES: dict[str, Quantity] = {}
 
 
 def register(quantity: Quantity) -> None:
-    """Offer one more quantity."""
+    """Add a quantity."""
     QUANTITIES[quantity.name] = quantity
 
 
@@ -276,10 +276,10 @@ def _std(cases: Cases) -> Sequence[Array]:
     for name in FIELDS:
         deviation = cases.std.get(name, 0.0)
         slope, bound = cases.details.gradient[name], cases.details.gradient_bound[name]
-        if name == "k":  # means nothing where contact is rigid
+        if name == "k":  # has no effect where contact is rigid
             rigid = np.isinf(cases.columns["k"])
             slope, bound = np.where(rigid, 0.0, slope), np.where(rigid, 0.0, bound)
-        # an infinite slope does no harm where the input is exact
+        # an infinite slope has no effect where the input is exact
         terms[name] = slope * deviation if deviation else np.zeros(n)
         doubts[name] = bound * deviation if deviation else np.zeros(n)
     std = np.zeros(n)
@@ -319,7 +319,7 @@ def _stick_fraction(cases: Cases) -> Sequence[Array]:
     v, y = cases.details.v_tilde, cases.details.y_tilde
     value, error = cases.kernel.surrogate.stick_fraction_with_bound(v, y)
     bound = np.full(v.shape, np.nan) if error is None else np.asarray(error)
-    # y~ below double range: whether such a contact sticks, the groups no longer tell
+    # y~ below double range: the groups do not show whether such a contact sticks
     lost = (y == 0.0) & (v < np.inf) & ~cases.at_rest
     return np.asarray(value), np.where(lost, 1.0, bound)
 

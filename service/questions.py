@@ -45,7 +45,7 @@ Target = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Included = Literal[INCLUDES]  # type: ignore[valid-type]
 LawIncluded = Literal[("approximations", *INCLUDES)]  # type: ignore[valid-type]
 
-_LEFT_OUT = "the input that is asked for is left out"
+_LEFT_OUT = "the unknown or swept input is left out"
 _SOLVE: dict[str, JsonValue] = {
     "unknown": "y0", "target": 0.15, "mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01
 }  # fmt: skip
@@ -68,7 +68,7 @@ class _Five(BaseModel):
     f: Frequency | None = Field(None, description="Frequency [Hz], finite and >= 0; in place of omega")
     v0: NotNegative | None = Field(None, description="Sliding velocity [m/s], finite and >= 0")
     tolerance: Positive | None = Field(None, description="Wanted error of mu_macro/mu0 [-]")
-    std: InputStd | None = Field(None, description="Standard deviations of the inputs, where include asks for std")
+    std: InputStd | None = Field(None, description="Standard deviations of the inputs, if include has std")
 
     def _asked(self) -> str:
         raise NotImplementedError
@@ -83,13 +83,13 @@ class _Five(BaseModel):
                 if input_asked == "omega":
                     if given is not None or self.f is not None:
                         field = "omega" if given is not None else "f"
-                        raise relation(field, "must be left out: it is what is asked for")
+                        raise relation(field, "must be left out: it is the unknown or swept input")
                 elif given is None and self.f is None:
                     raise relation("omega", STATE_OMEGA)
                 elif given is not None and self.f is not None:
                     raise relation("f", ONE_FREQUENCY)
             elif name == asked and name in self.model_fields_set and given is not None:
-                raise relation(name, "must be left out: it is what is asked for")
+                raise relation(name, "must be left out: it is the unknown or swept input")
             elif name == "k" and name != asked and "k" not in self.model_fields_set:
                 raise relation("k", STATE_K.format(rigid=self._rigid()))
             elif name not in ("k", asked) and given is None:
@@ -120,7 +120,7 @@ class SolveForRequest(_Five):
 
     model_config = examples(_SOLVE)
 
-    unknown: Name = Field(description="The input that is asked for")
+    unknown: Name = Field(description="The input to solve for")
     target: Target | Annotated[list[Target], Field(min_length=1, max_length=MAX_TARGETS)] = Field(
         description=f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}"
     )
@@ -128,7 +128,7 @@ class SolveForRequest(_Five):
         "mu_macro", description="What the target is: mu_macro, or mu_ratio = mu_macro/mu0 (0.5 halves the friction)"
     )
     range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = Field(
-        None, description="Where to look for the unknown [SI], ascending; left out: everywhere it makes a difference"
+        None, description="Where to search the unknown [SI], ascending; left out: wherever it changes mu_macro"
     )
     include: Annotated[list[Included], Field(max_length=2 * len(INCLUDES))] | None = Field(
         None, description=f"More to compute at every root: {', '.join(INCLUDES)}"
@@ -160,7 +160,7 @@ class LawRequest(_Five):
     family: dict[Name, Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_CURVES)]] | None = Field(
         None,
         max_length=1,
-        description=f"One input that is left out elsewhere, and up to {MAX_CURVES} values of it: a curve for each",
+        description=f"One input that is left out elsewhere, and up to {MAX_CURVES} values of it: one curve per value",
     )
     include: Annotated[list[LawIncluded], Field(max_length=2 + 2 * len(INCLUDES))] | None = Field(
         None, description=f"More to compute at every value: approximations, {', '.join(INCLUDES)}"
@@ -172,7 +172,7 @@ class LawRequest(_Five):
     @model_validator(mode="before")
     @classmethod
     def _first_of_family(cls, values: Any) -> Any:
-        """The first curve's value stands for the input while the others are checked."""
+        """Use the first curve's value as the input while the other fields are checked."""
         if isinstance(values, dict) and isinstance(values.get("family"), dict) and len(values["family"]) == 1:
             name, listed = next(iter(values["family"].items()))
             if name in values:
@@ -188,7 +188,7 @@ class LawRequest(_Five):
             raise relation("start", "must be > 0 on a logarithmic scale; for a range from 0 set scale to linear")
         for name, values in (self.family or {}).items():
             if name == self.along:
-                raise relation("family", f"{name} is what is swept")
+                raise relation("family", f"{name} is the swept input")
             if len(values) * self.points > MAX_ALL_POINTS:
                 raise relation("points", f"all curves together may have up to {MAX_ALL_POINTS} points")
             if name in ("mu0", "Fz", "k") and min(values) <= 0.0:
@@ -227,7 +227,7 @@ class LawQuery(BaseModel):
     ] = Field([], description="approximations: those of the paper beside the exact values")
 
     def form(self) -> LawRequest:
-        """The same as a body would have it."""
+        """The same request as a body."""
         given = {name: getattr(self, name) for name in self.model_fields_set}
         return LawRequest.model_validate(given)
 
@@ -239,9 +239,9 @@ class _RootBase(BaseModel):
     """One value of the unknown, and the answer there."""
 
     value: float = Field(description="The unknown [SI]")
-    low: float = Field(description="From here ...")
-    high: float = Field(description="... to here mu_macro is the target, as far as the table's error bound can tell")
-    mu_macro: float = Field(description="What the table says there [-]")
+    low: float = Field(description="From low ...")
+    high: float = Field(description="... to high, mu_macro is the target within the table's error bound")
+    mu_macro: float = Field(description="Value of the table there [-]")
     regime: Literal["continuous", "stick_slip", "static"]
 
 
@@ -258,12 +258,12 @@ class TargetAnswer(BaseModel):
     """All values that give one target."""
 
     target: float
-    roots: list[Root] = Field(description="Ascending; more than one where mu_macro folds (k, Fz, mu0)")
+    roots: list[Root] = Field(description="Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)")
     reason: str | None = Field(None, description="Why there is no root")
 
 
 class Reachable(BaseModel):
-    """What the unknown can give within its range."""
+    """Range of mu_macro for all values of the unknown in its range."""
 
     min: float
     max: float
@@ -272,12 +272,12 @@ class Reachable(BaseModel):
 
 
 class SolveForAnswer(Answered):
-    """Answer to the inverse question."""
+    """Answer to the inverse problem."""
 
     unknown: Name
     unit: str
     quantity: Literal["mu_macro", "mu_ratio"]
-    range: list[float | None] = Field(description="Where was looked [SI]; null: without limit")
+    range: list[float | None] = Field(description="The searched range [SI]; null: without limit")
     reachable: Reachable
     results: list[TargetAnswer] = Field(description="One per target, in order")
 
@@ -302,10 +302,10 @@ class _CurveBase(BaseModel):
     error_bound: list[float | None]
     source: list[str]
     mu_static: list[float] = Field(description="Static limit (v0 -> 0) of each case [-]")
-    border: list[BorderMark] = Field(description="Up to two places inside the range")
+    border: list[BorderMark] = Field(description="Up to two points inside the range")
     approximations: dict[str, list[float | None]] | None = Field(
         None,
-        description=f"Only if asked for [-]; null: outside the range of the formula. {_listed(APPROXIMATIONS)}",
+        description=f"Only if requested [-]; null: outside the range of the formula. {_listed(APPROXIMATIONS)}",
     )
     border_speeds: dict[str, list[float | None]] | None = Field(
         None,

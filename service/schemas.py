@@ -1,4 +1,4 @@
-"""Requests and answers: what is legal, in one place, and what OpenAPI says of it."""
+"""Models of requests and answers: their legal values and their OpenAPI description."""
 
 import math
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ _TEXTS = {
 }
 _INCLUDE = "More to compute: " + "; ".join(f"{name} ({entry.text})" for name, entry in QUANTITIES.items())
 _TOLERANCE = "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers"
-_STD = "Standard deviations of the inputs; required if include asks for std, refused otherwise"
+_STD = "Standard deviations of the inputs; required if include has std, refused otherwise"
 _EXAMPLE: dict[str, JsonValue] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
@@ -60,7 +60,7 @@ def examples(*found: Mapping[str, JsonValue]) -> ConfigDict:
 
 
 def relation(field: str, reason: str) -> PydanticCustomError:
-    """A fault in the relation of several fields, and which of them is to be changed."""
+    """A fault in the relation of several fields, and the field to change."""
     return PydanticCustomError("relation", "{field}: {reason}", {"field": field, "reason": reason})
 
 
@@ -168,7 +168,7 @@ class Options(BaseModel):
 
 def std_fault(missing: bool) -> PydanticCustomError:
     """The fault of standard deviations that are missing, or given without ``std`` in ``include``."""
-    reason = "is required where include asks for std" if missing else "has no effect unless include asks for std"
+    reason = "is required if include has std" if missing else "has no effect unless include has std"
     return relation("std", reason)
 
 
@@ -252,7 +252,7 @@ class CaseQuery(BatchQuery):
     v0: QueryNotNegative = Field(description=_TEXTS["v0"], examples=[0.01])
 
     def case(self) -> CaseRequest:
-        """The same case as a JSON body would give it."""
+        """The same case as a JSON body."""
         named = {name: getattr(self, name) for name in Case.model_fields}
         return CaseRequest.model_validate({**named, **self.given()})
 
@@ -347,7 +347,7 @@ def _title(name: str) -> str:
 
 
 def _included(listed: bool) -> dict[str, Any]:
-    """Members that the registry adds to a model of an answer."""
+    """Members that the registry of quantities adds to a model of an answer."""
     members: dict[str, list[Part]] = {}
     texts = {}
     for quantity in QUANTITIES.values():
@@ -361,7 +361,7 @@ def _included(listed: bool) -> dict[str, Any]:
 
     fields: dict[str, Any] = {}
     for name, parts in members.items():
-        only = "Only if asked for"
+        only = "Only if requested"
         if "." not in parts[0].path:
             fields[name] = (kind(parts[0]), Field(None, description=f"{only}. {parts[0].text} [{parts[0].unit}]"))
             continue

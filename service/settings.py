@@ -128,7 +128,7 @@ class Settings(BaseSettings):
 
 
 def cache_fields(settings: Settings) -> dict[str, str]:
-    """How long, and by whom, an answer may be cached: with an API key, only by the client that asked."""
+    """How long, and by whom, an answer may be cached: with an API key, only by the client itself."""
     if not settings.keys():
         return {"cache-control": f"public, max-age={_MAX_AGE_S}", "vary": "accept"}
     return {"cache-control": f"private, max-age={_MAX_AGE_S}", "vary": "accept, x-api-key, authorization"}

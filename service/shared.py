@@ -1,4 +1,4 @@
-"""The folder that several workers share.  The process that makes it only starts and stops them, and imports little."""
+"""The folder that worker processes share.  Their parent makes it; it only starts and stops them, and imports little."""
 
 import os
 import shutil
@@ -14,14 +14,14 @@ FOLDER_VARIABLE = "_MUMACRO_METRICS_FOLDER"
 
 @contextmanager
 def shared_folder() -> Iterator[None]:
-    """Make the folder that the workers share, in memory where there is such a place; remove it in the end."""
+    """Make the folder that the workers share, in memory if possible; remove it at the end."""
     for place in ("/dev/shm", None):  # noqa: S108  (mkdtemp makes a folder of its own there)
         try:
             folder = tempfile.mkdtemp(prefix="mumacro-metrics-", dir=place)
             break
         except OSError:
             continue
-    else:  # no writable place: every worker gives its own numbers
+    else:  # no writable folder: every worker reports its own counters
         yield
         return
     os.environ[FOLDER_VARIABLE] = folder

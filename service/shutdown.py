@@ -1,4 +1,4 @@
-"""Order of a stop: ``/readyz`` answers 503, after ``drain_s`` the service stops listening, then it ends."""
+"""Steps of a stop: ``/readyz`` answers 503; after ``drain_s`` the service closes the port; then the process ends."""
 
 import asyncio
 import multiprocessing
@@ -14,11 +14,11 @@ from .tables import Tables
 
 __all__ = ["draining", "end_with_parent"]
 
-_MARGIN_S = 2.0  # for the server's own end, after drain and grace
+_MARGIN_S = 2.0  # for the server to end, after drain and grace
 
 
 def end_with_parent() -> None:
-    """Stop this worker when its parent process is gone; else it would keep the port."""
+    """Stop this worker process when its parent has ended; else it would keep the port."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -32,10 +32,10 @@ def end_with_parent() -> None:
 
 @contextmanager
 def draining(tables: Tables, settings: Settings) -> Iterator[None]:
-    """After SIGTERM, answer as before for ``drain_s``, but ``/readyz`` with 503; then the server stops.
+    """After SIGTERM, answer requests for ``drain_s``, but ``/readyz`` with 503; then stop the server.
 
-    Each answer in that time ends its connection.  A second SIGTERM, or any other signal, stops the server at once.  The
-    process ends when drain and grace are over, even if a thread still runs.
+    In that time each answer closes its connection.  A second SIGTERM, or any other signal, stops the server at once.
+    The process ends when drain and grace are over, even if a thread still runs.
     """
     usual = signal.getsignal(signal.SIGTERM)
     if not callable(usual) or threading.current_thread() is not threading.main_thread():

@@ -1,9 +1,9 @@
-"""The short way: one plain case is answered at the front of this application's middleware.
+"""The fast path: the outermost middleware answers a plain case itself.
 
-A plain case is six numbers, and perhaps names of quantities and a tolerance.  msgspec reads it.  Whatever is not plain
-(a fault, a word, a name given twice, a condition, an unusual header) goes on to the record, the guard and the router,
-whose routes read the same request with the models of schemas.py and find the words for it.  So every refusal is written
-once.
+A plain case is six numbers, optionally with names of quantities and a tolerance.  msgspec reads it.  Any other request
+(a fault, a text, a name given twice, a condition, an unusual header) takes the general path: the other middleware and
+the router.  There the models of schemas.py read the same request and give the reason of a refusal.  So every error
+message is written in one place only.
 """
 
 import math
@@ -36,11 +36,11 @@ _TYPE = (b"content-type", b"application/json")
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 _NotNegative = Annotated[float, msgspec.Meta(ge=0.0)]
-_Quick: Any = Literal[tuple(name for name in QUANTITIES if name != "std")]  # std takes its time: in a thread
+_Quick: Any = Literal[tuple(name for name in QUANTITIES if name != "std")]  # std takes long: in a thread
 
 
 class _Plain(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    """A case as it mostly comes; anything else is not refused but read again."""
+    """The usual form of a case; any other form is read again on the general path."""
 
     mu0: _Positive
     Fz: _Positive
@@ -61,7 +61,7 @@ def _read(text: bytes) -> _Plain | None:
         case = _decode(text)
     except (msgspec.MsgspecError, ValueError, RecursionError):
         return None
-    # No string of a plain case holds a colon: more of them than members means a name given twice.
+    # No string of a plain case has a colon: more colons than members mean a name given twice.
     members = 6 + (case.include is not None) + (case.tolerance is not None)
     return case if text.count(b":") == members and (case.omega is None) != (case.f is None) else None
 
@@ -79,12 +79,12 @@ class SingleCase:
         self, app: ASGIApp, tables: Tables, settings: Settings, metrics: Metrics, log: AccessLog, keys: Keys
     ) -> None:
         self.app = app
-        self.answered = 0  # how many went this way
+        self.answered = 0  # number of requests answered here
         self._tables, self._metrics, self._log, self._keys = tables, metrics, log, keys
         self._kept = [(name.encode("ascii"), value.encode("ascii")) for name, value in cache_fields(settings).items()]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, or hand the request on with nothing taken from it."""
+        """Answer, or pass the unchanged request on."""
         started = time.perf_counter()
         if scope["type"] != "http" or path_of(scope) != CASE_PATH:
             await self.app(scope, receive, send)
@@ -101,7 +101,7 @@ class SingleCase:
             try:
                 reply = self._get(text) if method == "GET" else self._post(text)
             except Exception:
-                reply = None  # the route meets the same error, within the record, which logs and answers it
+                reply = None  # the general path raises the same error; RequestRecord logs and answers it
         if reply is None:
             await self.app(scope, receive, send)
             return
@@ -122,7 +122,7 @@ class SingleCase:
         )
 
     def _is_plain(self, scope: Scope, headers: dict[bytes, bytes]) -> bool:
-        """Whether the head of a request promises one plain case that may be answered."""
+        """Whether the head of a request allows the fast path."""
         if (
             len(headers) != len(scope["headers"])
             or b"upgrade" in headers
@@ -151,12 +151,12 @@ class SingleCase:
         elif self._tables.warm:
             values, source = answer_case(table, _inputs(case), canonical(case.include))
         else:
-            return None  # in a thread: what is not loaded yet takes its time
+            return None  # loading takes long: in a thread, on the general path
         return self._written(table, values, source), []
 
     def _get(self, query: bytes) -> tuple[bytes, list[tuple[bytes, bytes]]] | None:
-        # A query of plain numbers is a JSON object in another spelling.  Anything that JSON, or a query, spells
-        # in its own way has a character or a word that is not let through here, or is no JSON after this.
+        # A query of plain numbers becomes a JSON object by replacing "=" and "&".  Any other query has a character
+        # that is refused here, or is not valid JSON after the replacement.
         if query.translate(None, _PLAIN_QUERY):
             return None
         case = _read(b'{"' + query.replace(b"=", b'":').replace(b"&", b',"') + b"}")
@@ -184,7 +184,7 @@ class SingleCase:
 
 
 def _again(message: Message, receive: Receive) -> Receive:
-    """A ``receive`` that gives once more what was taken."""
+    """A ``receive`` that returns the given message first."""
     first: Message | None = message
 
     async def receive_again() -> Message:

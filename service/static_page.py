@@ -1,10 +1,9 @@
-"""The page as a folder for any static host: it computes in the browser, from a table compiled to WebAssembly.
+"""Writes the page as a folder for any static host: it computes in the browser, from a table compiled to WebAssembly.
 
     python -m builder export tables/mumacro-1e-7.nc --format wasm --out mumacro.wasm
     python -m service.static_page tables/mumacro-1e-7.nc mumacro.wasm FOLDER
 
-It is the page of the service with another file in the place of ``service.js``.  What it does not offer is hidden, and
-the page says so.
+It is the page of the service with another ``service.js``.  It hides the functions that need the service, and says so.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ __all__ = ["write_page"]
 
 _POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'").replace(
     "; frame-ancestors 'none'", ""
-)  # a page cannot say of itself who may frame it
+)  # browsers ignore frame-ancestors in a meta element
 
 
 class PageError(MumacroError):
@@ -56,7 +55,7 @@ def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
         ("<body>", '<body class="alone">'),
         ("</header>", f'<p id="alone" class="notice">{_about(surrogate)}</p>\n</header>'),
     ):
-        before, after = text.split(place)  # which is there once
+        before, after = text.split(place)  # occurs once
         text = before + new + after
     (out / "index.html").write_text(text, "utf-8")
     return surrogate
@@ -65,7 +64,7 @@ def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
 def _about(surrogate: Surrogate) -> str:
     name = html.escape(f"{surrogate.id}, tolerance {surrogate.tolerance:g}, checksum {surrogate.checksum[:12]}")
     return (
-        f"Everything here is computed in this browser, from the table {name}; no server is asked. Not offered here: "
+        f"Everything here is computed in this browser, from the table {name}, without a server. Not offered here: "
         "solving for an input, uncertainties, and the approximations beside the law."
     )
 

@@ -59,7 +59,7 @@ class LoadedTable:
     surrogate: Surrogate
     kernel: Kernel
     stamp: tuple[int, int, int]
-    cell: int = 0  # where its answers are counted
+    cell: int = 0  # index of the counter of its first source
 
     @classmethod
     def open(cls, path: Path) -> Self:
@@ -126,14 +126,14 @@ class Tables:
         self.paths = tuple(paths)
         self.loaded: tuple[LoadedTable, ...] = ()
         self.fault: str | None = "the tables are not loaded yet"
-        self.ready = False  # whether questions are answered
+        self.ready = False  # whether requests are answered
         self.draining = False
         self.warm = False  # whether everything compiled is loaded, not only what the first answers need
 
     def load(self, before_answers: Callable[[list[dict[str, Any]]], None] | None = None) -> None:
         """Load all tables.  A refused table makes the service not ready; it never stops the process.
 
-        ``before_answers`` is called with the labels of the tables before the first question is answered.
+        ``before_answers`` is called with the labels of the tables before the first request is answered.
         """
         try:
             tables = [LoadedTable.open(path) for path in table_files(self.paths)]
@@ -224,7 +224,7 @@ def tables_of(request: Request) -> Tables:
     return tables
 
 
-async def _tables(request: Request) -> Tables:  # async: the framework gives plain functions a thread each
+async def _tables(request: Request) -> Tables:  # async: FastAPI would run a plain function in a thread
     return tables_of(request)
 
 

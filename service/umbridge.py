@@ -1,11 +1,11 @@
-"""UM-Bridge 1.0: two models, reading of requests, answers and errors.  Of HTTP it knows only the status codes.
+"""UM-Bridge 1.0: two models, reading of requests, answers and errors.  Routes are in :mod:`service.routes.umbridge`.
 
 Rules of the protocol that are easily missed:
 
 - An error is ``{"error": {"type", "message"}}`` with 400 or 500 and nothing else; a reply has no keys beyond its own.
 - The model's name is checked first.
 - ``config`` may be missing, null, or an empty list (that is how R writes an empty one).  These models have no options.
-- Clients that unbox vectors of one element send a scalar ``sens``.  A scalar ``vec`` stands for every component.
+- Clients that unbox vectors of one element send a scalar ``sens``.  A scalar ``vec`` is used for every component.
 - An answer is never NaN or infinite: JSON has no such numbers, and clients would read them as friction.
 
 ``mu_macro_log10`` takes the decimal logarithms of the inputs: one client rounds inputs to four decimals, which would
@@ -36,7 +36,7 @@ Reply = dict[str, Any]
 
 
 class UmBridgeError(Exception):
-    """A request that has no answer, in the protocol's own terms."""
+    """A request that has no answer; ``kind`` is the protocol's name of the error."""
 
     def __init__(self, kind: str, message: str) -> None:
         self.kind = kind
@@ -77,7 +77,7 @@ def model_of(body: Any) -> str:
 
 
 def _numbers(value: Any, name: str, size: int, scalar: bool = False) -> list[float]:
-    """``value`` as ``size`` finite numbers; a lone number stands for all of them where ``scalar`` allows it."""
+    """``value`` as ``size`` finite numbers; with ``scalar``, one number may replace the list."""
     if scalar and not isinstance(value, list):
         value = [value] * size
     if not isinstance(value, list):

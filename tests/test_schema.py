@@ -24,9 +24,9 @@ from service.settings import Settings  # noqa: E402
 EXAMPLES = 25
 ARROW, NDJSON = "application/vnd.apache.arrow.stream", "application/x-ndjson"
 RELATIONS = (
-    r"has no effect unless include asks for std",
-    r"is required where include asks for std",
-    r"must be left out: it is what is asked for",
+    r"has no effect unless include has std",
+    r"is required if include has std",
+    r"must be left out: it is the unknown or swept input",
     r"no loaded table is that tight; the tightest has 1e-12",
     r"must be one of mumacro-1e-12, mumacro-1e-10, mumacro-1e-7, mumacro-1e-4",
     r"choose by one id or by tolerance",
@@ -41,7 +41,7 @@ RELATIONS = (
     r"must be > 0 on a logarithmic scale",
     r"must be mu_macro where mu0 is the unknown",
     r"must be left out: the family has its values",
-    r".* is what is swept",
+    r".* is the swept input",
     r"all curves together may have",
     r"(mu0|Fz|k) must be finite and > 0",
     r"is not in the answer",

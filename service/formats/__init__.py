@@ -1,7 +1,7 @@
-"""Wire formats of batches, one file each: a reader, a writer, and what OpenAPI says of them.
+"""Wire formats of batches, one file each: a reader, a writer, and their OpenAPI description.
 
 A format is an object with the members of :class:`Format`, given to :func:`register`.  The endpoint, content
-negotiation and the description follow from the registry.
+negotiation and the OpenAPI description use the registry.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,7 +24,7 @@ class Format(Protocol):
     aliases : tuple of str
         Other media types that mean the same.
     streams : bool
-        Whether a body is answered line by line while it comes.
+        Whether a body is answered line by line while it is received.
     body, answer : dict
         The media type objects of OpenAPI for request and response.
     """
@@ -40,7 +40,7 @@ class Format(Protocol):
         """Whether a body of the media type is in this form; for forms that share one."""
 
     def read(self, text: bytearray, max_batch: int) -> tuple[Batch, dict[str, Any]]:
-        """The cases of a body, and the options that it holds beside them.  May append to ``text``.
+        """The cases of a body, and its options.  May append to ``text``.
 
         Raises
         ------
@@ -56,7 +56,7 @@ MOST_MEMBERS = 16  # of an object of columns: the inputs and the options
 
 
 def register(made: Format) -> None:
-    """Offer one more format."""
+    """Add a format."""
     FORMATS.append(made)
 
 
@@ -72,7 +72,7 @@ def choose(media_type: str, text: memoryview) -> Format:
 
 
 def too_large(max_batch: int) -> BatchTooLargeError:
-    """More cases than the settings allow."""
+    """The error for a batch with more cases than the settings allow."""
     return BatchTooLargeError(
         f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON",
         max_batch=max_batch,
@@ -82,9 +82,9 @@ def too_large(max_batch: int) -> BatchTooLargeError:
 def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:
     """Refuse a body that holds more values than a batch may have, before it is decoded.
 
-    Every value of JSON but the first of its list or object has a comma before it, and every list or object a bracket:
-    counting those takes a millisecond a megabyte and bounds what decoding can make.  Every member of an object has a
-    colon, and no object has more members than there are fields.
+    In JSON every value but the first of its list or object has a comma before it, and every list or object has a
+    bracket.  Counting commas and brackets takes a millisecond per megabyte and bounds the memory of decoding.  Every
+    member of an object has a colon, and no object has more members than there are fields.
 
     Raises
     ------

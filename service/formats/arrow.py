@@ -39,8 +39,8 @@ class Arrow:
             "type": "string",
             "format": "binary",
             "description": "Arrow IPC stream, order kept: mu_macro, mu_ratio, regime, error_bound, source, what "
-            "include adds (power.saved and the like), error; null results and a text in error where a case is bad; the "
-            "table and the version in the schema's metadata",
+            "include adds (such as power.saved), error; a bad case has null results and a text in error; the "
+            "table and the version are in the schema's metadata",
         }
     }
 
@@ -85,7 +85,7 @@ class Arrow:
 
 
 class _Sink:
-    """A buffer that a stream is written to, and read from piece by piece."""
+    """A buffer that a stream is written to; it is read piece by piece."""
 
     closed = False
 
@@ -193,7 +193,7 @@ def _column(batch: Any, name: str, first: int, reasons: dict[int, Reason]) -> ND
 
 
 def _record(answers: Answers, part: slice, errors: Mapping[int, str]) -> Any:
-    """One record batch.  Regime and source are dictionaries: a byte a case."""
+    """One record batch.  Regime and source are dictionaries: one byte per case."""
     source = answers.source[part]
     bad = source < 0 if answers.n_bad else None
     arrays = {

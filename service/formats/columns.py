@@ -3,8 +3,8 @@
 A batch is refused as a whole only if it cannot be read: text that is not JSON, an unknown or missing column, lists of
 different lengths, a bad plain number that would hold for every case.  A bad entry of a list affects its own case only.
 
-Plain numbers go from text to arrays in compiled code (:mod:`service.numbers`), ordinary columns with options through
-msgspec.  If either refuses a body, :func:`read_values` reads it again, entry by entry, and gives the reasons.
+Compiled code (:mod:`service.numbers`) reads plain numbers into arrays; msgspec reads ordinary columns with options.  If
+both refuse a body, :func:`read_values` reads it again, entry by entry, and gives the reasons.
 """
 
 import math
@@ -62,7 +62,7 @@ def dump(values: Mapping[str, Any]) -> bytes:
 
 
 def decode(text: bytearray) -> Any:
-    """The value of a JSON text.  NaN and Infinity pass: the fields that they stand in are refused.
+    """The value of a JSON text.  NaN and Infinity are accepted here; their fields are refused later.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def decode(text: bytearray) -> Any:
 
 
 def read_entry(value: Any, name: str) -> tuple[float, str | None]:
-    """The number that an entry stands for and None; or NaN and the reason why it is not a number."""
+    """The number of an entry and None; or NaN and the reason why it is not a number."""
     if name == "k" and (value is None or value == "rigid"):
         return math.inf, None
     if type(value) is float or type(value) is int:
@@ -149,7 +149,7 @@ def _read_numbers(text: bytearray, max_batch: int) -> Batch | None:
         stop -= 1
     text.append(0)
     try:
-        columns = np.empty((6, min(max_batch, len(text) // 2)))  # memory is taken where something is written
+        columns = np.empty((6, min(max_batch, len(text) // 2)))  # only written pages take memory
         size = numbers.read_columns(np.frombuffer(text, dtype=np.uint8), 0, stop, columns)
     finally:
         text.pop()

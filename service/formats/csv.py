@@ -1,4 +1,4 @@
-"""CSV: a header with the names of the inputs, one case a line; the answer likewise, with a text where a case is bad."""
+"""CSV: a header with the names of the inputs, one case per line; the answer likewise, with a text for a bad case."""
 
 import csv
 import io
@@ -34,14 +34,15 @@ class Csv:
         "schema": {
             "type": "string",
             "description": "RFC 4180 with a header: mu0, Fz, k, y0, omega or f, v0; units in brackets are checked; an "
-            "empty cell or rigid in k is rigid contact",
+            "empty cell or the word rigid in k is rigid contact",
         },
         "example": "mu0,Fz,k,y0,f,v0\r\n0.3,10,1e6,2e-6,20690,0.01\r\n",
     }
     answer: ClassVar[dict[str, Any]] = {
         "schema": {
             "type": "string",
-            "description": "mu_macro, mu_ratio, regime, error_bound, source, what include adds, error; one line a case",
+            "description": "One line per case: mu_macro, mu_ratio, regime, error_bound, source, what include adds, "
+            "error",
         }
     }
 
@@ -73,7 +74,7 @@ class Csv:
         return Batch(len(rows), list(columns), reasons), {}
 
     def write(self, answers: Answers, label: Mapping[str, Any]) -> Iterator[bytes]:
-        """See :class:`Format`.  The table's name stands in the response's header."""
+        """See :class:`Format`.  The table's name is in the response header X-Table."""
         del label
         text = io.StringIO()
         writer = csv.writer(text)
@@ -102,7 +103,7 @@ def _cells(column: Any) -> list[Any]:
 
 def _names(header: list[str]) -> list[str]:
     faults, names = [], []
-    for cell in header[:MAX_FIELD_FAULTS]:  # as many cannot all be right, and no more are told
+    for cell in header[:MAX_FIELD_FAULTS]:  # so many cannot all be valid, and no more faults are reported
         found = _HEADER.fullmatch(cell) if len(cell) <= _LONGEST_NAME else None
         name, unit = (found[1], found[2]) if found else (cell, None)
         if name not in INPUTS:

@@ -1,4 +1,4 @@
-"""NDJSON: lines in, lines out, each answered as soon as it arrives.
+"""NDJSON: every line is answered with a line as soon as it arrives.
 
 Large streams mostly hold blocks: lines with an object of lists.  Several blocks are read, evaluated and written
 together, in memory that is used again.  Lines of one case each are answered together too.  Every other line, and every
@@ -22,7 +22,7 @@ from .rows import decode_rows, objects
 
 __all__ = ["LineAnswers", "Spans"]
 
-#: where lines begin and end in a text, the end without its newline, and their numbers from 1
+#: (start, end, number) of each line in a text: the end is before the newline, numbers are from 1
 Spans = Sequence[tuple[int, int, int]]
 
 _CASES = 8192  # cases of blocks that are evaluated together
@@ -31,7 +31,7 @@ _ONE_OF = ("BatchColumns", "Case")
 
 
 class Lines:
-    """The format.  A whole body is what comes of its lines; the endpoint answers streams with :class:`LineAnswers`."""
+    """The format.  The endpoint answers its lines with :class:`LineAnswers`."""
 
     name, media_type, streams = "lines", "application/x-ndjson", True
     aliases: tuple[str, ...] = ("application/ndjson", "application/jsonl", "application/x-jsonlines")
@@ -41,7 +41,7 @@ class Lines:
                 *({"$ref": f"#/components/schemas/{name}"} for name in _ONE_OF),
                 {"type": "array", "items": {"$ref": "#/components/schemas/Case"}},
             ],
-            "description": "One of these a line",
+            "description": "One of these per line",
         },
         "example": {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20690.0, "v0": [0.01, 0.1]},
     }
@@ -51,7 +51,7 @@ class Lines:
                 {"$ref": f"#/components/schemas/{name}"}
                 for name in ("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem")
             ],
-            "description": "One of these a line, in the order of the lines",
+            "description": "One of these per line, in the order of the lines",
         }
     }
 
@@ -106,13 +106,13 @@ class LineAnswers:
         self._end = dump({"errors": [], "n_errors": 0, **signature(table)})[1:] + b"\n"
 
     def pieces(self, text: bytearray, spans: Spans) -> Iterator[bytes]:
-        """The answers to some lines of ``text``, which ends in a byte behind the last."""
+        """The answers to some lines of ``text``, which has one byte after the last line."""
         together = self._cases(text, spans) if len(spans) > 1 else None
         if together is not None:
             yield from together
             return
         seen = np.frombuffer(text, dtype=np.uint8)
-        edges = [0]  # where the blocks that are read and not yet answered begin among the cases
+        edges = [0]  # index of the first case of each block that is read and not yet answered
         for index, (start, end, number) in enumerate(spans):
             size = self._read(seen, start, end, edges[-1])
             if size < 0 and len(edges) > 1:
@@ -166,7 +166,7 @@ class LineAnswers:
             yield b"".join(answered) + b"\n"
 
     def _cases(self, text: bytearray, spans: Spans) -> Iterator[bytes] | None:
-        """Answer lines of one case each all at once; None where they are anything else."""
+        """Answer lines of one case each together; None for other lines."""
         if any(end - start > _SHORT_LINE for start, end, _ in spans):
             return None
         lines = [line for line in (text[start:end].strip() for start, end, _ in spans) if line]

@@ -1,7 +1,7 @@
 """JSON rows: a list of objects, each one case.  A bad row affects only itself.
 
-Ordinary rows go through msgspec, a quarter of a megabyte at a time, since it keeps the interpreter's lock.  What it
-refuses is read again, row by row, by :func:`read_values`, which gives the reasons.
+msgspec reads ordinary rows, a quarter of a megabyte at a time, since it holds the interpreter's lock.  If it refuses a
+body, :func:`read_values` reads it again, row by row, and gives the reasons.
 """
 
 import math
@@ -82,10 +82,10 @@ class Rows:
 
 
 def decode_rows(text: bytearray) -> Batch | None:
-    """Ordinary rows as columns; None where it is anything else.
+    """Ordinary rows as columns; None for any other body.
 
-    Cut at ``},``: pieces that are lists of rows each are one list of rows together, and a cut within a text makes a
-    piece that is no list.
+    The text is cut at ``},``.  If every piece is a list of rows, the pieces together are one list of rows.  A cut
+    within a string makes a piece that is not a list.
     """
     begin, last = text.find(b"["), text.rfind(b"]")
     if begin < 0 or last < begin or text[:begin].strip() or text[last + 1 :].strip():
@@ -98,7 +98,7 @@ def decode_rows(text: bytearray) -> Batch | None:
             stop = last if end < 0 else end + 1
             rows = _decoder.decode(b"[" + text[start:stop] + b"]")
             if not rows and parts:
-                return None  # a comma with nothing behind it
+                return None  # a comma with nothing after it
             columns = _columns(rows)
             if columns is None:
                 return None
@@ -113,7 +113,7 @@ def decode_rows(text: bytearray) -> Batch | None:
 
 
 def _columns(rows: list[_Row]) -> list[Array] | None:
-    """Rows as columns; None where a frequency is missing, twofold or too large."""
+    """Rows as columns; None where a frequency is missing, given twice or too large."""
     named: dict[str, Any] = {name: list(map(attrgetter(name), rows)) for name in FIELDS}
     try:
         k = array("d", named["k"])

@@ -58,7 +58,7 @@ def etag_matches(request: Request, etag: str) -> bool:
 
 
 class _File(FileResponse):
-    """A file, or a part of it; a range that it has not is told like every other fault."""
+    """A file, or a part of it; a range outside the file is answered with problem details."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def send_checked(message: Message) -> None:
@@ -75,9 +75,9 @@ class _File(FileResponse):
 
 
 def file_answer(request: Request, path: Path, headers: Mapping[str, str], **options: Any) -> Response:
-    """A file, a part of it where a range is asked for, or 304 where the caller has it.
+    """A file, the part of it that Range requests, or 304 if the client has it already.
 
-    Its ETag is that of the headers, or made from its size and its time.
+    The ETag is that of the headers, or is made from the size and the modification time.
 
     Raises
     ------

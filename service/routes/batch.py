@@ -1,6 +1,6 @@
-"""Many cases at once: ``POST /v1/mu-macro/batch``, in every form of :mod:`service.formats`.
+"""Many cases at once: ``POST /v1/mu-macro/batch``, in every format of :mod:`service.formats`.
 
-The form is that of the Content-Type; ``/v1/mu-macro/batch/<name>`` takes one form only, so that generated clients are
+The Content-Type gives the format.  ``/v1/mu-macro/batch/<name>`` takes one format only, so that generated clients are
 typed.  Answers are sent piece by piece, no faster than the client reads them.
 """
 
@@ -40,9 +40,9 @@ router = APIRouter(tags=["answers"])
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are taken
 _LINES = 256 * 1024  # bytes of lines that are answered together
-_BYTES_PER_UNIT = 16  # of a body, for the time of a plain case: what reading it costs
+_BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
 _NO_QUERY = BatchQuery()
-_FORMS: dict[str, Format | None] = {}  # path -> the form that it takes; None: any
+_FORMS: dict[str, Format | None] = {}  # path -> the format that it takes; None: any
 
 
 class Batches:
@@ -60,7 +60,7 @@ class Batches:
         self.metrics.count_cases(table.cell, answers.source, answers.n_bad)
 
     def too_large(self) -> BodyTooLargeError:
-        """More bytes than the settings allow."""
+        """The error for a body with more bytes than the settings allow."""
         return BodyTooLargeError(
             f"the body may have up to {self.max_body_bytes} bytes: split it, or stream it as NDJSON without a "
             "Content-Length and read the answer while you send",
@@ -80,7 +80,7 @@ class BatchResponse(Response):
         self.background = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, and give the place back if one was taken."""
+        """Answer, and give the slot back if one was taken."""
         started = False
 
         async def send_noted(message: Message) -> None:
@@ -119,7 +119,7 @@ class BatchResponse(Response):
         size = len(text)
         chosen = self._chosen or choose(media_type, memoryview(text))
         query = self._options({}, "parameter")[0]
-        # Reading costs by the byte, computing by the case: a small body can ask for much work.
+        # Reading costs by the byte, computing by the case: a small body can request much computation.
         batch, given = await self._run(partial(chosen.read, text, self._batches.max_batch), size / _BYTES_PER_UNIT)
         options, place = self._options(given, "pointer") if given else (query, "parameter")
         if given and self._query.given().get("tolerance") is not None:
@@ -141,7 +141,7 @@ class BatchResponse(Response):
         return await self._batches.work.run(work, cost)
 
     async def _body(self, receive: Receive) -> bytearray:
-        """The body; one of more than 64 KiB needs a place."""
+        """The body; one of more than 64 KiB needs a slot."""
         limit, work = self._batches.max_body_bytes, self._batches.work
         length = self._request.headers.get("content-length", "0")
         if not length.isdigit() or len(length) > 18 or int(length) > limit:
@@ -166,7 +166,7 @@ class BatchResponse(Response):
         return body
 
     def _options(self, given: dict[str, Any], place: str) -> tuple[Options, str]:
-        """Options of query and body together, and where they stand."""
+        """Options of query and body together, and which of the two holds them."""
         query = self._query.given()
         twice = [name for name in given if name in query]
         if twice:
@@ -259,7 +259,7 @@ class BatchResponse(Response):
         table = self._batches.tables.pick(options.tolerance, place)
         std = options.std.of_inputs() if options.std is not None else {}
         answers = answer_batch(table, batch, options.names(), std)
-        if answers.n_bad and not batch.listed:  # one case, and no list that could hold its place
+        if answers.n_bad and not batch.listed:  # one case, and no list that could hold a null for it
             raise refusal([FieldFault(error["field"] or "body", error["reason"]) for error in answers.errors])
         self._batches.count(table, answers)
         if batch.listed:
@@ -268,7 +268,7 @@ class BatchResponse(Response):
 
 
 class _Pieces:
-    """A body that is read ahead of the answers: some clients send all of it before they read."""
+    """A body that is read ahead of the answers: some clients send the whole body before they read."""
 
     def __init__(self, receive: Receive, work: Work) -> None:
         self._receive = receive
@@ -286,7 +286,7 @@ class _Pieces:
         return bytearray(message.get("body", b"")), message.get("more_body", False)
 
     async def read_on(self) -> None:
-        """Read until the end, or until there is as much as may be held."""
+        """Read to the end of the body; pause while the buffer is full."""
         try:
             while self._more:
                 if self._size > _AHEAD:
@@ -315,7 +315,7 @@ class _Pieces:
 
 
 def _cut(text: bytearray, most: int) -> Iterator[bytearray]:
-    """Whole lines, some at a time, with a byte behind the last."""
+    """Whole lines, some at a time, with one byte after the last."""
     start = 0
     while start < len(text):
         end = len(text) if len(text) - start <= most else text.find(b"\n", start + most) + 1 or len(text)
@@ -325,7 +325,7 @@ def _cut(text: bytearray, most: int) -> Iterator[bytearray]:
 
 
 def _answered(answers: LineAnswers, text: bytearray, number: int) -> tuple[list[bytes], int]:
-    """The answers to some lines, and how many lines it were; blank ones are counted and have none."""
+    """The answers to some lines, and the number of lines; blank lines are counted and have no answer."""
     spans, start, count = [], 0, 0
     while start < len(text):
         end = text.find(b"\n", start)
@@ -351,10 +351,10 @@ def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
 
 
 class _Route(APIRoute):
-    """Solves parameters only where there is a query: that takes as long as a small batch."""
+    """Lets FastAPI read the parameters only if there is a query: that takes as long as a small batch."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """The usual handler, or none."""
+        """A handler that calls FastAPI's own only if there is a query."""
         usual, chosen = super().get_route_handler(), _FORMS[self.path]
 
         async def answer(request: Request) -> Response:
@@ -371,7 +371,7 @@ def _add(path: str, chosen: Format | None) -> None:
     _FORMS[path] = chosen
 
     async def post_batch(query: Annotated[BatchQuery, Query()], request: Request, _tables: TablesDep) -> Response:
-        """Answer in the form that was asked in, order kept.  A bad case has the result null and an entry in ``errors``.
+        """Answer in the format of the request, order kept.  A bad case has the result null and an entry in ``errors``.
 
         A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
         """
@@ -389,7 +389,7 @@ def _add(path: str, chosen: Format | None) -> None:
 
 
 def add_routes() -> None:
-    """One path for all forms, and one for each."""
+    """One path for all formats, and one for each."""
     _add(BATCH_PATH, None)
     for entry in FORMATS:
         _add(f"{BATCH_PATH}/{entry.name}", entry)

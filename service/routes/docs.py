@@ -20,7 +20,7 @@ ASSETS = {
 #: paths without an API key: the page and its parts; /openapi.json needs the key
 OPEN_PATHS = frozenset({"/docs", *(f"/static/swagger-ui/{name}" for name in ASSETS)})
 
-# Styles inline: the interface sets some on its elements.  Scripts, and all else, from this host alone.
+# Inline styles are allowed: the interface sets some on its elements.  Everything else comes from this host only.
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"

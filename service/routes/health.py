@@ -1,4 +1,4 @@
-"""Health: ``/livez`` (the process answers), ``/readyz`` and its alias ``/healthz`` (answers are right)."""
+"""Health: ``/livez`` (the process answers), ``/readyz`` and its alias ``/healthz`` (answers are correct)."""
 
 from fastapi import APIRouter
 from starlette.responses import Response
@@ -25,7 +25,7 @@ _VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
     response_model=Health,
 )
 async def livez() -> Response:
-    """Say that the process answers, also without a table: a restart would not repair a table."""
+    """Report that the process answers, also without a table: a restart would not repair a table."""
     return Response(dump({"status": "alive", **_VERSIONS}), headers=_NO_STORE, media_type="application/json")
 
 
@@ -46,7 +46,7 @@ async def livez() -> Response:
     responses=problems(503),
 )
 async def readyz(tables: TablesDep) -> Response:
-    """Say whether every table is loaded, has the right checksum, gives its known answer and has an unchanged file."""
+    """Check that every table is loaded, has the right checksum, gives its known answer and has an unchanged file."""
     tables.check()
     answer = {"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}
     return Response(dump(answer), headers=_NO_STORE, media_type="application/json")

@@ -39,7 +39,7 @@ accepts("/v1/law.csv", LawQuery.model_fields)
     dependencies=[Depends(no_query)],
 )
 async def post_law(form: LawRequest, tables: TablesDep, request: Request) -> Response:
-    """Return the law in columns, with its static limit and its border; with ``family``, one curve a value."""
+    """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
     table = tables.pick(form.tolerance)
     content = await request.app.state.work.run_in_place(lambda: dump(_answer(table, form, "pointer")))
     return Response(content, media_type="application/json")

@@ -1,4 +1,4 @@
-"""``GET /metrics``, for Prometheus: this worker and all others of the same service."""
+"""``GET /metrics``, for Prometheus: counts of all worker processes of the service."""
 
 import anyio.to_thread
 from fastapi import APIRouter

@@ -1,6 +1,6 @@
 """One case: ``GET`` and ``POST /v1/mu-macro``, and ``GET /v1/mu-macro.txt`` for spreadsheets.
 
-Good cases are mostly answered before they come here, see :mod:`service.single`.
+Most valid cases are answered by the fast path before they get here: :mod:`service.single`.
 """
 
 from typing import Annotated, Any
@@ -30,7 +30,7 @@ accepts(TEXT_PATH, [*CaseQuery.model_fields, "value"])
 
 
 class ValueQuery(CaseQuery):
-    """One case as a query, and which value of the answer is wanted."""
+    """One case as a query, and the name of the requested value."""
 
     value: str = Field(
         "mu_macro", description="Name in the answer, such as mu_macro, regime or power.saved", max_length=64
@@ -75,7 +75,7 @@ async def _get(request: Request, tables: Any, query: CaseQuery) -> tuple[dict[st
     dependencies=[Depends(once_each)],
 )
 async def get_mu_macro(query: Annotated[CaseQuery, Query()], tables: TablesDep, request: Request) -> Response:
-    """Answer one case given as a query; with ``Accept: text/plain`` by the number alone.
+    """Answer one case given as a query; with ``Accept: text/plain`` the answer is mu_macro only.
 
     The answer can be cached: ETag, If-None-Match, Cache-Control.
     """
@@ -102,7 +102,7 @@ async def get_mu_macro(query: Annotated[CaseQuery, Query()], tables: TablesDep, 
     dependencies=[Depends(once_each)],
 )
 async def get_mu_macro_text(query: Annotated[ValueQuery, Query()], tables: TablesDep, request: Request) -> Response:
-    """Answer one case by one value as text: ``mu_macro``, or the one that ``value`` names."""
+    """Answer one case with one value as text: ``mu_macro``, or the one that ``value`` names."""
     answer, headers = await _get(request, tables, query)
     headers["ETag"] = f'{headers["ETag"][:-1]}-{query.value}"'
     if answer is None or etag_matches(request, headers["ETag"]):
@@ -126,6 +126,6 @@ async def get_mu_macro_text(query: Annotated[ValueQuery, Query()], tables: Table
     dependencies=[Depends(no_query)],
 )
 async def post_mu_macro(case: CaseRequest, tables: TablesDep, request: Request) -> Response:
-    """Answer one case given as a JSON object; ``include`` asks for more than the default answer."""
+    """Answer one case given as a JSON object; ``include`` adds quantities to the default answer."""
     answer = await _answered(request, tables.pick(case.tolerance), case)
     return Response(dump(answer), media_type="application/json")

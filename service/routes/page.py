@@ -1,4 +1,4 @@
-"""``/``: the page.  The map of all cases, the user's point on it, the friction law beside it."""
+"""``/``: the page.  It shows the map of all cases with the user's point on it, and the friction law."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(FOLDER.iterdir()) if path.suffix in _TYPES}
 _NAMES = "/static/page/names.json"
-#: paths without an API key: the page and its parts, which hold no number
+#: paths without an API key: the page and its parts, which hold no number of a table
 OPEN_PATHS = frozenset({"/", _NAMES, *(f"/static/page/{name}" for name in ASSETS)})
 
 # No inline script, no inline style, nothing from another host.
@@ -35,7 +35,7 @@ POLICY = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-# The window of the map [-]: from deep in creep to fast sliding, twenty places a decade.
+# The range of the map [-]: from deep in creep to fast sliding, twenty points per decade.
 _PER_DECADE = 20
 _V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
 # Formulas of the paper for the border; "small_amplitude" is eq. (31) among the approximations, not among the borders.
@@ -117,6 +117,6 @@ def map_content(surrogate: Surrogate) -> bytes:
 
 
 def _line(v: np.ndarray, y: np.ndarray) -> list[list[float]]:
-    """Places (v~, y~) of a curve, in six digits; without those at which it is not given."""
+    """Points (v~, y~) of a curve, in six digits; without those at which it is not defined."""
     places = np.column_stack((v, y))[np.isfinite(v)]
     return [[float(f"{x:.6g}") for x in place] for place in places.tolist()]

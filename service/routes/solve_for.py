@@ -1,4 +1,4 @@
-"""The inverse question: ``POST /v1/solve-for``."""
+"""The inverse problem: ``POST /v1/solve-for``."""
 
 import math
 from typing import Any

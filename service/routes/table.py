@@ -71,13 +71,13 @@ async def get_table(table: ChosenTable, tables: TablesDep) -> Response:
     responses={
         **problems(400, 401, 416, 422, 503),
         200: {"description": "The file", "content": _FILE},
-        206: {"description": "The part of it that Range asked for", "content": _FILE},
+        206: {"description": "The part of it that Range requests", "content": _FILE},
     },
     dependencies=[Depends(once_each)],
 )
 async def get_table_file(table: ChosenTable, request: Request) -> Response:
     """Stream the file from disk; ranges are supported.  It is the file that the answers come from."""
-    # A file that was replaced after loading is another table with the same name.
+    # A file that was replaced after loading holds another table with the same name.
     table.check()
     path = table.surrogate.path
     headers = {"ETag": f'"{table.kernel.checksum}"', "Cache-Control": "no-cache"}

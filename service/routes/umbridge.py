@@ -1,7 +1,7 @@
 """UM-Bridge 1.0 at the root: ``GET /Info`` and seven POSTs; the protocol itself is :mod:`service.umbridge`.
 
-At the root, because the C++ client fails with a path prefix.  The body is read raw: several clients send no JSON
-content type.  Errors here have the form of the protocol, never that of problem details.
+The C++ client fails with a path prefix, so the paths are at the root.  The body is read without a check of its
+Content-Type: several clients send none for JSON.  Errors have the form of the protocol, never that of problem details.
 """
 
 import json
