@@ -590,17 +590,43 @@ def _in_another_process(port: int, body: bytes, kind: str) -> None:
         subprocess.run(["taskset", "-c", str(CLIENT_CORE), *command, f"http://127.0.0.1:{port}{BATCH}"], check=True)
 
 
+def send_chunks(server: Server, line: bytes, count: int) -> None:
+    """A stream of ``count`` equal lines in chunks; reads the answer meanwhile, and keeps none of it."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=120) as raw:
+        head = f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: {KINDS['lines']}\r\n"
+
+        def send() -> None:
+            raw.sendall(head.encode() + b"Transfer-Encoding: chunked\r\nConnection: close\r\n\r\n")
+            for _ in range(count):
+                raw.sendall(b"%x\r\n%b\r\n" % (len(line), line))
+            raw.sendall(b"0\r\n\r\n")
+
+        sender = threading.Thread(target=send)
+        sender.start()
+        reply = http.client.HTTPResponse(raw, method="POST")
+        reply.begin()
+        found = 0
+        while piece := reply.read(1 << 20):
+            found += piece.count(b"\n")
+        sender.join()
+        if (reply.status, found) != (200, count):
+            raise RuntimeError(f"{found} of {count} lines were answered, status {reply.status}")
+
+
 def measure_streams() -> list[list[str]]:
     """Memory of the server over the length of a stream."""
     rows = []
     with ours() as server:
         line = body_of("lines", 1000)
-        server.ask("POST", BATCH, line * 10, KINDS["lines"])
-        base = server.forget_peak()
+        send_chunks(server, line, 10)
         for blocks in (100, 1000, 5000):
-            progress(f"a stream of {blocks} blocks")
+            progress(f"streams of {blocks} blocks")
+            base = server.forget_peak()
+            send_chunks(server, line, blocks)
+            chunked = server.memory("VmHWM") - base
             server.ask("POST", BATCH, line * blocks, KINDS["lines"])
-            rows.append([f"{1000 * blocks:,}", quantity(server.memory("VmHWM") - base, 3)])
+            sized = server.memory("VmHWM") - base
+            rows.append([f"{1000 * blocks:,}", f"{chunked:.1f}", quantity(sized, 3)])
     return rows
 
 
@@ -798,7 +824,9 @@ def others(options: argparse.Namespace, folder: Path) -> dict[str, Callable[[], 
             ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)
         ),
         "waiting": lambda: markdown(waiting, measure_waiting()),
-        "streams": lambda: markdown(["cases in a stream", "memory above the start [MB]"], measure_streams()),
+        "streams": lambda: markdown(
+            ["cases in a stream", "sent in chunks [MB]", "sent with a Content-Length [MB]"], measure_streams()
+        ),
         "once": lambda: markdown(
             ["batches of 100,000 at once", "one body [MB]", *(f"{n} [MB]" for n in AT_ONCE)], measure_at_once()
         ),
