@@ -252,9 +252,9 @@ def test_a_small_text_that_asks_for_much_takes_a_place(tables_dir, case, problem
 def test_plain_columns_get_the_same_bytes_on_the_fast_path(client, case, n):
     columns = {**case, "v0": np.geomspace(1e-6, 1e2, n).tolist(), "k": [1e6] * n}
     text = json.dumps(columns)
-    doubled = '{"mu0": 0.7, ' + text[1:]  # a name given twice is handled by the general parser; the last value counts
+    escaped = text.replace('"mu0"', '"\\u006du0"')  # an escaped name is read by the general parser
     headers = {"Content-Type": "application/json", "Accept-Encoding": "identity"}
-    short, long = (client.post(PATH, content=body, headers=headers) for body in (text, doubled))
+    short, long = (client.post(PATH, content=body, headers=headers) for body in (text, escaped))
     assert short.content == long.content
     assert len(short.json()["mu_macro"]) == n
     spoilt = {**columns, "v0": [*columns["v0"][:-1], -1.0]}
@@ -288,3 +288,38 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
         ("solve-for", {"unknown": "v0", "target": 0.1}),
     ):
         assert client.post(f"/v1/{path}", json={**held, **asked}).json()["errors"][0]["field"] == "f"
+
+
+TWICE = (
+    '{"mu0":0.3,"Fz":10,"k":1e6,"y0":2e-6,"omega":1e5,"v0":%s,"mu0":0.2}',
+    '{"mu0":0.3,"Fz":10,"k":null,"y0":2e-6,"f":1e4,"v0":%s,"\\u006du0":0.2}',
+    '{"mu0":0.3,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":1e5,"f":null,"v0":%s}',
+    '{"mu0":-1,"mu0":0.3,"Fz":10,"k":1e6,"y0":2e-6,"omega":1e5,"v0":%s}',
+)
+
+
+@pytest.mark.parametrize("text", TWICE)
+def test_a_name_given_twice_is_refused(client, problem, text):
+    bodies = {"/v1/mu-macro": text % "0.1", PATH: text % "[0.1, 0.2]", f"{PATH}/rows": f"[{text % '0.1'},{text % '1'}]"}
+    for path, body in bodies.items():
+        answer = client.post(path, content=body, headers={"Content-Type": "application/json"})
+        found = problem(answer, 422)
+        assert [(fault["field"], fault["reason"]) for fault in found["errors"]] == [("mu0", "is given more than once")]
+    lines = client.post(PATH, content="\n".join(bodies.values()), headers={"Content-Type": "application/x-ndjson"})
+    assert [json.loads(line)["status"] for line in lines.text.splitlines()] == [422] * 3
+
+
+def test_options_with_a_name_given_twice_are_refused(client, problem, case):
+    body = json.dumps({**case, "include": ["std"]})[:-1] + ',"std":{"mu0":0.1,"mu0":0.2}}'
+    for path in ("/v1/mu-macro", PATH):
+        answer = client.post(path, content=body, headers={"Content-Type": "application/json"})
+        assert "more than once" in problem(answer, 422)["errors"][0]["reason"]
+
+
+def test_explicit_nulls_are_read_like_absent_names(client, case):
+    rows = [{**case, "f": None}, {**case, "k": None}, {**case, "omega": None, "f": 1e4}]
+    answer = client.post(PATH, json=rows).json()
+    assert answer["n_errors"] == 0
+    assert [row["mu_macro"] for row in answer["results"]] == [
+        client.post("/v1/mu-macro", json=row).json()["mu_macro"] for row in rows
+    ]

@@ -4,13 +4,19 @@ A format is an object with the members of :class:`Format`, given to :func:`regis
 negotiation and the OpenAPI description use the registry.
 """
 
+import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any, ClassVar, Protocol
 
-from ..errors import BatchTooLargeError, InvalidFieldsError
+from ..errors import BatchTooLargeError, FieldFault, InvalidFieldsError, refusal
 from ..evaluation import Answers, Batch
 
-__all__ = ["FORMATS", "Format", "choose", "limit_values", "media_types", "register", "too_large"]
+__all__ = [
+    "FORMATS", "Format", "choose", "limit_values", "media_types", "members_of", "refuse_repeated", "register",
+    "too_large", "unique_names",
+]  # fmt: skip
 
 
 class Format(Protocol):
@@ -96,6 +102,42 @@ def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:
         raise too_large(max_batch)
     if text.count(b":") > MOST_MEMBERS * objects + 64:
         raise InvalidFieldsError("the body has objects with more members than there are fields")
+
+
+def unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON from its members.
+
+    Raises
+    ------
+    InvalidFieldsError
+        A name is given more than once.
+    """
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        counts = Counter(name for name, _ in pairs)
+        raise refusal([FieldFault(name, "is given more than once") for name, count in counts.items() if count > 1])
+    return found
+
+
+def refuse_repeated(text: bytearray, members: int) -> None:
+    """Refuse a body in which an object has a name twice.
+
+    A body has as many colons as members, unless it has a name twice or a colon in a string: only then it is read again.
+
+    Raises
+    ------
+    InvalidFieldsError
+    """
+    if text.count(b":") != members:
+        with suppress(ValueError, RecursionError):
+            json.loads(text, object_pairs_hook=unique_names)
+
+
+def members_of(value: Any) -> int:
+    """How many members the objects of a decoded body have."""
+    if isinstance(value, dict):
+        return len(value) + sum(map(members_of, value.values()))
+    return sum(members_of(entry) for entry in value if isinstance(entry, dict)) if isinstance(value, list) else 0
 
 
 def _load() -> None:

@@ -24,7 +24,7 @@ from ..hints import TOO_FREQUENT, number_hint, unknown_name
 from ..kernel import BOUNDS, FIELDS, INPUTS, MOST_HZ, POSITIVE, REGIME_NAMES, SOURCES, Array
 from ..quantities import QUANTITIES, nested, parts_of
 from ..schemas import BatchColumns
-from . import limit_values, register, too_large
+from . import limit_values, members_of, refuse_repeated, register, too_large
 
 __all__ = ["NAMES", "REGIMES_OF", "SOURCES_OF", "decode", "dump", "read_entry", "write_columns"]
 
@@ -120,7 +120,10 @@ class Columns:
             if not isinstance(found, dict):
                 reason = "must be an object of columns or a list of rows"
                 raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())]) from None
+            refuse_repeated(text, members_of(found))
             return read_values(found, max_batch)
+        stated = sum(value is not None or name == "k" for name, value in given.items())
+        refuse_repeated(text, stated + len(plain.std or ()))
         options = {name: given[name] for name in OPTIONS if given[name] is not None}
         return _batch(columns, {}, [], max_batch), options
 

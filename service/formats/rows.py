@@ -13,13 +13,14 @@ from typing import Any, ClassVar, Literal
 import msgspec
 import numpy as np
 import orjson
+from msgspec import UNSET, UnsetType
 
 from ..errors import FieldFault, InvalidFieldsError
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
 from ..hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA, TOO_FREQUENT, unknown_name
 from ..kernel import FIELDS, INPUTS, MOST_HZ, RAD_PER_CYCLE, Array
 from ..quantities import nested
-from . import limit_values, register, too_large
+from . import limit_values, members_of, refuse_repeated, register, too_large
 from .columns import REGIMES_OF, SOURCES_OF, decode, dump, is_bool, read_entry
 
 __all__ = ["decode_rows", "objects", "read_row", "read_values"]
@@ -36,8 +37,8 @@ class _Row(msgspec.Struct, forbid_unknown_fields=True, gc=False):
     k: float | Literal["rigid"] | None
     y0: float
     v0: float
-    omega: float | None = None
-    f: float | None = None
+    omega: float | UnsetType | None = UNSET
+    f: float | UnsetType | None = UNSET
 
 
 _decoder = msgspec.json.Decoder(list[_Row])
@@ -64,6 +65,7 @@ class Rows:
         batch = decode_rows(text)
         if batch is None:
             found = decode(text)
+            refuse_repeated(text, members_of(found))
             if not isinstance(found, list):
                 reason = "must be an object of columns or a list of rows"
                 raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())])
@@ -91,7 +93,7 @@ def decode_rows(text: bytearray) -> Batch | None:
     if begin < 0 or last < begin or text[:begin].strip() or text[last + 1 :].strip():
         return None
     parts: list[list[Array]] = []
-    start = begin + 1
+    start, members = begin + 1, 0
     try:
         while True:
             end = text.find(b"},", start + _PIECE, last) if last - start > _PIECE else -1
@@ -99,37 +101,45 @@ def decode_rows(text: bytearray) -> Batch | None:
             rows = _decoder.decode(b"[" + text[start:stop] + b"]")
             if not rows and parts:
                 return None  # a comma with nothing after it
-            columns = _columns(rows)
-            if columns is None:
+            found = _columns(rows)
+            if found is None:
                 return None
-            parts.append(columns)
+            parts.append(found[0])
+            members += found[1]
             if end < 0:
                 break
             start = end + 2
     except (msgspec.MsgspecError, ValueError, RecursionError):
         return None
-    columns = parts[0] if len(parts) == 1 else [np.concatenate(found) for found in zip(*parts, strict=True)]
+    if text.count(b":", begin, last) != members:
+        return None  # a name is given twice
+    columns = parts[0] if len(parts) == 1 else [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
     return Batch(columns[0].size, columns)
 
 
-def _columns(rows: list[_Row]) -> list[Array] | None:
-    """Rows as columns; None where a frequency is missing, given twice or too large."""
-    named: dict[str, Any] = {name: list(map(attrgetter(name), rows)) for name in FIELDS}
+def _columns(rows: list[_Row]) -> tuple[list[Array], int] | None:
+    """Rows as columns, and how many members they have; None where a frequency is missing, given twice or too large."""
+    named: dict[str, Any] = {name: list(map(attrgetter(name), rows)) for name in INPUTS}
+    unset = named["f"].count(UNSET)
     try:
         k = array("d", named["k"])
     except TypeError:
         k = array("d", [math.inf if type(value) is not float else value for value in named["k"]])
     try:
         omega = array("d", named["omega"])
-        if any(row.f is not None for row in rows):
+        if any(type(value) is float for value in named["f"]):
             return None
     except TypeError:
-        if any((row.omega is None) == (row.f is None) or (row.f or 0.0) > MOST_HZ for row in rows):
+        pairs = list(zip(named["omega"], named["f"], strict=True))
+        if any(
+            (type(omega) is float) == (type(f) is float) or (type(f) is float and f > MOST_HZ) for omega, f in pairs
+        ):
             return None
-        omega = array("d", [row.omega if row.f is None else RAD_PER_CYCLE * row.f for row in rows])
+        omega = array("d", [omega if type(omega) is float else RAD_PER_CYCLE * f for omega, f in pairs])
+        unset += named["omega"].count(UNSET)
     columns = {name: array("d", named[name]) for name in FIELDS if name not in ("k", "omega")}
     columns.update(k=k, omega=omega)
-    return [np.frombuffer(columns[name]) if rows else np.empty(0) for name in FIELDS]
+    return [np.frombuffer(columns[name]) if rows else np.empty(0) for name in FIELDS], len(INPUTS) * len(rows) - unset
 
 
 def read_values(found: list[Any]) -> Batch:

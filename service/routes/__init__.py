@@ -1,11 +1,13 @@
 """The endpoints, and the dependencies that they share."""
 
+import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -13,8 +15,30 @@ from starlette.responses import FileResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from ..errors import FieldFault, faults_of, names_at, refusal
+from ..formats import unique_names
 
-__all__ = ["etag_matches", "file_answer", "no_query", "once_each", "parameters_of"]
+__all__ = ["JsonRoute", "etag_matches", "file_answer", "no_query", "once_each", "parameters_of"]
+
+
+class _Once(Request):
+    """A request whose JSON has no name twice."""
+
+    async def json(self) -> Any:
+        """Decode the body."""
+        return json.loads(await self.body(), object_pairs_hook=unique_names)
+
+
+class JsonRoute(APIRoute):
+    """Refuses a body in which an object has a name twice."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The usual handler of such a request."""
+        usual = super().get_route_handler()
+
+        async def answer(request: Request) -> Response:
+            return await usual(_Once(request.scope, request.receive))
+
+        return answer
 
 
 async def no_query(request: Request) -> None:

@@ -21,11 +21,11 @@ from ..openapi import problems
 from ..quantities import nested
 from ..questions import LawAnswer, LawFamilyAnswer, LawQuery, LawRequest
 from ..tables import LoadedTable, TablesDep, signature
-from . import no_query, once_each, parameters_of
+from . import JsonRoute, no_query, once_each, parameters_of
 
 __all__ = ["router"]
 
-router = APIRouter(tags=["answers"])
+router = APIRouter(tags=["answers"], route_class=JsonRoute)
 accepts("/v1/law", LawRequest.model_fields)
 accepts("/v1/law.csv", LawQuery.model_fields)
 

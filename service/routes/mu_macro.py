@@ -19,11 +19,11 @@ from ..quantities import cost_of
 from ..schemas import CaseAnswer, CaseQuery, CaseRequest
 from ..settings import cache_fields
 from ..tables import LoadedTable, TablesDep
-from . import etag_matches, no_query, once_each, parameters_of
+from . import JsonRoute, etag_matches, no_query, once_each, parameters_of
 
 __all__ = ["router"]
 
-router = APIRouter(tags=["answers"])
+router = APIRouter(tags=["answers"], route_class=JsonRoute)
 PATH, TEXT_PATH = "/v1/mu-macro", "/v1/mu-macro.txt"
 accepts(PATH, CaseRequest.model_fields)
 accepts(TEXT_PATH, [*CaseQuery.model_fields, "value"])

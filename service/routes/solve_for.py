@@ -19,11 +19,11 @@ from ..openapi import problems
 from ..questions import SolveForAnswer, SolveForRequest
 from ..schemas import canonical
 from ..tables import LoadedTable, TablesDep, signature
-from . import no_query
+from . import JsonRoute, no_query
 
 __all__ = ["router"]
 
-router = APIRouter(tags=["answers"])
+router = APIRouter(tags=["answers"], route_class=JsonRoute)
 _NO_LIMIT = 1e300
 accepts("/v1/solve-for", SolveForRequest.model_fields)
 
