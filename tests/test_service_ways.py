@@ -175,7 +175,8 @@ def test_a_name_given_twice_is_refused_in_every_form(client, problem, case, name
 
     for path, body in (
         (SINGLE, twice()), (SINGLE, twice(', "include": ["groups"]')), (BATCH, f"[{twice()}]"),
-        (BATCH, twice(', "include": ["groups"], "tolerance": 1e-3')), (BATCH, twice().replace(f"{case['v0']}", "[1, 2]")),
+        (BATCH, twice(', "include": ["groups"], "tolerance": 1e-3')),
+        (BATCH, twice().replace(f"{case['v0']}", "[1, 2]", 1)),
     ):  # fmt: skip
         (fault,) = problem(client.post(path, content=body, headers=JSON), 422)["errors"]
         assert (fault["field"], fault["reason"]) == (name, "is given more than once")
