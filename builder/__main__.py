@@ -123,7 +123,7 @@ def solve(
 def verify(
     table: Annotated[Path, typer.Argument(help="A table file.")],
     points: Annotated[int, typer.Option(min=100, max=10_000_000, help="Fresh solves to compare with.")] = 20_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the drawn points.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the drawn points.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = processors(),
 ) -> None:
     """Compare a table with fresh solves; exit code 1 when it misses its own tolerance."""

@@ -26,7 +26,7 @@ __all__ = ["ABS_TO_REL", "MAX_TOLERANCE", "MIN_TOLERANCE", "BuildError", "build_
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 ABS_TO_REL = 10.0  # the table's largest relative error may be this many times its tolerance
-SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of answers
+SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
@@ -37,7 +37,7 @@ REFERENCE = (
 
 
 class BuildError(RuntimeError):
-    """The tolerance was not reached; the message says where and by how much."""
+    """The tolerance was not reached; the message states where and by how much."""
 
 
 def stages() -> int:
@@ -46,7 +46,7 @@ def stages() -> int:
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
-    """The log-spaced grid that a person plots; finer for finer tables, nodes solved, not interpolated.
+    """The log-spaced grid for plots; finer for finer tables, nodes solved, not interpolated.
 
     mu~ and the stick fraction keep as many digits as the table's tolerance needs; ``error_estimate`` is the solver's
     and that of the rounding.
@@ -138,7 +138,7 @@ def finish_table(
     if report["max_abs_error"] > tolerance or report["max_rel_error"] > ABS_TO_REL * tolerance or report["not_covered"]:
         raise BuildError(
             f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} relative against a "
-            f"tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; {report['not_covered']} answers outside "
+            f"tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; {report['not_covered']} values outside "
             "their bound; no table was written"
         )
     power, stick, slopes = report["power"], report["stick_fraction"], report["slopes"]

@@ -168,7 +168,7 @@ def build_block(
         c = chebyshev_coefficients(values)
         left = [_tail(c, 0), _tail(c, 1)]
         for axis in (0, 1):
-            # twice no better by a third: what is left is the solver's rounding, which more nodes only gather
+            # twice no better by a third: what is left is the solver's rounding, to which more nodes only add
             stuck[axis] = 0 if left[axis] < 0.67 * best[axis] else stuck[axis] + 1
             best[axis] = min(best[axis], left[axis])
         grow_a = left[0] > wanted and na < MAX_NODES and stuck[0] < 3 and not tail_block

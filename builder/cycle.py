@@ -24,7 +24,7 @@ CASES = {
 
 
 def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """The steady cycle at v~ = ``v`` > 0, y~ = ``y`` [-], marched: an independent and simple witness for pictures.
+    """The steady cycle at v~ = ``v`` > 0, y~ = ``y`` [-], marched: an independent and simple method for pictures.
 
     The foot follows as far as the friction circle makes it: u <- P(u + dw), where dw is the motion of the upper point
     in a step and P the projection on the unit disc.  That is eqs. (9) to (12) to first order in the step.
@@ -56,7 +56,7 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
     along = v * tau[1]
     u, sticks = np.empty((steps, 2)), np.empty(steps, dtype=np.bool_)
     ux = uy = 0.0
-    for _ in range(math.ceil(3.0 / v)):  # a start is forgotten after a drag of some l0
+    for _ in range(math.ceil(3.0 / v)):  # the initial state decays after a drag of some l0
         for i in range(steps):
             ux, uy = ux + along, uy + across[i]
             stretch = math.hypot(ux, uy)

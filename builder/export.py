@@ -1,8 +1,8 @@
 """The plain grid of a table in the formats of other tools: CSV, MAT, Modelica's text tables, Parquet.
 
 The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and ``error_estimate`` over
-(``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all dimensionless.  It is a grid for tools that have
-an interpolation of their own; its nodes are solved, what lies between them is that tool's guess.  The tolerance of
+(``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all dimensionless.  It is a grid for tools with
+their own interpolation: its nodes are solved, the values between them depend on that tool.  The tolerance of
 the table is kept by :class:`mumacro.Surrogate` alone.
 
 Every file is written beside its name and then renamed, and the same table gives the same bytes.
@@ -42,7 +42,7 @@ _MAT_TEXT = 116
 
 
 class ExportError(MumacroError):
-    """A table that cannot be exported; the text says why."""
+    """A table that cannot be exported; the text states why."""
 
 
 def long_columns(table: Table) -> dict[str, Array]:
@@ -72,7 +72,7 @@ def _mat(table: Table, out: BinaryIO) -> None:
     content["info"] = {
         name: json.dumps(value) if isinstance(value, dict) else value for name, value in attributes.items()
     }
-    held: Any = io.BytesIO()  # it takes streams, too, though not all of its releases say so
+    held: Any = io.BytesIO()  # it takes streams, too, though not all of its releases document it
     savemat(held, content, do_compression=True, oned_as="column")
     data = bytearray(held.getvalue())
     text = f"MATLAB 5.0 MAT-file, mumacro table of tolerance {table.attributes['tolerance']:g}"

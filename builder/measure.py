@@ -90,7 +90,7 @@ def solver_noise(which: int, v: Array, y: Array, solved: dict[str, Array], slidi
 
 
 def _with_errors(surrogate: Surrogate, which: int, error: float, border_share: float) -> batch.Data:
-    """The table's arrays with one error for all blocks: answers' bounds are then their scale, plus rounding."""
+    """The table's arrays with one error for all blocks: bounds of values are then their scale, plus rounding."""
     coef, blocks, border, pieces = surrogate._of(which)
     blocks, pieces = blocks.copy(), pieces.copy()
     blocks[: len(CHARTS), ERROR:] = error

@@ -7,7 +7,7 @@ Two sections are used, because neither is well conditioned everywhere:
 * the *time section*: unknown sigma1 < 0, the instant at which slip starts; used at creeping speeds for y~ <= 1 and in
   the corner, where the window in which |u| > 1 is far shorter than any scan step and th0 hardly moves.
 
-``eta`` = y~ - 1 is an argument of its own: next to the corner rounding y~ to double costs 1e-16 / mu~.
+``eta`` = y~ - 1 is a separate argument: next to the corner rounding y~ to double costs 1e-16 / mu~.
 v = v~ [-], y = y~ [-]; angles and charts as in :mod:`.model`.
 """
 
@@ -216,7 +216,7 @@ def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: 
             return status
         lo, hi = (lo, z) if f > 0.0 else (z, hi)
         if f == 0.0 or spread * before < 1e-17:
-            # the secant method's error is about the product of its last two steps: this evaluation is the answer
+            # the secant method's error is about the product of its last two steps: this evaluation is the result
             return OK
         secant = f_old < math.inf and f != f_old
         if secant:
@@ -233,7 +233,7 @@ def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: 
             new = 0.1 * hi if lo == 0.0 and it < 40 else 0.5 * (lo + hi)
         if hi - lo <= 4e-16 * hi or new == z:
             return OK
-        # only a secant step tells how far the root still is
+        # only a secant step shows how far the root still is
         before, spread = spread, abs(new - z) / abs(new) if secant else math.inf
         z_old, f_old, z = z, f, new
     return NOT_CONVERGED

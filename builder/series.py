@@ -1,4 +1,4 @@
-"""Taylor series of the slip orbit over one step, and what is asked of them: values, integrals, roots.
+"""Taylor series of the slip orbit over one step, and the operations on them: values, integrals, roots.
 
 Every polynomial is a row (ORDER + 2,) of the workspace ``w``, its coefficients in powers of the time [rad] since the
 start of the step.  Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols as in :mod:`.model`.

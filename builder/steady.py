@@ -25,7 +25,7 @@ CONTINUOUS, STICK_SLIP = 0, 1
 REGIMES = ("continuous", "stick_slip")
 BAD_INPUT = 11
 
-_LOST = "the solver failed here, which is a fault of its own: a v~ that differs in the tenth digit will do"
+_LOST = "the solver failed here, which is a defect of the solver: use a v~ that differs in the tenth digit"
 ADVICE = {
     OK: "solved",
     model.NO_SLIP: "the stick phase never reaches the friction limit: " + _LOST,
@@ -87,7 +87,7 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
         if abs(step) < 1e-8 * scale or (out[model.PATH] > model.FORGOTTEN and abs(step) < 0.05):
             done = True
         if out[model.PATH] > model.FORGOTTEN:
-            # the start is forgotten within half a period: one more pass starts on the orbit
+            # the initial state decays within half a period: one more pass starts on the orbit
             th = -(x_end + chart_end * half)
     return NOT_CONVERGED
 
@@ -108,7 +108,7 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
         else:
             lo = z
         if f == 0.0 or (f_old < math.inf and abs(z - z_old) <= 1e-9 * z):
-            if f not in (0.0, f_old):  # both at rounding level: z is the answer
+            if f not in (0.0, f_old):  # both at rounding level: z is the root
                 z -= f * (z - z_old) / (f - f_old)
             mu = out[model.SUM_UX] / math.pi
             return z, (1.0 - out[model.SUM_DEFICIT] / math.pi if mu > 0.5 else mu), OK

@@ -1,4 +1,4 @@
-"""The stick phase in closed form: when does the spring reach the friction limit again?
+"""The stick phase in closed form: the time at which the spring reaches the friction limit again.
 
 During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit in the time, its first root ends it.
 Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1 [-]; angles of u as in :mod:`.model`.

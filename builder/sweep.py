@@ -32,7 +32,7 @@ _MU, _DEFICIT, _STICK, _POWER, _ERROR, _STATUS = range(len(COLUMNS))
 
 
 class SolveError(ArithmeticError):
-    """A node could not be solved; the message says which and what to do."""
+    """A node could not be solved; the message states which and what to do."""
 
 
 class CheckpointError(MumacroError):
@@ -124,7 +124,7 @@ class Sweep:
         Raises
         ------
         SolveError
-            When any point fails: a table with a hole would be worse than no table.
+            When any point fails: a table must have no missing node.
         """
         v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
         eta = y - 1.0 if eta is None else np.broadcast_to(eta, y.shape)
@@ -152,7 +152,7 @@ class Sweep:
     def _file(self, kind: str, points: Array) -> Path | None:
         if self.checkpoint is None:
             return None
-        # the digest of the sources: what another state of the solver found is not taken over
+        # the digest of the sources: results of another version of the solver are not reused
         digest = hashlib.sha256(
             (source_digest(SOURCES) + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
         ).hexdigest()

@@ -120,7 +120,7 @@ def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 
 
 
 class _Compared(NamedTuple):
-    """Errors beyond the solver's own, the bounds, and the sources of some answers."""
+    """Errors beyond the solver's own, the bounds, and the sources of some values."""
 
     error: Array
     bound: Array
@@ -164,12 +164,12 @@ def _compare_slopes(surrogate: Surrogate, sweep: Sweep, v: Array, y: Array, sour
 
 
 def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
-    """Compare the table with ``points`` fresh solves drawn as :data:`CASES` say.
+    """Compare the table with ``points`` fresh solves drawn as in :data:`CASES`.
 
     Returns
     -------
     dict
-        ``points``, ``max_abs_error``, ``max_rel_error``, ``not_covered`` (answers whose error exceeds their bound),
+        ``points``, ``max_abs_error``, ``max_rel_error``, ``not_covered`` (values whose error exceeds their bound),
         ``cases`` and ``sources`` (the same, by kind of case and by block or closed form), ``seam_jump``,
         ``seam_slope_jump``, ``monotony``; ``power`` (relative errors beyond the solver's own), ``stick_fraction`` and
         ``slopes`` (absolute ones): largest error, ``not_covered``, and the same by source.  Slopes are those of mu~

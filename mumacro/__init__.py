@@ -9,7 +9,7 @@ try:
     from mumacro.surrogate import Surrogate
     from mumacro.version import __version__
 except ModuleNotFoundError as _error:
-    # "python -m mumacro", "-m builder" and "-m service" say in one line what is missing; argv[0] is "-m" meanwhile.
+    # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing; argv[0] is "-m" meanwhile.
     if _sys.argv[:1] != ["-m"]:
         raise
     from mumacro.extras import missing as _missing

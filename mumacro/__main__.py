@@ -1,7 +1,7 @@
-"""The command ``mumacro`` (``python -m mumacro``): questions about macroscopic friction from the command line.
+"""The command ``mumacro`` (``python -m mumacro``): macroscopic friction from the command line.
 
-Exit codes: 0 answered, 1 an answer is impossible (a table, a file, a package, a target out of reach), 2 the command is
-written wrongly; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
+Exit codes: 0 done, 1 no result is possible (a table, a file, a package, a target out of reach), 2 wrong
+arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ inputs, SI units, each as name=value:
   v0     sliding speed [m/s], >= 0
 """
 OVERVIEW = f"""\
-What friction will I feel if I shake this contact sideways?
+Macroscopic friction of a contact that is oscillated transversely to its sliding direction.
 
   mumacro '{CASE}'         one case
   mumacro eval cases.parquet -o out.parquet                  files of cases: csv, ndjson, parquet
@@ -78,9 +78,9 @@ def _law(words: Sequence[str]) -> int:
     parser.add_argument("--along", choices=NAMES, default="v0", help="the swept input; default: v0")
     parser.add_argument("--from", dest="start", type=float, help="first value, in its SI unit")
     parser.add_argument("--to", dest="stop", type=float, help="last value, in its SI unit")
-    parser.add_argument("--points", type=int, default=25, help="how many; default: 25")
+    parser.add_argument("--points", type=int, default=25, help="number of values; default: 25")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
-    parser.add_argument("--approximations", action="store_true", help="beside it the approximations of the article")
+    parser.add_argument("--approximations", action="store_true", help="also print the approximations of the article")
     parser.add_argument(
         "--modelica", type=float, metavar="TOLERANCE",
         help="instead print the table f_pos of Modelica's SupportFriction, within that share of mu0 Fz",
@@ -91,7 +91,7 @@ def _law(words: Sequence[str]) -> int:
     if chosen.modelica is None and (chosen.start is None or chosen.stop is None):
         parser.error("the following arguments are required: --from, --to")
     if chosen.modelica is None and chosen.radius is not None:
-        parser.error("--radius goes with --modelica")
+        parser.error("--radius requires --modelica")
     print(command.law(chosen) if chosen.modelica is None else command.modelica_law(chosen))
     return 0
 
@@ -103,12 +103,12 @@ def _solve_for(words: Sequence[str]) -> int:
         epilog=f"{INPUTS}\nexample, the amplitude [m] that halves the friction:\n"
         "  mumacro solve-for y0 'mu0=0.3 Fz=10 k=1e6 f=20690 v0=0.01' --target 0.15",
     )
-    parser.add_argument("unknown", choices=NAMES, help="the input that is asked for")
+    parser.add_argument("unknown", choices=NAMES, help="the unknown input")
     parser.add_argument("words", nargs="+", metavar="name=value", help="the other five inputs")
     parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     parser.add_argument(
-        "--between", type=float, nargs=2, metavar=("LOW", "HIGH"), help="where to look, in the SI unit of the unknown"
+        "--between", type=float, nargs=2, metavar=("LOW", "HIGH"), help="range to search, in the SI unit of the unknown"
     )
     _add_table(parser)
     print(command.solve(parser.parse_intermixed_args(words)))

@@ -1,4 +1,4 @@
-"""The answer of the surrogate to one case or many."""
+"""The result of the surrogate for one case or many."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Answer:
     error_bound : float or ndarray
         Verified bound of the absolute error of ``mu_macro`` [-].
     source_code : int or ndarray of int8
-        Block or closed form that answered, index into :data:`mumacro.SOURCES`; -1 for an illegal case.
+        Block or closed form that gave the value, index into :data:`mumacro.SOURCES`; -1 for an illegal case.
     gradient : dict of str to float or ndarray, or None
-        d mu_macro / d input by field name, where it was asked for; infinite for v0 at v0 = 0 on y~ = 1.
+        d mu_macro / d input by field name, where requested; infinite for v0 at v0 = 0 on y~ = 1.
     gradient_bound : dict of str to float or ndarray, or None
         Verified bounds of the absolute errors of ``gradient``.
 
@@ -72,12 +72,12 @@ class Answer:
 
     def _group(self, place: int, name: str) -> Any:
         if self._groups is None:
-            raise AttributeError(f"{name} was not asked for: evaluate(..., groups=True)")
+            raise AttributeError(f"{name} was not requested: evaluate(..., groups=True)")
         return self._groups[place]
 
     @property
     def v_tilde(self) -> Any:
-        """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient were asked for."""
+        """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient were requested."""
         return self._group(0, "v_tilde")
 
     @property
@@ -116,7 +116,7 @@ class Answer:
 
     @property
     def source(self) -> Any:
-        """Name of the block or closed form that answered: str, or ndarray of shared str, made when asked for."""
+        """Name of the block or closed form that gave the value: str, or ndarray of shared str, made on request."""
         return self._by_source(_SOURCE_NAMES)
 
     def __repr__(self) -> str:

@@ -22,7 +22,7 @@ Codes = NDArray[np.int8]
 Data = tuple[Array, Array, Array, Array]
 
 SLICE = 16_384  # points a kernel is given at a time: its arrays stay in the second cache
-FEW = 65_536  # points that one thread answers before a second one has started
+FEW = 65_536  # points that one thread evaluates before a second one has started
 _NONE: Array = np.empty(0)
 
 
@@ -72,7 +72,7 @@ def cases(
         if odd:
             given: Any = (*six, *data, v, y, *answers)
             dimensional.other_cases(*given)
-        with np.errstate(all="ignore"):  # the caller may have set numpy to raise at underflow or NaN
+        with np.errstate(all="ignore"):  # the calling code may have set numpy to raise at underflow or NaN
             np.multiply(mu[part], six[0], out=macro[part])
             bound[part] *= six[0]
 

@@ -22,7 +22,7 @@ def bundled_tables() -> list[Path]:
     >>> sorted(path.name for path in bundled_tables())[0]
     'mumacro-1e-10.nc'
     """
-    # A folder "tables" beside the package may belong to another project; ours are named after us.
+    # A folder "tables" beside the package may belong to another project; this project's are mumacro-*.nc.
     for folder in (_PACKAGE / "data", _PACKAGE.parent / "tables"):
         found = sorted(folder.glob("mumacro-*.nc"))
         if found:

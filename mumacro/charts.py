@@ -157,7 +157,7 @@ _A_HIGH, _A_TAIL = Axis("ln_y", _LN(Y_HIGH), _LN(Y_TAIL)), Axis("inverse_y", 0.0
 _B_RHO, _B_S = Axis("ln_rho", 0.0, _LN(RHO_MAX)), Axis("s", 0.0, 1.0)
 _HYPOTENUSE, _SLOPE = "mu_ratio sqrt(1 + y_tilde^2/v_tilde^2)", "mu_ratio y_tilde/v_tilde"
 _LAYER = "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))"
-#: a block's place in this list is the source code of its answers
+#: a block's place in this list is the source code of its values
 CHARTS = (
     Chart("continuous_low", CONTINUOUS, _A_LOW, Axis("v_squared_share", 0.0, 1.0),
           "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2"),
@@ -201,8 +201,8 @@ BLOCK_COLUMNS = ERROR + 9
 PIECE_FIRST, PIECE_OFFSET, PIECE_STEP, PIECE_ERROR = range(4)
 PIECE_COLUMNS = 4
 
-ROUNDING = 2e-15  # of coordinates, Horner sums and the inputs' last digits, relative to the scale of the answer
-DENORMAL = 1e-306  # what an answer may lose where it leaves the normal range of double precision
+ROUNDING = 2e-15  # of coordinates, Horner sums and the inputs' last digits, relative to the scale of the value
+DENORMAL = 1e-306  # what a value may lose where it leaves the normal range of double precision
 
 _TINY, _HUGE = 1e-150, 1e150  # squares of what lies between are normal numbers
 _SPEED_TINY = 1e-290
@@ -504,7 +504,7 @@ def point(chart: Chart, a: Array, b: Array, border_of: Callable[[Array], Array])
     """The inverse: (v~, y~, eta = y~ - 1) at the table file's coordinates ``a``, ``b`` (broadcast together).
 
     eta is exact in the corner, where rounding y~ to double costs 1e-16/mu~.  ``border_of`` gives v~crit(y~): the stored
-    curve, so that nodes and answers use the same one.
+    curve, so that nodes and evaluation use the same one.
     """
     a, b = np.broadcast_arrays(a, b)
     if chart.a.name == "radius":

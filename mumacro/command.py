@@ -1,7 +1,7 @@
-"""What the command ``mumacro`` answers from the library alone: a case, a friction law, an inverse question, the table.
+"""What the command ``mumacro`` computes from the library alone: a case, a friction law, an inverse problem, the table.
 
-Every function here takes what the user wrote and returns the text to print; what is wrong with it is a UsageError, what
-cannot be answered an ImpossibleError.
+Every function here takes what the user wrote and returns the text to print; wrong arguments raise a UsageError, a
+request without a result an ImpossibleError.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ class UsageError(Exception):
 
 
 class ImpossibleError(Exception):
-    """The question is well put and has no answer; one line, with the reason."""
+    """The request is valid and has no result; one line, with the reason."""
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A fault, told in one line."""
+    """A fault, reported in one line."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
@@ -66,14 +66,14 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def read_case(words: Sequence[str], without: str | None = None) -> dict[str, float]:
-    """The inputs from words such as ``mu0=0.3 Fz=10``, in SI; an infinite ``k`` is rigid.
+    """The inputs from arguments such as ``mu0=0.3 Fz=10``, in SI; an infinite ``k`` is rigid.
 
     Parameters
     ----------
     words : sequence of str
         Each holds any number of ``name=value``.
     without : str, optional
-        The input that is asked for or swept, which must not be among them.
+        The unknown or swept input, which must not be among them.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def read_case(words: Sequence[str], without: str | None = None) -> dict[str, flo
     Raises
     ------
     UsageError
-        A word that is no ``name=value``, an unknown, repeated, missing or superfluous name, a value that is no number.
+        Text that is no ``name=value``, an unknown, repeated, missing or superfluous name, a value that is no number.
 
     Examples
     --------
@@ -113,7 +113,7 @@ def read_case(words: Sequence[str], without: str | None = None) -> dict[str, flo
 def _check_names(case: dict[str, float], without: str | None) -> None:
     other = {"f": "omega", "omega": "f"}
     for name in case.keys() & {without, other.get(without or "")}:
-        raise UsageError(f"leave {name} out: {without} is what is asked for")
+        raise UsageError(f"leave {name} out: {without} is the unknown or the swept input")
     if {"f", "omega"} <= case.keys():
         raise UsageError("give exactly one of omega [rad/s] and f [Hz]")
     absent = [
@@ -127,7 +127,7 @@ def _check_names(case: dict[str, float], without: str | None) -> None:
 def open_table(which: str | None) -> Surrogate:
     """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled one.
 
-    A first use compiles the kernels, which is said on stderr.
+    A first use compiles the kernels, which is reported on stderr.
     """
     if not kernels_are_cached():
         print(f"compiling kernels into {cache_folder() or 'memory'} (once)", file=sys.stderr, flush=True)

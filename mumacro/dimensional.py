@@ -88,7 +88,7 @@ def find_faults(columns: Mapping[str, ArrayLike | None]) -> list[Fault]:
 
 
 def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
-    """The six inputs as float64 arrays; their values are not looked at.
+    """The six inputs as float64 arrays; their values are not checked.
 
     ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, or None.
 

@@ -36,7 +36,7 @@ class InputError(MumacroError, ValueError):
         super().__init__(f"{field}{where} must be {bound}, got {_shown(value)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from the parts: an error that a worker process raises must reach its caller."""
+        """Rebuild from the parts: an error that a worker process raises must reach the calling process."""
         return type(self), (self.field, self.value, self.bound, self.index)
 
 

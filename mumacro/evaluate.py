@@ -1,8 +1,8 @@
 """From (v~, y~) to a value with its bound: one point, and many in passes that the compiler turns into vector code.
 
-A point's way through the blocks is a chain of branches that a processor cannot foresee.  So CHUNK points go together
-through :func:`mumacro.charts.place`, which selects instead of branching; what it does not know (the corner, closed
-forms, zero and extreme inputs) is marked and answered one by one by :func:`answer`.  One point and many give the same
+The choice of a point's block is a chain of branches that a processor cannot predict.  So CHUNK points go together
+through :func:`mumacro.charts.place`, which selects instead of branching; what it does not handle (the corner, closed
+forms, zero and extreme inputs) is marked and evaluated one by one by :func:`answer`.  One point and many give the same
 bits: they run the same functions.
 
 Arrays of a table, as :mod:`mumacro.cells` makes them: ``coef`` (patches, 8, 8) of a quantity, ``blocks`` (sources + 1,
@@ -350,7 +350,7 @@ def _slack(
     shaken = 0.0
     if block == CORNER:
         eta = y - 1.0
-        # d phi / d eta = -2 phi / stiff; where that is no longer linear over a digit of y~, the root itself is asked
+        # d phi / d eta = -2 phi / stiff; where that is no longer linear over a digit of y~, the root itself is computed
         digit = ROUNDING / (3.0 * phi * phi + 2.0 * eta)
         moved = digit if digit < 1e-3 else (charts.normal_form_root(v, eta - ROUNDING) - phi) / phi
         if quantity == MU:
@@ -463,7 +463,7 @@ def answer_with_slopes(
     errors = ERROR + 3 * quantity
     noise = 8.0 * ROUNDING * (scale * (1.0 + abs(form_v) + abs(form_y) + reach) + abs(base_v) + abs(base_y)) + DENORMAL
     bound_v = scale * blocks[block, errors + 1] * slope_weight(a_v, reach, form_v) + noise
-    # along y~ the border's own slope takes part in what the last cell is freed of
+    # along y~ what is removed from the last cell also depends on the border's slope
     ratio = reach / abs(b_v) if b_v != 0.0 else 1.0
     bound_y = scale * blocks[block, errors + 2] * slope_weight(a_y, b_y * ratio, form_y) + noise
     if block == CORNER:

@@ -8,7 +8,7 @@ _OURS = ("mumacro", "builder", "service")
 
 
 def missing(extra: str, error: ImportError) -> str:
-    """Say in one line what to install.
+    """State in one line what to install.
 
     Parameters
     ----------

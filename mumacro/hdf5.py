@@ -1,7 +1,7 @@
 """Reading HDF5 files from unknown sources: the parts of a netCDF-4 file, by name, with a limit of memory.
 
-The netCDF library reads all of a file when it opens it, follows links that lead back to where they came from until the
-stack is full, and unpacks what claims to be small.  Here only what is asked for is looked at, sizes are checked before
+The netCDF library reads all of a file when it opens it, follows cyclic links until the stack is full, and
+unpacks data beyond their declared size.  Here only the requested parts are read, sizes are checked before
 memory is taken, and numbers are unpacked up to the size that they have.
 """
 

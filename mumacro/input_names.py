@@ -1,4 +1,4 @@
-"""How people write the six inputs: their names, the names they are mistaken for, and the units they come in.
+"""The six inputs as text: their names, the names they are mistaken for, and their units.
 
 One table of units and one of other names, for the command line, for the columns of files and for hints anywhere else.
 An angular frequency ``omega`` [rad/s] may be given as a frequency ``f`` [Hz] in its place.
@@ -68,7 +68,7 @@ UNITS_OF: dict[str, dict[str, Scale]] = {
 }  # fmt: skip
 
 # Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a file that has one of
-# them while the input itself is nowhere is refused.
+# them while the input itself is missing is refused.
 _OTHER_NAMES = {
     "mu": "mu0", "mus": "mu0", "muk": "mu0", "mucoulomb": "mu0", "frictioncoefficient": "mu0",
     "coefficientoffriction": "mu0", "cof": "mu0", "µ": "mu0", "µ0": "mu0", "μ": "mu0", "μ0": "mu0",
@@ -131,7 +131,7 @@ def read_number(name: str, text: str) -> float:
     Raises
     ------
     ValueError
-        The text is not a plain number; the message says what to write.
+        The text is not a plain number; the message states what to write.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """How kernels are compiled, and where the compiled code is stored.
 
 numba compiles a kernel at its first call; the result is kept in a file.  Stored code is run as it is.  So its folder
-must belong to this user, and is named after a digest of all sources: after an update, old code would answer.  And every
+must belong to this user, and is named after a digest of all sources: after an update, old code would run.  And every
 file has a digest of its content: a damaged kernel is compiled again.
 """
 
@@ -32,7 +32,7 @@ _HERE = Path(__file__).resolve().parent
 _SUFFIX = ".kernel"
 _DIGEST = 32  # bytes in front of a file's content
 _log = logging.getLogger("mumacro.kernels")
-# How numba takes a compiled function apart and puts it together; its constructor would look for a folder of numba's.
+# How numba serializes a compiled function and rebuilds it; its constructor would look for a folder of numba's.
 _form: Any = CompileResultCacheImpl.__new__(CompileResultCacheImpl)
 
 
@@ -103,7 +103,7 @@ class _Stored:
     """The compiled code of one kernel on the disk, a file for every signature and processor.
 
     Takes the place of numba's own store, which keeps an index of its files beside them, raises on a file that is empty
-    or cut, runs one that is damaged, mixes up what several processes write at once, and lets no kernel answer that
+    or cut, runs one that is damaged, mixes up what several processes write at once, and runs no kernel that
     cannot be saved.
     """
 
@@ -134,7 +134,7 @@ class _Stored:
         return _form.rebuild(target, parts)
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Keep a kernel, if that is possible: it answers in any case."""
+        """Store a kernel if possible; it runs in any case."""
         if compiled.lifted or compiled.library.has_dynamic_globals:  # such code is of this process alone
             return
         path, what = self._place(signature, compiled.codegen)
@@ -186,7 +186,7 @@ def kernel(function: Callable[..., Any] | None = None, *, fuse: bool = True, bes
     folder = cache_folder(*(() if beside is None else (beside,)))
     # A switched-off numba gives the function back; what a closure holds is no part of a file's name.
     if folder is not None and hasattr(compiled, "enable_caching") and function.__closure__ is None:
-        compiled._cache = _Stored(function, folder)  # numba has no other place to say so
+        compiled._cache = _Stored(function, folder)  # numba has no other place to set this
     return compiled
 
 
@@ -201,7 +201,7 @@ def part(*, inline: bool = False, fuse: bool = True) -> Callable[[Function], Fun
 def part(function: Callable[..., Any] | None = None, *, inline: bool = False, fuse: bool = True) -> Any:
     """Compile a function that kernels call: it becomes part of their code, and is not stored separately.
 
-    With ``inline`` it is placed into every caller.  For small functions that return tuples: numba returns those
+    With ``inline`` it is placed into every calling kernel.  For small functions that return tuples: numba returns those
     through memory.
     """
     if function is None:

@@ -83,7 +83,7 @@ class Law:
     values : ndarray
         Its values [SI], ascending, shape (n,).
     answer : Answer
-        What the surrogate says at each, arrays (n,).
+        The surrogate's results, arrays (n,).
     mu_static : ndarray
         Static limit (v0 -> 0) of each case [-], eq. (38), shape (n,).
     border : tuple of Crossing
@@ -120,7 +120,7 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
         share = np.linspace(0.0, 1.0, points)
         values: Array = start * (1.0 - share) + stop * share
     else:
-        values = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))  # decades come out exactly
+        values = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))  # decades are exact
     values[0], values[-1] = start, stop
     np.clip(values, start, stop, out=values)
     return values
@@ -132,7 +132,7 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     Parameters
     ----------
     surrogate : Surrogate
-        The table that answers.
+        The table to evaluate.
     along : str
         The swept input: mu0, Fz, k, y0, omega or v0.
     values : ndarray
@@ -143,7 +143,7 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     Returns
     -------
     Law
-        The answers with the static limit, eq. (38), and the border of continuous sliding.
+        The results with the static limit, eq. (38), and the border of continuous sliding.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def straight_pieces(
     Parameters
     ----------
     surrogate : Surrogate
-        The table that answers.
+        The table to evaluate.
     case : mapping
         The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
     tolerance : float
@@ -245,7 +245,7 @@ def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | No
         ratio = np.where(v_safe > 0.0, y_safe / v_safe, np.inf)
         rigid = np.where(np.isfinite(ratio), closed_forms.outer(np.where(np.isfinite(ratio), ratio, 0.0)), 0.0)
         small = closed_forms.small_amplitude(np.minimum(v_safe, 1e150), y_low)
-    # rigid contact has no v~ and y~ of its own; eq. (37) is then the answer itself
+    # rigid contact has no finite v~ and y~; eq. (37) is then the result itself
     rigid = np.where(elastic, rigid, np.asarray(law.answer.mu_ratio))
     near = elastic & (np.abs(y_safe - 1.0) <= _CORNER_REACH) & (v_safe > 0.0) & (v_safe < 1.0)
     corner = np.full(v.shape, np.nan)
@@ -313,7 +313,7 @@ def borders(y: Array) -> dict[str, Array]:
 def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
     """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in :data:`BORDERS`; (n,).
 
-    NaN where an approximation is not meant to hold and where y~ is beyond double range; 0 for rigid contact and without
+    NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid contact and without
     oscillation, which never stick.
     """
     full: dict[str, Any] = {"k": None, **checked_case(case, law.along), law.along: law.values}

@@ -1,4 +1,4 @@
-"""How many processors there are for this process, and how many threads a call may start unasked."""
+"""How many processors there are for this process, and how many threads a call may start by default."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def processors() -> int:
 def default_threads() -> int:
     """The default number of threads of a call.
 
-    All processors in the main thread of a program.  One in any other thread and in a child process: whoever started
-    those (Dask, joblib, multiprocessing, a pool of threads) shares the work out already.
+    All processors in the main thread of a program.  One in any other thread and in a child process: what started
+    them (Dask, joblib, multiprocessing, a pool of threads) already divides the work.
     """
     if threading.current_thread() is not threading.main_thread() or multiprocessing.parent_process() is not None:
         return 1

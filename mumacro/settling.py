@@ -11,7 +11,7 @@ disturbance, of any size,
     abs(d) after n periods <= abs(d) exp(-n S/2),
 
 and for small ones exp(-n S) in continuous sliding, exp(-n S) cos^(2n)(th1 - th0) in stick-slip, where th0 and th1 are
-the angles at which the contact begins and ends to stick.  S follows from the energy that drive and shaker put in:
+the angles at which stick begins and ends.  S follows from the energy that drive and shaker put in:
 
     S = 2 pi (v~ mu~ + p),    p = <y~ cos tau u_y>, the oscillation power
 
@@ -76,7 +76,7 @@ def settling(
     Parameters
     ----------
     surrogate : Surrogate
-        The table that is asked for mu~ and for the oscillation power.
+        The table that gives mu~ and the oscillation power.
     mu0, Fz, k, y0, omega, v0 : array_like
         The case [-, N, N/m, m, rad/s, m/s], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float

@@ -1,4 +1,4 @@
-"""Tangential contact stiffness from materials and geometry: the input k that every question needs first.
+"""Tangential contact stiffness from materials and geometry: the input k that every evaluation needs.
 
 Half-space elasticity, two smooth elastic bodies, small strains:
 
@@ -196,7 +196,7 @@ def cylinder_on_flat(
 ) -> Contact:
     """A cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact.
 
-    A line contact of unlimited length has no stiffness of its own, since its displacement grows with the logarithm of
+    A line contact of unlimited length has no defined stiffness, since its displacement grows with the logarithm of
     the size of the bodies.  Here the contact is finite, and is replaced by the ellipse of the same area and
     proportions, which under a tangential force moves as one.  An estimate: right to about 10 % as far as the bodies are
     large beside ``length``.
@@ -268,7 +268,7 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
 
 
 def in_series(*stiffnesses: float) -> float:
-    """Stiffness [N/m] of springs one behind the other, such as contact, roughness and holder: 1/k = sum of 1/k_i.
+    """Stiffness [N/m] of springs in series, such as contact, roughness and holder: 1/k = sum of 1/k_i.
 
     Raises
     ------

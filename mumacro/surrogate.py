@@ -1,4 +1,4 @@
-"""The surrogate: what users hold.  Value, regime, source, gradient, power and stick fraction, each with its bound."""
+"""The surrogate for users.  Value, regime, source, gradient, power and stick fraction, each with its bound."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read
 __all__ = ["Surrogate"]
 
 Array = NDArray[np.float64]
-_PLACED = charts.CORNER, charts.FAST, charts.OTHER  # sources that common_ratio leaves to be answered
+_PLACED = charts.CORNER, charts.FAST, charts.OTHER  # sources that common_ratio does not evaluate
 
 
 class Surrogate:
@@ -68,13 +68,13 @@ class Surrogate:
             A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it; or None for the
             tightest bundled table.
         threads : int, optional
-            Threads that large arrays are shared out to; 1 never starts one.  Left out: all processors when called from
-            the main thread of a program; one in other threads and in child processes, which are shared out already.
+            Threads that large arrays are divided among; 1 never starts one.  Left out: all processors when called from
+            the main thread of a program; one in other threads and in child processes, where work is already divided.
 
         Returns
         -------
         Surrogate
-            Ready to answer; kernels compile at the first call, see :meth:`mumacro.Surrogate.warm_up`.
+            Ready for use; kernels compile at the first call, see :meth:`mumacro.Surrogate.warm_up`.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Surrogate:
         return cls(parse_table(image, path), path, threads, image)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle small: a bundled table by name and checksum, which also fits elsewhere; another with its bytes."""
+        """Pickle small: a bundled table by name and checksum, valid on another machine, too; another with its bytes."""
         if self.path.resolve() in (path.resolve() for path in bundled_tables()):
             return _reopen, (self.path.name, self.checksum, self._asked_threads, None)
         image = read_image(self.path) if self._image is None else self._image
@@ -107,7 +107,7 @@ class Surrogate:
 
     @property
     def threads(self) -> int:
-        """Threads that a large array is shared out to by a call from here."""
+        """Threads that a call from here divides a large array among."""
         return default_threads() if self._asked_threads is None else self._asked_threads
 
     @property
@@ -333,13 +333,13 @@ class Surrogate:
         Parameters
         ----------
         cases : mapping, pandas.DataFrame or xarray.Dataset, optional
-            The inputs by name, in place of keywords; other columns are passed by.
+            The inputs by name, in place of keywords; other columns are ignored.
         mu0 : array_like
             Coulomb friction coefficient [-], > 0.
         Fz : array_like
             Normal force [N], > 0.
         k : array_like or None
-            Tangential stiffness [N/m], > 0; None or inf is rigid contact, eq. (37).  It is always said.
+            Tangential stiffness [N/m], > 0; None or inf is rigid contact, eq. (37).  It must always be given.
         y0 : array_like
             Amplitude of the transverse oscillation [m], >= 0.
         omega : array_like
@@ -353,7 +353,7 @@ class Surrogate:
         groups : bool
             Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and gradients have them.
         illegal : str
-            What an illegal value of an array does: "nan" answers its case with NaN and the source -1, "raise" raises.
+            Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case, "raise" raises.
 
         Returns
         -------
@@ -400,8 +400,8 @@ class Surrogate:
     ) -> tuple[Array, Array, Array, NDArray[np.int8]]:
         """(mu_macro, mu~, bound of mu_macro, source code) of columns of float64, each of shape (n,) or (1,).
 
-        On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` says how many cases
-        there are where all columns have length 1.
+        On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` is the number of
+        cases where all columns have length 1.
         """
         columns = [_contiguous(c) for c in (mu0, Fz, k, y0, omega, v0)]
         if n is None:
@@ -422,7 +422,7 @@ class Surrogate:
         return found
 
     def _scalar_if_plain(self, inputs: Mapping[str, Any], gradient: bool) -> Answer | None:
-        """The answer to six legal plain floats, which need no arrays; None where an input is anything else."""
+        """The result for six legal plain floats, which need no arrays; None where an input is anything else."""
         a, b, c, d, e, f = (
             inputs["mu0"], inputs["Fz"], inputs["k"], inputs["y0"], inputs["omega"], inputs["v0"],
         )  # fmt: skip
@@ -565,8 +565,8 @@ def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | N
 def _picked(cases: Any) -> dict[str, Any]:
     """The inputs among the columns of a mapping, DataFrame or Dataset."""
     try:
-        cases.keys()  # which a list or a string has not
-        # coordinates of a Dataset are inputs, too, though no keys
+        cases.keys()  # which a list or a string does not have
+        # coordinates of a Dataset are inputs, too, although they are not keys
         picked = {name: cases[name] for name in (*dimensional.FIELDS, "f") if name in cases}
     except (AttributeError, TypeError, KeyError) as error:
         raise InputError(

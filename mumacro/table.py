@@ -2,13 +2,13 @@
 
 Layout (all quantities dimensionless, units "1"):
 
-* root: the plain log-spaced grid a person plots first, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
+* root: the plain log-spaced grid for plots, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
   ``error_estimate`` and ``v_tilde_crit(y_tilde)``, and the provenance as attributes;
 * group ``border``: one sub-group a piece of v~crit (:data:`mumacro.charts.BORDER_PIECES`);
 * group ``border/blocks``: one sub-group a block (:data:`mumacro.charts.CHARTS`): node coordinates, node values of
   mu~, power and stick fraction, the chart by name and range, the number of cells, the verified errors.
 
-The netCDF library writes, and is not safe for threads: one lock holds while it works.  It does not read: see
+The netCDF library writes, and is not thread-safe: a lock is held while it works.  For reading see
 ``mumacro.hdf5``.
 """
 
@@ -112,7 +112,7 @@ class Table:
 
 
 def _digest(table: Table) -> str:
-    """SHA-256 over every number that takes part in an answer or its bound, the geometry, and the tolerance."""
+    """SHA-256 over every number that affects a value or its bound, the geometry, and the tolerance."""
     h = hashlib.sha256()
 
     def put(*parts: object) -> None:
@@ -199,7 +199,7 @@ def write_table(table: Table, path: str | Path) -> str:
     table.attributes["content_sha256"] = _digest(table)
     try:
         image = _image(table)
-    except (OSError, RuntimeError) as error:  # the netCDF library says RuntimeError where it cannot write
+    except (OSError, RuntimeError) as error:  # the netCDF library raises RuntimeError where it cannot write
         where = f"in the folder of temporary files, {tempfile.gettempdir()}"
         raise TableError(path, f"cannot be made {where}: {getattr(error, 'strerror', None) or error}") from error
     try:
@@ -212,10 +212,10 @@ def write_table(table: Table, path: str | Path) -> str:
 def _image(table: Table) -> bytes:
     """The bytes of a file that holds ``table``.
 
-    Made among the temporary files: where the disk is full the netCDF library says little and keeps the file open.  What
+    A temporary file: where the disk is full the netCDF library reports little and keeps the file open.  What
     it makes in memory holds the time of day.
     """
-    import netCDF4  # only who builds tables has it
+    import netCDF4  # installed only to build tables
 
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         path = Path(folder) / "table.nc"
@@ -228,7 +228,7 @@ def _image(table: Table) -> bytes:
 
 
 class _Reader:
-    """One file; every refusal names it."""
+    """One file; every error names it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -350,7 +350,7 @@ def parse_table(image: bytes, path: str | Path) -> Table:
         digest = _digest(table)
     except TableError:
         raise
-    except Exception as error:  # h5py raises nearly all that there is
+    except Exception as error:  # h5py raises nearly any exception
         raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
     if digest != table.attributes["content_sha256"]:
         raise TableError(path, "checksum does not match the content: the file is damaged or was edited")

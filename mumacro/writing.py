@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, and folders that one process has to itself."""
+"""Files that are either complete or absent, and folders that one process has locked."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ __all__ = ["BusyError", "alone_in", "put", "sync_folder", "write_whole"]
 
 
 class BusyError(MumacroError):
-    """Another process is at work on the same output."""
+    """Another process is writing the same output."""
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk, where the system can."""
+    """Flush the names in a folder to the disk, if the system can."""
     if os.name == "nt":
         return
     handle = os.open(folder, os.O_RDONLY)

@@ -208,7 +208,7 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(tmp_path, capsys, 
             ",".join([*good[:2], "rigid", *good[3:]]), "", ",".join([*good[:4], "inf", good[5]]), GOOD]  # fmt: skip
     (tmp_path / "cases.csv").write_text("\n".join([HEADER, *rows]))
     out = tmp_path / f"out.{end}"
-    assert "4 of 10 rows answered" in ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
+    assert "4 of 10 rows evaluated" in ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
     found = read(out)
     assert [row["source"] for row in found] == ["stick_slip_low", "rigid", "rigid", "stick_slip_low"]
     if end == "parquet":

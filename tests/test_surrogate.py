@@ -373,7 +373,7 @@ def test_groups_of_arrays_are_returned_if_requested(tables_dir: Path) -> None:
     columns = {**CASE, "v0": np.array([0.0, 1e-3, 0.01])}
     plain = table.evaluate(**columns)
     for name in ("v_tilde", "y_tilde", "length_scale"):
-        with pytest.raises(AttributeError, match=f"{name} was not asked for"):
+        with pytest.raises(AttributeError, match=f"{name} was not requested"):
             getattr(plain, name)
     assert "v_tilde" not in repr(plain)
     for asked in (table.evaluate(**columns, groups=True), table.evaluate(**columns, gradient=True)):

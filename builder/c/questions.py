@@ -1,4 +1,4 @@
-"""What the header answers beyond the library's own scalar functions; written to be translated, see translate.py.
+"""What the header computes beyond the library's own scalar functions; written to be translated, see translate.py.
 
 Arrays are those of :mod:`mumacro.evaluate`; each quantity has its own ``coef`` and ``blocks``.
 """
@@ -49,7 +49,7 @@ def cycle(
         return 0.0, 0.0, 0.0, stick, stick_bound
     if k == math.inf:
         return 0.0, math.nan, math.nan, stick, stick_bound
-    if y == 0.0 and v < math.inf:  # whether such a contact sticks, the groups no longer tell
+    if y == 0.0 and v < math.inf:  # the groups no longer determine whether such a contact sticks
         stick_bound = 1.0
     if v == math.inf or y == math.inf:
         return math.nan, math.nan, math.nan, stick, stick_bound

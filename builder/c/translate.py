@@ -1,12 +1,12 @@
-"""From the library's scalar Python functions to C99: what is translated is the very source that numba compiles.
+"""From the library's scalar Python functions to C99: the translated source is the one that numba compiles.
 
 A function is translated where it is first called, with the types that the call has, as numba does; what it calls
 follows.  The language is the one the kernels are written in: floats, integers and truth values; ``if``, ``for`` over
 ``range``, conditional expressions; tuples as results; arrays that are parameters or constants, by index; and rows of
 arrays, element by element.  Anything else raises :class:`TranslationError` with the place, so that a kernel which
-outgrows the language is noticed when the header is made and not when it is used.
+leaves the language is found when the header is made and not when it is used.
 
-C has the meaning of Python: evaluation order, true division, comparison chains, ``min`` and ``max`` that keep the first
+C keeps Python's semantics: evaluation order, true division, comparison chains, ``min`` and ``max`` that keep the first
 of equals.  Operations are not reordered, so that C and the interpreted Python give the same bits wherever the two use
 the same mathematical library; the compiled kernels may differ in the last digits, since they fuse multiply-adds.
 """
@@ -54,7 +54,7 @@ class Translator:
     Attributes
     ----------
     functions : dict of str to str
-        C definitions by name, callees before callers.
+        C definitions by name, called functions first.
     structs : dict of str to Struct
         Tuple types by C name.
     macros : dict of str to str
@@ -107,7 +107,7 @@ class Translator:
 
 
 class _Function(Expressions):
-    """One function on its way to C."""
+    """One function during its translation to C."""
 
     def __init__(self, into: Translator, function: Any, name: str, types: list[Type]) -> None:
         super().__init__(into, function)
@@ -147,7 +147,7 @@ class _Function(Expressions):
         ])  # fmt: skip
 
     def unused(self, parameters: Sequence[str]) -> list[str]:
-        """Statements that keep compilers from asking about parameters that are not needed."""
+        """Statements that keep compilers from warning about unused parameters."""
         used = words_of(" ".join(self.lines))
         counts = [f"{n}_count" for n in parameters if counted(self.locals[n])]
         return [f"    (void){name};" for name in (*map(c_name, parameters), *counts) if name not in used]

@@ -1,4 +1,4 @@
-"""Files of cases, answered without a server: Parquet, CSV and NDJSON, in constant memory, resumable.  Needs pyarrow.
+"""Files of cases, evaluated without a server: Parquet, CSV and NDJSON, in constant memory, resumable.  Needs pyarrow.
 
 ``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes files.
 """

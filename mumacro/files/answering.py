@@ -1,4 +1,4 @@
-"""One Arrow record batch of cases in, the same batch with answers out, and a list of what could not be answered."""
+"""One Arrow record batch of cases in, the same batch with results out, and a list of rejected rows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "numbers"]
 
 Array = NDArray[np.float64]
 
-#: of a row without an answer: its index, the input (null: the row itself), the value, the reason
+#: of a row without a result: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema([("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())])
 
 _PLAIN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(?i:nan|inf|infinity)$"
@@ -47,14 +47,14 @@ def answer(
     rigid: bool = False,
     include: Sequence[str] = (),
 ) -> tuple[pa.RecordBatch, pa.RecordBatch]:
-    """Answer every case of a batch.
+    """Evaluate every case of a batch.
 
     Parameters
     ----------
     batch : pyarrow.RecordBatch
         Columns ``mu0`` [-], ``Fz`` [N], ``k`` [N/m], ``y0`` [m], ``omega`` [rad/s] or ``f`` [Hz], ``v0`` [m/s], with
         another unit where the heading has it in brackets; numbers or text.  A null, an empty or a ``rigid`` k is a
-        rigid contact.  Other columns come along as they are.
+        rigid contact.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
         The table; left out, the tightest one that comes with the library.
     rigid : bool
@@ -66,7 +66,7 @@ def answer(
     -------
     batch : pyarrow.RecordBatch
         As many rows in the same order, with mu_macro, mu_ratio, regime, error_bound and source; null where a case has
-        no answer.
+        no result.
     rejects : pyarrow.RecordBatch
         One row of ``REJECTS`` for each of those.
 

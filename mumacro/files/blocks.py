@@ -1,4 +1,4 @@
-"""Files of cases as blocks of whole records, from any record on: what reading and resuming are made of."""
+"""Files of cases as blocks of whole records, from any record on: the basis of reading and resuming."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Place(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A record without an answer: its number in its file (from 1), input, value, reason."""
+    """A record without a result: its number in its file (from 1), input, value, reason."""
 
     row: int
     field: str | None
@@ -54,7 +54,7 @@ class Block:
     rows : ndarray of int64
         Their numbers in the file, from 1.
     lines : pyarrow.Array or None
-        The records themselves, where they are to come out as they are.
+        The records themselves, where they are to be written unchanged.
     faults : list of Fault
         Those that could not be read.
     place : Place
@@ -122,7 +122,7 @@ def records_of(path: Path, place: Place, size: int, quotes: bool) -> Iterator[Re
     size : int
         Bytes to read at a time; where blocks end depends on the file and ``size`` alone.
     quotes : bool
-        CSV: a record goes on beyond the end of a line inside quotes.
+        CSV: a record continues beyond the end of a line inside quotes.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def records_of(path: Path, place: Place, size: int, quotes: bool) -> Iterator[Re
             stream.seek(place.at)
             rest, last = b"", False
             while not last:
-                # up to the next multiple of size: blocks are then the same from whichever record a run goes on
+                # up to the next multiple of size: blocks are then the same from whichever record a run continues
                 data = stream.read(size - stream.tell() % size)
                 last = not data
                 data, begin = rest + data, place
@@ -198,7 +198,7 @@ def _line_of(path: Path, offset: int) -> int:
 
 
 def decoding_fault(path: Path, records: Records, error: Exception) -> FilesError:
-    """What to say of text that pyarrow could not decode: which record, or what pyarrow says."""
+    """The error for text that pyarrow could not decode: which record, or pyarrow's message."""
     first = records.place.rows - len(records.texts)
     for i, text in enumerate(records.texts):
         try:

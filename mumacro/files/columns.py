@@ -21,7 +21,7 @@ class FilesError(MumacroError):
 
 @dataclass(frozen=True)
 class Columns:
-    """Where the inputs stand: by input (``omega`` or ``f``) the column and what its unit is in SI; no k when rigid."""
+    """Where the inputs are: by input (``omega`` or ``f``) the column and what its unit is in SI; no k when rigid."""
 
     places: dict[str, tuple[str, Scale]]
 
@@ -41,7 +41,7 @@ def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str]
     rigid : bool
         All contacts are rigid; then there must be no column for k.
     added : sequence of str
-        Names that answers will take.
+        Names of the columns that are added.
 
     Returns
     -------
@@ -51,8 +51,8 @@ def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str]
     Raises
     ------
     FilesError
-        A column that is there twice, would be written twice, has an unknown unit, or is missing; then a column that
-        looks like it is named.
+        A column that is there twice, would be written twice, has an unknown unit, or is missing; then a similar
+        column is named.
 
     Examples
     --------

@@ -20,26 +20,26 @@ from mumacro.files.run import Progress as Report
 __all__ = ["main"]
 
 _COLUMNS = """\
-columns, by name in any order; another unit stands in brackets, as in k [N/mm] or y0 [um]:
+columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   an empty cell or "rigid" in k is a rigid contact; without a column k give --rigid
-  other columns come along as they are
+  other columns are copied unchanged
 added: mu_macro, mu_ratio, regime, error_bound, source
-rows without an answer stand in OUT.rejects.csv only: row (from 1), field, value, reason
+rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason
 
 examples:
   mumacro eval cases.parquet -o out.parquet
   mumacro eval 'runs/2024-*.csv.gz' -o answers/ --table 1e-7
 
 A stopped run resumes when the same command is given again; the output has the same bytes.
-exit codes: 0 every row answered, 3 some rows rejected, 1 could not run, 2 wrong words, 130 interrupted
+exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wrong arguments, 130 interrupted
 """
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(
         prog="mumacro eval",
-        description="Answer every case of Parquet, CSV or NDJSON files (text also packed, .gz).",
+        description="Evaluate every case of Parquet, CSV or NDJSON files (text also compressed, .gz).",
         epilog=_COLUMNS,
     )
     parser.add_argument("cases", nargs="+", help="files, folders or patterns, all of one format")
@@ -51,8 +51,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--include", choices=("gradient",), action="append", default=[], help="add d mu_macro / d input"
     )
-    parser.add_argument("--on-error", choices=ON_ERROR, default="list", help="list rows without an answer, or stop")
-    parser.add_argument("--force", action="store_true", help="replace an output, drop the parts of another run")
+    parser.add_argument("--on-error", choices=ON_ERROR, default="list", help="list rejected rows, or stop")
+    parser.add_argument("--force", action="store_true", help="replace an output, delete the parts of another run")
     parser.add_argument("--part-rows", type=int, metavar="N", help="rows that a stopped run loses at the most")
     return parser
 
@@ -75,7 +75,7 @@ def _bar() -> Iterator[Report]:
 
 
 def _told(summary: Summary, table: str) -> str:
-    parts = [f"{summary.answered:,} of {summary.rows:,} rows answered by {table}: {summary.out}"]
+    parts = [f"{summary.answered:,} of {summary.rows:,} rows evaluated with {table}: {summary.out}"]
     if summary.rejects:
         parts.append(f"{summary.rejected:,} rejected: {summary.rejects}")
     if summary.resumed:

@@ -60,7 +60,7 @@ class Source(ABC):
     schema : pyarrow.Schema
         The columns of the blocks.
     cells_are_text : bool
-        Inputs are read as text, since any cell may be none.
+        Inputs are read as text, since any cell may hold no number.
     """
 
     names: list[str]
@@ -133,7 +133,7 @@ class ParquetSource(Source):
             self.schema = self.schema.append(found.schema.field(name))
 
     def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:  # noqa: ARG002
-        """Nothing is left to settle but the size of a batch."""
+        """Fix the size of a batch; the schema is known."""
         self.rows = max(1, min(ROWS, part_rows))
 
     def done(self, place: Place) -> float:
@@ -148,7 +148,7 @@ class ParquetSource(Source):
         before = 0
         with pa.parquet.ParquetFile(path, pre_buffer=False) as file:
             try:
-                # Group by group: batches then begin at the same rows from wherever a run goes on.
+                # Group by group: batches then begin at the same rows from wherever a run continues.
                 for i in range(file.num_row_groups):
                     rows = file.metadata.row_group(i).num_rows
                     if before + rows <= place.at:
@@ -315,7 +315,7 @@ def _without(records: Records, batch: pa.RecordBatch, wrong: dict[int, str], ver
         kept = np.ones(n, np.bool_)
         kept[list(wrong)] = False
         rows, texts = rows[kept], [text for i, text in enumerate(texts) if i not in wrong]
-    if batch.num_rows != len(texts):  # cannot happen; a row that is answered as another must not
+    if batch.num_rows != len(texts):  # cannot happen; no row may get the result of another
         raise FilesError(f"rows {first + 1} to {first + n}: {len(texts)} records, but {batch.num_rows} were read")
     lines = pa.array(texts, pa.large_binary()) if verbatim else None
     return Block(batch, rows, records.place, lines, faults)
@@ -441,7 +441,7 @@ class NdjsonSource(_TextSource):
 
 
 class _DoubtError(Exception):
-    """The quick reader may have taken something for what it is not."""
+    """The quick reader may have misread something."""
 
 
 def _json_table(texts: list[bytes], schema: pa.Schema, unexpected: str) -> pa.Table:

@@ -1,6 +1,6 @@
-"""A run over files of cases: parts, what is noted of each, going on after a stop, one output of all parts.
+"""A run over files of cases: parts, a note of each, resuming after a stop, one output of all parts.
 
-While it runs, ``OUT.parts`` holds a plan (what is answered, how, from which table), the finished parts, and a note of
+While it runs, ``OUT.parts`` holds a plan (inputs, options and table), the finished parts, and a note of
 each with the place where the next one begins.  A part that has its note is never made again, and one without it is
 written again from the place that the note before it names, with the same bytes.
 """
@@ -105,14 +105,14 @@ def evaluate_files(
     part_rows: int | None = None,
     progress: Progress = lambda _share, _rows, _rejected: None,
 ) -> Summary:
-    """Answer every case of some files.
+    """Evaluate every case of some files.
 
     Parameters
     ----------
     given : sequence of path
         Files, folders or patterns; all of one format.
     out : path
-        A file, whose ending tells the format, or a folder (that exists, or ends in ``/``) for a file a part, in the
+        A file, whose ending sets the format, or a folder (that exists, or ends in ``/``) for a file a part, in the
         format of the input.  Rows keep their order; a rejected row is not in it, but in ``OUT.rejects.csv``.
     surrogate : Surrogate
         The table.
@@ -121,7 +121,7 @@ def evaluate_files(
     include : sequence of str
         ``"gradient"`` adds d mu_macro / d input.
     on_error : str
-        ``"list"`` puts rows without an answer into the side file, ``"stop"`` raises at the first one.
+        ``"list"`` puts rejected rows into the side file, ``"stop"`` raises at the first one.
     force : bool
         Replace an output that exists, and delete the parts of another run.
     part_rows : int, optional
@@ -198,7 +198,7 @@ class _Run:
         }
 
     def _out_field(self, field: pa.Field) -> pa.Field:
-        """Inputs that were cells of text come out as numbers; all else as it is."""
+        """Inputs that were cells of text are written as numbers; all else is unchanged."""
         inputs = {column for column, _ in self.columns.places.values()}
         return field.with_type(pa.float64()) if self.source.cells_are_text and field.name in inputs else field
 
@@ -296,7 +296,7 @@ class _Run:
         return note
 
     def _answered(self, block: Block) -> tuple[pa.RecordBatch, list[Fault]]:
-        """The answered rows of a block (and their lines, in place), and what is wrong with the others."""
+        """The evaluated rows of a block (and their lines, in place), and what is wrong with the others."""
         batch, rejects = answer_columns(block.batch, self.surrogate, self.columns, self.include)
         faults = block.faults
         if rejects.num_rows:
@@ -333,7 +333,7 @@ class _Run:
     # --- finish -------------------------------------------------------------------------------------
 
     def finish(self, notes: list[_Note], resumed: int) -> Summary:
-        """One output of all parts; then the parts go."""
+        """One output of all parts; then the parts are deleted."""
         rejected = sum(note.rejected for note in notes)
         if rejected:
             head = [*(["file"] if len(self.source.files) > 1 else []), *Fault._fields]

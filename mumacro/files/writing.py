@@ -1,4 +1,4 @@
-"""Answered batches as Parquet, CSV or NDJSON: parts that get their name when they are whole, and one file of them."""
+"""Evaluated batches as Parquet, CSV or NDJSON: parts that get their name when complete, and one file of them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROWS = 262_144  # of a row group that is written
 
 def _bytes_of(lines: pa.Array) -> bytes:
     """All the text of an array without nulls, one after the other."""
-    lines = pa.concat_arrays([lines])  # an array of its own, whose text begins at its first entry
+    lines = pa.concat_arrays([lines])  # a separate array, whose text begins at its first entry
     if len(lines) == 0:
         return b""
     total = pc.sum(pc.binary_length(lines)).as_py()
@@ -111,7 +111,7 @@ def json_text(names: Sequence[str], columns: Sequence[pa.Array], lines: pa.Array
 
 
 class Part(ABC):
-    """A file that has another name until it is whole and on the disk."""
+    """A file that has another name until it is complete and on the disk."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -119,7 +119,7 @@ class Part(ABC):
 
     @abstractmethod
     def write(self, batch: pa.RecordBatch, lines: pa.Array | None, added: int) -> None:
-        """Append the rows; the last ``added`` columns are answers, the others stand in ``lines`` already."""
+        """Append the rows; the last ``added`` columns are results, the others are in ``lines`` already."""
 
     @abstractmethod
     def close(self) -> None:
@@ -131,7 +131,7 @@ class Part(ABC):
         put(self.growing, self.path)
 
     def discard(self) -> None:
-        """Leave nothing; what cannot be written any more, on a full disk, need not be."""
+        """Delete the file; on a full disk, data that cannot be written are dropped."""
         with suppress(OSError, pa.ArrowException):
             self.close()
         self.growing.unlink(missing_ok=True)

@@ -26,8 +26,8 @@ class Friction(DifferentiableFriction):
 
     Notes
     -----
-    Arguments broadcast together; answers are float64 of the broadcast shape, NaN where a case is illegal.  The table is
-    asked on the host, also from a program on another device.  Second derivatives raise NotImplementedError.  Where a
+    Arguments broadcast together; results are float64 of the broadcast shape, NaN where a case is illegal.  The table
+    is read on the host, also from a program on another device.  Second derivatives raise NotImplementedError.  Where a
     slope is infinite (v0 = 0 at y~ = 1, and for rigid contact), ``jacfwd`` gives NaN along every input.
 
     Raises
@@ -79,7 +79,7 @@ def _differentiable(quantity: Quantity) -> Any:
         moved = [
             gradient[..., i] * tangent
             for i, tangent in enumerate(tangents)
-            if type(tangent) is not jax.custom_derivatives.SymbolicZero  # an infinite slope times nothing is nothing
+            if type(tangent) is not jax.custom_derivatives.SymbolicZero  # infinite slope times zero tangent is zero
         ]
         return value(*primals), sum(moved)
 

@@ -1,4 +1,4 @@
-"""Labels survive: pandas, xarray and Dask objects in, the same out; Dask stays lazy.
+"""Labels are kept: pandas, xarray and Dask objects in, the same out; Dask stays lazy.
 
 The inputs of one call come from one of these libraries, with plain numbers and NumPy arrays beside them.
 """

@@ -24,8 +24,8 @@ class Friction(DifferentiableFriction):
 
     Notes
     -----
-    Arguments, tensors or numbers, broadcast together; answers are float64 of the broadcast shape, on the device of the
-    tensors, NaN where a case is illegal.  The table is asked on the host.  Second derivatives raise
+    Arguments, tensors or numbers, broadcast together; results are float64 of the broadcast shape, on the device of the
+    tensors, NaN where a case is illegal.  The table is evaluated on the host.  Second derivatives raise
     NotImplementedError.
 
     Examples

@@ -1,4 +1,4 @@
-"""The inverse question: which value of one input gives a wanted mu_macro."""
+"""The inverse problem: which value of one input gives a wanted mu_macro."""
 
 from mumacro.inverse.border import border_crossings
 from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case

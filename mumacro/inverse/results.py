@@ -1,4 +1,4 @@
-"""What the inverse question gives back, and the case that it is asked of."""
+"""The results of the inverse problem, and the case that it is solved for."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Root(NamedTuple):
         The unknown [SI].
     low, high : float
         Between them, and on the root's side of the next turning point, mu_macro is within the surrogate's error bound
-        of the target: the true root cannot be told from any of these values [SI].
+        of the target: the true root cannot be distinguished from any of these values [SI].
     mu_macro : float
-        What the surrogate says there [-].
+        The surrogate's value there [-].
     regime : str
         "continuous", "stick_slip" or "static".
     """
@@ -38,7 +38,7 @@ class Root(NamedTuple):
 
 @dataclass(frozen=True)
 class Reach:
-    """Which mu_macro can be had in a range of the unknown.
+    """Which mu_macro is reachable in a range of the unknown.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Reach:
     max_included: bool
 
     def holds(self, target: float) -> bool:
-        """Whether ``target`` can be had."""
+        """Whether ``target`` is reachable."""
         above = target > self.mu_min or (self.min_included and target == self.mu_min)
         return above and (target < self.mu_max or (self.max_included and target == self.mu_max))
 
@@ -70,13 +70,13 @@ class Solution:
     Attributes
     ----------
     unknown : str
-        The input that was asked for.
+        The input that was solved for.
     targets : tuple of float
         The wanted mu_macro [-].
     roots : tuple of tuple of Root
-        The roots of each target, ascending; empty where it cannot be had.
+        The roots of each target, ascending; empty where it is not reachable.
     reach : Reach
-        What can be had in the range that was searched.
+        What is reachable in the range that was searched.
     constant : bool
         True when the unknown has no influence on mu_macro, such as v0 without oscillation.
     """
@@ -118,7 +118,7 @@ def checked_case(case: Mapping[str, float | None], without: str) -> dict[str, fl
             raise InputError("f", frequency, f"at most {MOST_HZ:.4g} Hz, where omega leaves double range")
         given["omega"] = omega
     if given.get(without) is not None:
-        raise InputError(without, given[without], "left out, because it is what is asked for")
+        raise InputError(without, given[without], "left out, because it is the unknown")
     out: dict[str, float | None] = {}
     for name in FIELDS:
         if name == without:

@@ -1,8 +1,8 @@
-"""Where mu_macro, as a function of one input, comes to a level: bracketed Newton steps for many levels at once.
+"""Where mu_macro, as a function of one input, reaches a level: bracketed Newton steps for many levels at once.
 
-All levels of one question lie on one curve, so the curve is sampled once; a search in the samples brackets every level,
+All levels of one problem lie on one curve, so the curve is sampled once; a search in the samples brackets every level,
 and Newton's method in the logarithm of the input, with the surrogate's gradient, does the rest.  A step that leaves its
-bracket, that has no finite slope to go by (plateaus, the cusp of the static limit at y~ = 1) or that does not halve the
+bracket, that has no finite slope (plateaus, the cusp of the static limit at y~ = 1) or that does not halve the
 step before the last is replaced by halving the bracket: by its geometric mean, so that any scale is reached.
 """
 
@@ -36,7 +36,7 @@ class Sweep:
         self.case: dict[str, Any] = {"k": None, **case}
 
     def answer(self, x: Array) -> Answer:
-        """The surrogate's answers at the values ``x`` (n,) of the input [SI]."""
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]."""
         return self.surrogate.evaluate(**{**self.case, self.unknown: x})
 
     def mu(self, x: Array) -> Array:
@@ -49,7 +49,7 @@ class Sweep:
         return float(self.mu(np.array([x]))[0])
 
     def with_slope(self, x: Array) -> tuple[Answer, Array]:
-        """The answers and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
+        """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
         answer = self.surrogate.evaluate(**{**self.case, self.unknown: x}, gradient=True)
         gradient = answer.gradient or {}
         with np.errstate(over="ignore", invalid="ignore"):
@@ -72,7 +72,7 @@ class Curve:
         return out
 
     def meet(self, level: Array, leave: ArrayLike = False) -> Array:
-        """Where mu_macro comes to the levels (n,), or where ``leave`` is true goes beyond them, (n,) [SI].
+        """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,) [SI].
 
         To a rounding error of mu_macro; an end of the piece where it never does.
         """
@@ -136,13 +136,13 @@ def _ordered(x: ArrayLike) -> NDArray[np.int64]:
 def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike) -> tuple[Array, Array]:
     """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
 
-    For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like the integers that
-    their bits spell, so this ends at two neighbours, whatever the scale.
+    For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like the integers
+    with the same bits, so this ends at two neighbours, whatever the scale.
 
     Parameters
     ----------
     below : callable
-        Array (n, m) in, array of bool (n, m) out, row i judging bracket i; true at ``low``, false at ``high``, monotone
+        Array (n, m) in, array of bool (n, m) out, row i for bracket i; true at ``low``, false at ``high``, monotone
         in between.
     low, high : array_like
         Ends of the brackets, >= 0, shape (n,).

@@ -1,6 +1,6 @@
-"""The inverse question: which value of one input gives a wanted mu_macro; and where a sweep of it crosses the border.
+"""The inverse problem: which value of one input gives a wanted mu_macro; and where a sweep of it crosses the border.
 
-What is known of mu_macro as a function of one input, the others held:
+What is known of mu_macro as a function of one input, the others constant:
 
 =====  =====================================  ====================================================================
 input  course                                 roots
@@ -19,7 +19,7 @@ mu0    rises: it would fold only where        one, but searched like k and Fz
 
 The figures are those of benchmarks/folds.py, for r up to 1e8.
 
-How a level is met on a monotone piece: :mod:`mumacro.inverse.rootfinding`.
+How a level is found on a monotone piece: :mod:`mumacro.inverse.rootfinding`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ MONOTONE = ("v0", "y0", "omega")
 HUGE = 1.7976931348623157e308
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  At r = 10, three
-# percent above its birth, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
+# percent above its onset, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
 _PER_DECADE = 100
 _MAX_SAMPLES = 20_001
 # Elsewhere samples only bracket roots, for Newton's method to finish: close together within so many decades of where
@@ -145,7 +145,7 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
         if not which.size:
             continue
         wanted, start, end = targets[which], curve.x[0], curve.x[-1]
-        # a target that is the very value at an edge has its root there; just inside, rounding may say otherwise
+        # a target equal to the value at an edge has its root there; just inside, rounding may hide it
         value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
         last = wanted == curve.mu[-1]
         if last.any():
@@ -175,7 +175,7 @@ def _enclosures(
         step = bound / (curve.sign * slope)
         ends = np.concatenate((value * np.exp(-step), value * np.exp(step)))
         straight = (ends > curve.x[0]) & (ends < curve.x[-1]) & (np.concatenate((step, step)) > 0.0)
-    # most often the curve is straight over so short a way; where it is not, the levels are looked for
+    # most often the curve is straight over so short a way; where it is not, the levels are searched for
     tried = np.where(straight, ends, curve.x[0])
     straight &= np.abs(sweep.mu(tried) - levels) <= 0.01 * np.concatenate((bound, bound))
     curved = np.flatnonzero(~straight)
@@ -204,7 +204,7 @@ def solve_for(
     case : mapping
         The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
     within : (float, float), optional
-        Where to look [SI].  Left out: everywhere for v0, y0, omega; for k, Fz and mu0 from where the contact is so soft
+        Search range [SI].  Left out: everywhere for v0, y0, omega; for k, Fz and mu0 from where the contact is so soft
         that mu_macro = mu0 to where it is as good as rigid.
 
     Returns
@@ -215,7 +215,7 @@ def solve_for(
     Raises
     ------
     InputError
-        A value out of bounds, an unknown that is given or does not exist, a range that is none.
+        A value out of bounds, an unknown that is given or does not exist, an invalid range.
 
     Examples
     --------

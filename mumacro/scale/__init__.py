@@ -1,6 +1,6 @@
-"""More cases than fit in memory: designs that exist chunk by chunk, and answers reduced as they come.
+"""More cases than fit in memory: designs that exist chunk by chunk, and results reduced as they are computed.
 
-The arrays are Dask's in xarray's Datasets, so that a laptop and a cluster run the same lines.
+The arrays are Dask's in xarray's Datasets, so that a laptop and a cluster run the same code.
 Needs the extra ``dask``.
 """
 

@@ -1,4 +1,4 @@
-"""Lazy designs: a grid, and Sobol points by their counter.  A chunk is made by the worker that answers it."""
+"""Lazy designs: a grid, and Sobol points by their counter.  A chunk is made by the worker that evaluates it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ da: Any = dask.array  # of which parts have no types
 
 
 def grid(chunk: int = CHUNK, **inputs: Any) -> xr.Dataset:
-    """Every combination of the values of each input; nothing is made before it is asked for.
+    """Every combination of the values of each input; values are made on request.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def sobol(n: int, *, seed: int | None = 0, chunk: int = CHUNK, **inputs: Any) ->
     Parameters
     ----------
     n : int
-        Cases, up to 2^52; powers of two are evenest.
+        Cases, up to 2^52; powers of two are most even.
     seed : int or None
         Of the random digital shift that makes averages unbiased; other seeds give independent repetitions.  None leaves
         the sequence as it is.

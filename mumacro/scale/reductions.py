@@ -1,6 +1,6 @@
-"""What Dask and xarray lack to reduce answers chunk by chunk: quantiles with a bound, and the best case.
+"""Reductions chunk by chunk that Dask and xarray lack: quantiles with a bound, and the best case.
 
-Mean, standard deviation, extremes and histograms are their own: ``answer.mu_macro.mean()`` passes over illegal cases.
+Mean, standard deviation, extremes and histograms are theirs: ``answer.mu_macro.mean()`` skips illegal cases.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def quantiles(
     Parameters
     ----------
     values : xarray.DataArray or dask.array.Array
-        Any shape; NaN (illegal cases) is passed over.
+        Any shape; NaN (illegal cases) is skipped.
     q : array_like
         Probabilities, 0 to 1.
     low, high : float

@@ -30,7 +30,7 @@ _OPTIONS = (
 
 
 class WasmError(MumacroError):
-    """There is no compiler for WebAssembly, or it refuses the source; the text says which."""
+    """There is no compiler for WebAssembly, or it refuses the source; the text states which."""
 
 
 def compiler() -> list[str] | None:
