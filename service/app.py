@@ -72,7 +72,7 @@ def load(tables: Tables) -> None:
 
 def _load_more(tables: Tables) -> None:
     if tables.loaded:
-        # A whole case: of an empty object nothing would be spread over the cases, and that kernel stays unloaded.
+        # One whole case: an empty object would not call the kernel that fills the columns given by one number.
         case = bytearray(b'{"mu0":[0.3],"Fz":10,"k":1e6,"y0":2e-6,"omega":1.3e5,"v0":0.01}\0')
         numbers.read_columns(np.frombuffer(case, dtype=np.uint8), 0, len(case) - 1, np.empty((6, 1)))
         numbers_ready(now=True)

@@ -7,6 +7,7 @@ the value in a form that JSON can hold, and what it must be.  No traceback reach
 
 import json
 import math
+from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -45,6 +46,7 @@ __all__ = [
     "problem_of",
     "problem_response",
     "refusal",
+    "repeated",
     "safe_value",
 ]
 
@@ -258,6 +260,12 @@ def refusal(faults: Sequence[FieldFault]) -> InvalidFieldsError:
     first = faults[0]
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return InvalidFieldsError(f"{safe_value(first.field)}: {first.reason}{more}", faults)
+
+
+def repeated(names: Iterable[str], place: str = "pointer") -> list[FieldFault]:
+    """Faults of the names that are given more than once."""
+    counts = Counter(names).items()
+    return [FieldFault(name, "is given more than once", place=place) for name, count in counts if count > 1]
 
 
 def missing_inputs(given: Container[str], rigid: str) -> list[FieldFault]:

@@ -5,17 +5,14 @@ negotiation and the OpenAPI description use the registry.
 """
 
 import json
-from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from typing import Any, ClassVar, Protocol
 
-from ..errors import BatchTooLargeError, FieldFault, InvalidFieldsError, refusal
+from ..errors import BatchTooLargeError, InvalidFieldsError, MalformedBodyError, refusal, repeated
 from ..evaluation import Answers, Batch
 
 __all__ = [
-    "FORMATS", "Format", "choose", "limit_values", "media_types", "members_of", "refuse_repeated", "register",
-    "too_large", "unique_names",
+    "FORMATS", "Format", "choose", "decode", "limit_values", "media_types", "register", "too_large", "unique_names",
 ]  # fmt: skip
 
 
@@ -114,30 +111,35 @@ def unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """
     found = dict(pairs)
     if len(found) < len(pairs):
-        counts = Counter(name for name, _ in pairs)
-        raise refusal([FieldFault(name, "is given more than once") for name, count in counts.items() if count > 1])
+        raise refusal(repeated(name for name, _ in pairs))
     return found
 
 
-def refuse_repeated(text: bytearray, members: int) -> None:
-    """Refuse a body in which an object has a name twice.
+def decode(text: bytearray) -> Any:
+    """The value of a JSON text.  NaN and Infinity are accepted here; their fields are refused later.
 
-    A body has as many colons as members, unless it has a name twice or a colon in a string: only then it is read again.
+    The numbers are read by functions of Python, so that other threads run meanwhile.
 
     Raises
     ------
-    InvalidFieldsError
+    MalformedBodyError, InvalidFieldsError
+        Not JSON; an integer with too many digits, or a name that is given more than once.
     """
-    if text.count(b":") != members:
-        with suppress(ValueError, RecursionError):
-            json.loads(text, object_pairs_hook=unique_names)
+    try:
+        return json.loads(
+            text.decode(), object_pairs_hook=unique_names, parse_float=lambda digits: float(digits), parse_int=_integer
+        )
+    except RecursionError:
+        raise MalformedBodyError("the body is nested too deeply") from None
+    except ValueError as error:
+        raise MalformedBodyError(f"the body is not JSON: {error}") from None
 
 
-def members_of(value: Any) -> int:
-    """How many members the objects of a decoded body have."""
-    if isinstance(value, dict):
-        return len(value) + sum(map(members_of, value.values()))
-    return sum(members_of(entry) for entry in value if isinstance(entry, dict)) if isinstance(value, list) else 0
+def _integer(digits: str) -> int:
+    try:
+        return int(digits)
+    except ValueError:  # Python reads at most 4,300 digits
+        raise InvalidFieldsError("a number in the body is beyond double range") from None
 
 
 def _load() -> None:

@@ -15,18 +15,18 @@ from typing import Any, ClassVar, Literal
 import msgspec
 import numpy as np
 import orjson
-from pydantic_core import from_json
+from msgspec import UNSET, UnsetType
 
 from .. import numbers
-from ..errors import FieldFault, InvalidFieldsError, MalformedBodyError, missing_inputs, refusal, safe_value
+from ..errors import FieldFault, InvalidFieldsError, missing_inputs, refusal, safe_value
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason, angular_frequency
 from ..hints import TOO_FREQUENT, number_hint, unknown_name
 from ..kernel import BOUNDS, FIELDS, INPUTS, MOST_HZ, POSITIVE, REGIME_NAMES, SOURCES, Array
 from ..quantities import QUANTITIES, nested, parts_of
 from ..schemas import BatchColumns
-from . import limit_values, members_of, refuse_repeated, register, too_large
+from . import decode, limit_values, register, too_large
 
-__all__ = ["NAMES", "REGIMES_OF", "SOURCES_OF", "decode", "dump", "read_entry", "write_columns"]
+__all__ = ["NAMES", "REGIMES_OF", "SOURCES_OF", "dump", "read_entry", "write_columns"]
 
 OPTIONS = ("include", "tolerance", "std")
 NAMES = (*INPUTS, *OPTIONS)
@@ -46,11 +46,11 @@ class _Plain(msgspec.Struct, forbid_unknown_fields=True, gc=False):
     k: Stiff | list[Stiff]
     y0: Column
     v0: Column
-    omega: Column | None = None
-    f: Column | None = None
-    include: list[str] | None = None
-    tolerance: float | None = None
-    std: dict[str, float] | None = None
+    omega: Column | UnsetType | None = UNSET
+    f: Column | UnsetType | None = UNSET
+    include: list[str] | UnsetType | None = UNSET
+    tolerance: float | UnsetType | None = UNSET
+    std: dict[str, float] | UnsetType | None = UNSET
 
 
 _decoder = msgspec.json.Decoder(_Plain)
@@ -59,22 +59,6 @@ _decoder = msgspec.json.Decoder(_Plain)
 def dump(values: Mapping[str, Any]) -> bytes:
     """Write JSON; numbers that are not finite become null."""
     return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-def decode(text: bytearray) -> Any:
-    """The value of a JSON text.  NaN and Infinity are accepted here; their fields are refused later.
-
-    Raises
-    ------
-    MalformedBodyError, InvalidFieldsError
-        Not JSON; an integer with too many digits.
-    """
-    try:
-        return from_json(memoryview(text).tobytes())
-    except ValueError as error:
-        if str(error).startswith("number out of range"):
-            raise InvalidFieldsError("a number in the body is beyond double range") from None
-        raise MalformedBodyError(f"the body is not JSON: {error}") from None
 
 
 def read_entry(value: Any, name: str) -> tuple[float, str | None]:
@@ -113,19 +97,22 @@ class Columns:
         limit_values(text, max_batch, len(NAMES))
         try:
             plain = _decoder.decode(text)
-            given = {name: getattr(plain, name) for name in NAMES}
-            columns = {name: _converted(given[name]) for name in INPUTS if name == "k" or given[name] is not None}
+            given = {name: value for name in NAMES if (value := getattr(plain, name)) is not UNSET}
+            stated = {name: value for name, value in given.items() if value is not None or name == "k"}
+            columns = {name: _converted(stated[name]) for name in INPUTS if name in stated}
         except (msgspec.MsgspecError, ValueError, TypeError, OverflowError, RecursionError):
-            found = decode(text)
-            if not isinstance(found, dict):
-                reason = "must be an object of columns or a list of rows"
-                raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())]) from None
-            refuse_repeated(text, members_of(found))
-            return read_values(found, max_batch)
-        stated = sum(value is not None or name == "k" for name, value in given.items())
-        refuse_repeated(text, stated + len(plain.std or ()))
-        options = {name: given[name] for name in OPTIONS if given[name] is not None}
-        return _batch(columns, {}, [], max_batch), options
+            return self._read_values(text, max_batch)
+        # More colons than members: a name is given twice, or a string holds one.
+        if text.count(b":") != len(given) + len(stated.get("std", ())):
+            return self._read_values(text, max_batch)
+        return _batch(columns, {}, [], max_batch), {name: stated[name] for name in OPTIONS if name in stated}
+
+    def _read_values(self, text: bytearray, max_batch: int) -> tuple[Batch, dict[str, Any]]:
+        found = decode(text)
+        if not isinstance(found, dict):
+            reason = "must be an object of columns or a list of rows"
+            raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())])
+        return read_values(found, max_batch)
 
     def write(self, answers: Answers, label: Mapping[str, Any]) -> Iterator[bytes]:
         """See :class:`Format`."""

@@ -20,8 +20,8 @@ from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
 from ..hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA, TOO_FREQUENT, unknown_name
 from ..kernel import FIELDS, INPUTS, MOST_HZ, RAD_PER_CYCLE, Array
 from ..quantities import nested
-from . import limit_values, members_of, refuse_repeated, register, too_large
-from .columns import REGIMES_OF, SOURCES_OF, decode, dump, is_bool, read_entry
+from . import decode, limit_values, register, too_large
+from .columns import REGIMES_OF, SOURCES_OF, dump, is_bool, read_entry
 
 __all__ = ["decode_rows", "objects", "read_row", "read_values"]
 
@@ -65,7 +65,6 @@ class Rows:
         batch = decode_rows(text)
         if batch is None:
             found = decode(text)
-            refuse_repeated(text, members_of(found))
             if not isinstance(found, list):
                 reason = "must be an object of columns or a list of rows"
                 raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())])

@@ -1,7 +1,6 @@
 """The endpoints, and the dependencies that they share."""
 
 import json
-from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
-from ..errors import FieldFault, faults_of, names_at, refusal
+from ..errors import FieldFault, faults_of, names_at, refusal, repeated
 from ..formats import unique_names
 
 __all__ = ["JsonRoute", "etag_matches", "file_answer", "no_query", "once_each", "parameters_of"]
@@ -53,14 +52,9 @@ async def no_query(request: Request) -> None:
 async def once_each(request: Request) -> None:
     """Refuse parameters that are given more than once; ``include`` may be."""
     if request.scope["query_string"]:
-        counts = Counter(name for name, _ in request.query_params.multi_items())
-        faults = [
-            FieldFault(name, "is given more than once", place="parameter")
-            for name, count in counts.items()
-            if count > 1 and name != "include"
-        ]
+        faults = repeated((name for name, _ in request.query_params.multi_items() if name != "include"), "parameter")
         if faults:
-            raise refusal(faults[:100])
+            raise refusal(faults)
 
 
 @contextmanager

@@ -42,7 +42,6 @@ _AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are
 _LINES = 256 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
 _NO_QUERY = BatchQuery()
-_FORMS: dict[str, Format | None] = {}  # path -> the format that it takes; None: any
 
 
 class Batches:
@@ -355,20 +354,19 @@ class _Route(APIRoute):
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """A handler that calls FastAPI's own only if there is a query."""
-        usual, chosen = super().get_route_handler(), _FORMS[self.path]
+        usual = super().get_route_handler()
 
         async def answer(request: Request) -> Response:
             if request.scope["query_string"]:
                 return await usual(request)
-            tables_of(request)
-            return BatchResponse(request, request.app.state.batches, chosen, _NO_QUERY)
+            response: Response = await self.endpoint(_NO_QUERY, request, tables_of(request))
+            return response
 
         return answer
 
 
 def _add(path: str, chosen: Format | None) -> None:
     accepts(path, BatchQuery.model_fields)
-    _FORMS[path] = chosen
 
     async def post_batch(query: Annotated[BatchQuery, Query()], request: Request, _tables: TablesDep) -> Response:
         """Answer in the format of the request, order kept.  A bad case has the result null and an entry in ``errors``.
