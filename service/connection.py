@@ -31,7 +31,7 @@ _LINGER_S = 5.0  # how long the rest of an unused body is read, so that the clie
 _LINGER = 32 * 1024 * 1024  # and how many bytes of it
 _LAST_S = 0.25  # how long a stopping service still accepts a request on an open connection
 _STATUS = {status.value: f"HTTP/1.1 {status.value} {status.phrase}\r\n".encode() for status in HTTPStatus}
-_END = b"\r\n"
+_NOTED = frozenset({b"host", b"expect", b"transfer-encoding"})  # header fields that are used here
 _log = logging.getLogger("mumacro.error")
 
 
@@ -44,15 +44,17 @@ class _Exchange:
     """One request and its answer."""
 
     __slots__ = (
-        "answered", "body", "connection", "expects", "gone", "head", "keep", "left", "more", "scope", "started",
-        "taken", "task", "waiter",
+        "answered", "connection", "expects", "gone", "head", "keep", "left", "more", "pieces", "scope", "started",
+        "taken", "task", "unread", "waiter",
     )  # fmt: skip
 
     def __init__(self, connection: "Connection", scope: Scope, keep: bool, expects: bool) -> None:
         self.connection, self.scope = connection, scope
         self.keep = keep  # whether the connection stays open after it
         self.expects = expects  # whether the client waits for "100 Continue"
-        self.body, self.more = b"", True
+        self.pieces: list[bytes] = []  # of the body, that the application has not taken yet
+        self.unread = 0  # bytes in them
+        self.more = True
         self.taken = False  # whether the application has all of the body
         self.started = self.answered = self.gone = False
         self.head = b""  # of an answer of known length: written together with its first piece
@@ -80,10 +82,12 @@ class _Exchange:
             self.expects = False
             self.connection.write(b"HTTP/1.1 100 Continue\r\n\r\n")
         while not (self.gone or self.answered):
-            if self.body or not (self.more or self.taken):
-                body, self.body = self.body, b""
+            if self.pieces or not (self.more or self.taken):
+                pieces, self.pieces, self.unread = self.pieces, [], 0
+                body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
                 self.taken = not self.more
-                self.connection.regulate()
+                if self.connection.paused:
+                    self.connection.regulate()
                 return {"type": "http.request", "body": body, "more_body": self.more}
             self.waiter = asyncio.get_running_loop().create_future()
             await self.waiter
@@ -133,22 +137,22 @@ class _Exchange:
         fields = []
         for name, value in headers:
             name = name.lower()
-            if name == b"connection":
-                self.keep = self.keep and b"close" not in value.lower()
-                continue
             if name == b"content-length":
                 sized, self.left = True, 0.0 if bodiless else float(value)
-            fields.append(name + b": " + value)
+            elif name == b"connection":
+                self.keep = self.keep and b"close" not in value.lower()
+                continue
+            fields.append(b"%b: %b\r\n" % (name, value))
         if not sized:
             self.left = math.inf
-            fields.append(b"transfer-encoding: chunked")
+            fields.append(b"transfer-encoding: chunked\r\n")
         if not self.keep:
-            fields.append(b"connection: close")
-        text = b"".join([field + _END for field in fields])
+            fields.append(b"connection: close\r\n")
+        text = b"".join(fields)
         if text.count(b"\n") != len(fields) or text.count(b"\r") != len(fields) or b"\0" in text:
             raise RuntimeError("a header holds a line break or a zero byte")
         self.started = True
-        head = _STATUS[status] + self.connection.defaults() + text + _END
+        head = b"%b%b%b\r\n" % (_STATUS[status], self.connection.defaults(), text)
         if sized:
             self.head = head
         else:
@@ -180,7 +184,7 @@ class Connection(asyncio.Protocol):
         self._moved = False
         self._stopping = False
         self._deaf = False  # whether received bytes are discarded
-        self._paused = False
+        self.paused = False  # whether the socket is not read
         self.stalled: asyncio.Event | None = None  # while the client does not read
         self._clock: asyncio.TimerHandle | None = None
         self._idle_clock: asyncio.TimerHandle | None = None
@@ -266,11 +270,13 @@ class Connection(asyncio.Protocol):
             self._idle_bytes += len(data)
             if self._idle_bytes > _LINGER:
                 self._give_up()
-        elif not self._held and self._is_wanted and len(data) <= _HEADS:
-            self._parse(data)
-        else:
+        elif self._held or not self._is_wanted:
             self._held += data
             self._go_on()
+        elif len(data) <= _HEADS:
+            self._parse(data)
+        else:
+            self._feed(memoryview(data))
 
     # --- from bytes to requests -----------------------------------------------------------------------
 
@@ -287,7 +293,18 @@ class Connection(asyncio.Protocol):
             self._parse(piece)
         self.regulate()
 
-    def _parse(self, data: bytes) -> None:
+    def _feed(self, data: memoryview) -> None:
+        """Parse new bytes until a request waits for an earlier answer; hold the rest."""
+        start = 0
+        while start < len(data) and not self._deaf and self._is_wanted:
+            size = _HEADS if self._coming is None else _BODIES
+            self._parse(data[start : start + size])
+            start += size
+        if start < len(data) and not self._deaf:
+            self._held += data[start:]
+            self.regulate()
+
+    def _parse(self, data: bytes | memoryview) -> None:
         self._moved = False
         try:
             self._parser.feed_data(data)
@@ -311,7 +328,8 @@ class Connection(asyncio.Protocol):
             coming = self._coming
             if self._in_head or (coming is not None and (coming.answered or not _keeps_time(coming.scope))):
                 self._watch(self.timeout_s)
-        self.regulate()
+        if self._coming is not None or self._held:
+            self.regulate()
 
     def on_message_begin(self) -> None:
         """Callback of the parser: a request begins."""
@@ -326,13 +344,14 @@ class Connection(asyncio.Protocol):
         """Callback of the parser: a header field, or a trailer field, which is ignored."""
         if self._in_head:
             name = name.lower()
-            if name == b"host":
-                self._hosts += 1
-            elif name == b"expect":
-                self._expects = value.lower() == b"100-continue"
-            elif name == b"transfer-encoding" and value.lower() != b"chunked":
-                raise ValueError("an unknown transfer coding")
             self._headers.append((name, value))
+            if name in _NOTED:
+                if name == b"host":
+                    self._hosts += 1
+                elif name == b"expect":
+                    self._expects = value.lower() == b"100-continue"
+                elif value.lower() != b"chunked":
+                    raise ValueError("an unknown transfer coding")
 
     def on_headers_complete(self) -> None:
         """Callback of the parser: the head is complete."""
@@ -372,7 +391,8 @@ class Connection(asyncio.Protocol):
         self._moved = True
         exchange = self._coming
         if exchange is not None and not exchange.answered:
-            exchange.body = exchange.body + body if exchange.body else body
+            exchange.pieces.append(body)
+            exchange.unread += len(body)
             exchange.wake()
 
     def on_message_complete(self) -> None:
@@ -424,7 +444,8 @@ class Connection(asyncio.Protocol):
         self._rest()
         if self._queue:
             self._begin(self._queue.popleft())
-        self._go_on()
+        if self._held or self.paused:
+            self._go_on()
 
     def _last(self) -> Any:
         return self._queue[-1] if self._queue else self._now
@@ -477,11 +498,11 @@ class Connection(asyncio.Protocol):
         """Read the socket only while there is room in the buffers."""
         coming = self._coming
         full = len(self._held) > _AHEAD or (
-            coming is not None and not coming.answered and len(coming.body) > _UNREAD
+            coming is not None and not coming.answered and coming.unread > _UNREAD
         )  # fmt: skip
         full = full and not self._deaf
-        if full != self._paused:
-            self._paused = full
+        if full != self.paused:
+            self.paused = full
             if full:
                 self._transport.pause_reading()
             elif not self._transport.is_closing():

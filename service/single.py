@@ -91,35 +91,32 @@ class SingleCase:
             return
         method = scope["method"]
         headers: dict[bytes, bytes] = dict(scope["headers"])
-        reply = None
-        if self._is_plain(scope, headers):
+        holder = self._keys.holder(headers) if self._keys else None
+        reply, message = None, None
+        if (holder is not None or not self._keys) and self._is_plain(scope, headers):
             text = scope["query_string"]
             if method == "POST":
                 message = await receive()
-                receive = _again(message, receive)
                 text = message.get("body", b"") if not message.get("more_body") else b""
             try:
                 reply = self._get(text) if method == "GET" else self._post(text)
             except Exception:
                 reply = None  # the general path raises the same error; RequestRecord logs and answers it
         if reply is None:
-            await self.app(scope, receive, send)
+            await self.app(scope, receive if message is None else _again(message, receive), send)
             return
         self.answered += 1
         content, fields = reply
         identity = accept_request_id(headers.get(b"x-request-id"))
-        fields = [
-            (b"content-length", b"%d" % len(content)), _TYPE, *fields,
-            (b"x-request-id", identity.encode("ascii")), NOSNIFF,
-        ]  # fmt: skip
+        fields += (
+            _TYPE, NOSNIFF, (b"content-length", b"%d" % len(content)), (b"x-request-id", identity.encode("ascii")),
+        )  # fmt: skip
         await send({"type": "http.response.start", "status": 200, "headers": fields})
         await send({"type": "http.response.body", "body": content})
         seconds = time.perf_counter() - started
         self._metrics.count(CASE_PATH, method, 200, seconds)
         client = scope.get("client")
-        self._log.write(
-            identity, method, CASE_PATH, 200, seconds, client[0] if client else None, self._keys.holder(headers)
-        )
+        self._log.write(identity, method, CASE_PATH, 200, seconds, client[0] if client else None, holder)
 
     def _is_plain(self, scope: Scope, headers: dict[bytes, bytes]) -> bool:
         """Whether the head of a request allows the fast path."""
@@ -128,7 +125,6 @@ class SingleCase:
             or b"upgrade" in headers
             or self._tables.fault is not None
             or self._tables.draining
-            or (self._keys and self._keys.holder(headers) is None)
         ):
             return False
         if scope["method"] == "GET":
