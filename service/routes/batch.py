@@ -197,9 +197,9 @@ class BatchResponse(Response):
     async def _stream(self, receive: Receive, send: Send, media_type: str) -> None:
         """Answer each line as soon as it arrives; memory does not grow with the stream."""
         batches, work = self._batches, self._batches.work
-        length = self._request.headers.get("content-length")
-        if length is not None and (not length.isdigit() or len(length) > 18 or int(length) > batches.max_body_bytes):
-            raise batches.too_large()
+        # A client that gives a length may send all of the body before it reads: the answer then comes after the body.
+        # A client that gives no length may wait for the start of the answer before it sends more.
+        more = "content-length" not in self._request.headers
         options, place = self._options({}, "parameter")
         table = batches.tables.pick(options.tolerance, place)
         std = options.std.of_inputs() if options.std is not None else {}
@@ -207,18 +207,11 @@ class BatchResponse(Response):
         answers = LineAnswers(
             table, include, std, batches.max_batch, self._line, batches.count, self._request.scope["path"]
         )
+        text = bytearray() if more else await self._body(receive)
+        self._place()
         source = _Pieces(receive, work)
         patience = self._request.app.state.settings.client_timeout_s
         source.until = asyncio.get_running_loop().time() + patience
-        text, more = bytearray(), True
-        # A client that gives a length may send all of the body before it reads: the answer then comes after the body.
-        # A client that gives no length may wait for the start of the answer before it sends more.
-        while length is not None and more:
-            if len(text) > SMALL_BODY:
-                self._place()
-            came, more = await source.next()
-            text += came
-        self._place()
         reader = asyncio.create_task(source.read_on()) if more else None
         end = asyncio.get_running_loop().time() + self._request.app.state.settings.time_limit_s
         try:
@@ -229,7 +222,7 @@ class BatchResponse(Response):
             number = 0
             while True:
                 cut = len(text) if not more else text.rfind(b"\n") + 1
-                for lines in _cut(text[:cut], _LINES):
+                for lines in _cut(text, cut, _LINES):
                     pieces, count = await work.run(partial(_answered, answers, lines, number))
                     number += count
                     for piece in pieces:
@@ -313,11 +306,11 @@ class _Pieces:
         return text, self._more
 
 
-def _cut(text: bytearray, most: int) -> Iterator[bytearray]:
-    """Whole lines, some at a time, with one byte after the last."""
+def _cut(text: bytearray, stop: int, most: int) -> Iterator[bytearray]:
+    """Whole lines of the text before ``stop``, some at a time, with one byte after the last."""
     start = 0
-    while start < len(text):
-        end = len(text) if len(text) - start <= most else text.find(b"\n", start + most) + 1 or len(text)
+    while start < stop:
+        end = stop if stop - start <= most else text.find(b"\n", start + most, stop) + 1 or stop
         piece = text[start:end]
         yield piece if piece.endswith(b"\n") else piece + b"\n"
         start = end
