@@ -12,6 +12,8 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
+pytest.importorskip("openapi_python_client")
+
 PROGRAM = '''
 """Ask every operation with a JSON body, as a user of the generated client does."""
 
