@@ -204,6 +204,9 @@ def others(
             continue
         if code == FAST:
             value[i], error, _ = _fast(quantity, v[i], y[i])
+        elif code == CORNER and quantity != STICK:
+            a, b, phi = charts.corner(v[i], y[i])
+            value[i], error = _in_block(quantity, CORNER, v[i], y[i], a, b, phi, coef, blocks)
         else:
             value[i], error, source[i] = answer(quantity, v[i], y[i], coef, blocks, border, pieces)
         if bound.size > 0:
