@@ -26,8 +26,10 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +65,7 @@ KINDS = {
 }
 AT_ONCE = (1, 4, 8)  # the last: as many as are answered in parallel
 INCLUDED = tuple(name for name in QUANTITIES if name != "std")  # which needs deviations, too
-WAITED_FOR = 5  # batches during which short requests are sent
+WAITED_FOR = {100_000: 30, 1_000_000: 5}  # cases of the batches during which short requests are sent: their number
 LABELS = {
     "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
 }  # fmt: skip
@@ -514,31 +516,27 @@ def measure_waiting() -> list[list[str]]:
     case = json.dumps(cases(1)[0]).encode()
     path = get().paths[0]
     with ours() as server, peer("raw") as idle:
-        for form in KINDS:
-            progress(f"short requests beside {form}")
-            body = body_of(form, 1_000_000)
-            asked = {
-                "livez": (server, "GET", "/livez", b""), "case": (server, "POST", "/v1/mu-macro", case),
-                "idle": (idle, "GET", path, b""),
-            }  # fmt: skip
+        asked = {
+            "livez": (server, "GET", "/livez", b""), "case": (server, "POST", "/v1/mu-macro", case),
+            "idle": (idle, "GET", path, b""),
+        }  # fmt: skip
+        for n, form in product(WAITED_FOR, KINDS):
+            progress(f"short requests beside {n} cases as {form}")
+            body = body_of(form, n)
             waits: dict[str, list[float]] = {name: [] for name in asked}
-            for _ in range(WAITED_FOR):
-                done = threading.Event()
-
-                def large(form: str = form, body: bytes = body, done: threading.Event = done) -> None:
-                    _in_another_process(server.port, body, KINDS[form])
-                    done.set()
-
-                thread = threading.Thread(target=large)
-                thread.start()
-                while not done.is_set():
-                    for name, (other, method, target, content) in asked.items():
-                        begun = time.perf_counter()
-                        other.ask(method, target, content)
-                        waits[name].append(time.perf_counter() - begun)
-                thread.join()
+            for _ in range(WAITED_FOR[n]):
+                with ThreadPoolExecutor(1) as pool:
+                    large = pool.submit(_in_another_process, server.port, body, KINDS[form])
+                    while not large.done():
+                        for name, (other, method, target, content) in asked.items():
+                            begun = time.perf_counter()
+                            other.ask(method, target, content)
+                            waits[name].append(time.perf_counter() - begun)
+                    large.result()
             short = waits["livez"] + waits["case"]
-            rows.append([LABELS[form], str(len(short)), *_distribution(short), *_distribution(waits["idle"])])
+            rows.append([
+                f"{n:,}", LABELS[form], str(len(short)), *_distribution(short), *_distribution(waits["idle"])
+            ])  # fmt: skip
     return rows
 
 
@@ -818,7 +816,7 @@ def overview(single: dict[str, tuple[float, float]], rates: dict[str, dict[int, 
 def others(options: argparse.Namespace, folder: Path) -> dict[str, Callable[[], str]]:
     """The sections that are measured separately."""
     spread = ("median", "99 %", "99.9 %", "longest")
-    waiting = ["[ms] beside batches of 1,000,000 as", "requests", *spread, *(f"idle server: {name}" for name in spread)]
+    waiting = ["[ms] beside batches of", "as", "requests", *spread, *(f"idle server: {name}" for name in spread)]
     return {
         "includes": lambda: markdown(
             ["include", "one case [us]", "a case of 100,000 in columns [ns]"], measure_includes(options.rounds, folder)

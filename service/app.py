@@ -86,14 +86,22 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
     await loop.run_in_executor(threads, tables.load, app.state.metrics.start)
     if not tables.loaded:
         app.state.metrics.start([])
+    _freeze()
     tables.ready = tables.fault is None
     try:
         await loop.run_in_executor(threads, _load_more, tables)
     except Exception:
         _log.exception("some compiled code could not be loaded")
+    _freeze()
+
+
+def _freeze() -> None:
+    """Exclude all present objects from garbage collection.
+
+    A full collection visits a hundred thousand objects of the libraries.  No request is answered meanwhile, about 0.1 s.
+    So the first one is made before the service is ready; later ones do not visit frozen objects.
+    """
     if threading.current_thread() is threading.main_thread():
-        # A full garbage collection visits a hundred thousand objects of the libraries.  It takes about fifty
-        # milliseconds, in which no request is answered.  It does not visit frozen objects.
         gc.collect()
         gc.freeze()
 
