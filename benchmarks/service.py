@@ -782,7 +782,7 @@ def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path
         axes.set_xlabel("cases in a batch")
         axes.grid(True, color="#e4e4e4")
         axes.spines[["top", "right"]].set_visible(False)
-    right.legend(frameon=False, fontsize=8)
+    right.legend(framealpha=1.0, edgecolor="none", fontsize=8)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
