@@ -98,8 +98,8 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
 def _freeze() -> None:
     """Exclude all present objects from garbage collection.
 
-    A full collection visits a hundred thousand objects of the libraries.  No request is answered meanwhile, about 0.1 s.
-    So the first one is made before the service is ready; later ones do not visit frozen objects.
+    A full collection visits a hundred thousand objects of the libraries; for about 0.1 s no request is answered.  So
+    the first one is made before the service is ready; later ones do not visit frozen objects.
     """
     if threading.current_thread() is threading.main_thread():
         gc.collect()

@@ -196,3 +196,8 @@ class Page:
         rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
         self.browser.execute_cdp_cmd("Network.enable", {})
         self.browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": state, **rates})
+        self.run(  # the browser applies it a moment later
+            f"const state = {json.dumps(state)};"
+            " while ((await fetch('/livez').then(() => false, () => true)) !== state)"
+            " await new Promise((next) => setTimeout(next, 10));"
+        )
