@@ -204,7 +204,7 @@ def others(
             continue
         if code == FAST:
             value[i], error, _ = _fast(quantity, v[i], y[i])
-        elif code == CORNER and quantity != STICK:
+        elif code == CORNER and quantity != STICK:  # whose bound needs v~crit
             a, b, phi = charts.corner(v[i], y[i])
             value[i], error = _in_block(quantity, CORNER, v[i], y[i], a, b, phi, coef, blocks)
         else:

@@ -270,13 +270,13 @@ class Connection(asyncio.Protocol):
             self._idle_bytes += len(data)
             if self._idle_bytes > _LINGER:
                 self._give_up()
-        elif self._held or not self._is_wanted:
+        elif self._held:
             self._held += data
             self._go_on()
-        elif len(data) <= _HEADS:
+        elif len(data) <= _HEADS and self._is_wanted:
             self._parse(data)
         else:
-            self._feed(memoryview(data))
+            self._feed(data)
 
     # --- from bytes to requests -----------------------------------------------------------------------
 
@@ -285,23 +285,21 @@ class Connection(asyncio.Protocol):
         return self._now is None or self._coming is self._now
 
     def _go_on(self) -> None:
-        """Parse held bytes until a request waits for an earlier answer."""
-        while self._held and not self._deaf and self._is_wanted:
-            size = _HEADS if self._coming is None else _BODIES
-            piece = bytes(self._held[:size])
-            del self._held[:size]
-            self._parse(piece)
+        """Parse held bytes."""
+        if self._held and not self._deaf and self._is_wanted:
+            held, self._held = self._held, bytearray()
+            self._feed(held)
         self.regulate()
 
-    def _feed(self, data: memoryview) -> None:
-        """Parse new bytes until a request waits for an earlier answer; hold the rest."""
-        start = 0
+    def _feed(self, data: bytes | bytearray) -> None:
+        """Parse bytes until a request waits for an earlier answer; hold the rest."""
+        view, start = memoryview(data), 0
         while start < len(data) and not self._deaf and self._is_wanted:
             size = _HEADS if self._coming is None else _BODIES
-            self._parse(data[start : start + size])
+            self._parse(view[start : start + size])
             start += size
         if start < len(data) and not self._deaf:
-            self._held += data[start:]
+            self._held += view[start:]
             self.regulate()
 
     def _parse(self, data: bytes | memoryview) -> None:
@@ -328,7 +326,7 @@ class Connection(asyncio.Protocol):
             coming = self._coming
             if self._in_head or (coming is not None and (coming.answered or not _keeps_time(coming.scope))):
                 self._watch(self.timeout_s)
-        if self._coming is not None or self._held:
+        if self._coming is not None:
             self.regulate()
 
     def on_message_begin(self) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mumacro import Surrogate, charts, evaluate
+from mumacro import Surrogate, batch, charts, evaluate
 from mumacro.arithmetic import log, square_plus
 from mumacro.charts import CHARTS, RHO_MAX, SIGMA_CUT, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from mumacro.outer import QUICK_MAX, outer_expansion, outer_quick
@@ -52,6 +52,22 @@ def test_over_the_whole_quadrant(table: Surrogate) -> None:
     v, y = 10.0 ** rng.uniform(-3.0, 3.0, 30_000), 10.0 ** rng.uniform(-3.0, 3.0, 30_000)
     same(table, v, y)
     assert np.unique(table.ratio_with_bound(v, y)[2]).size >= len(CHARTS) - 1
+
+
+@pytest.mark.parametrize("quantity", [charts.POWER, charts.STICK])
+def test_other_quantities(table: Surrogate, quantity: int) -> None:
+    rng = np.random.default_rng(8)
+    v, y = 10.0 ** rng.uniform(-8.0, 4.0, 10_000), 10.0 ** rng.uniform(-4.0, 8.0, 10_000)
+    near = 10.0 ** rng.uniform(-8.0, -1.0, 3000), 1.0 + rng.uniform(-0.25, 0.5, 3000)
+    v, y = np.concatenate([v, near[0]]), np.concatenate([y, near[1]])
+    found = np.array([evaluate.answer(quantity, a, b, *table._data) for a, b in zip(v, y, strict=True)])
+    value, bound, source = batch.quantity(quantity, table._data, v, y, 1)
+    np.testing.assert_array_equal(source, found[:, 2])
+    np.testing.assert_array_equal(value, found[:, 0])
+    np.testing.assert_allclose(bound, found[:, 1], rtol=2.0**-52)  # its terms are added in another order
+    corner = source == charts.CORNER
+    assert np.count_nonzero(corner) > 1000
+    np.testing.assert_array_equal(bound[corner], found[corner, 1])
 
 
 def test_on_both_sides_of_every_seam(table: Surrogate) -> None:

@@ -125,6 +125,23 @@ async def empty(_scope, _receive, send):
     await send({"type": "http.response.body"})
 
 
+def test_large_bodies_and_the_requests_behind_them_are_kept_apart():
+    bodies = [bytes([97 + i]) * size for i, size in enumerate((0, 300_000, 5, 16_384, 70_000, 1, 65_536, 600_000))]
+    received = served(echo, b"".join(post("/", body) for body in bodies) + LAST)
+    head = b"HTTP/1.1 200 OK\r\ndate: now\r\ncontent-length: %d\r\n"
+    wanted = [head % len(body) + b"\r\n" + body for body in bodies]
+    assert received == b"".join(wanted) + head % 0 + b"connection: close\r\n\r\n"
+
+
+async def echo(_scope, receive, send):
+    body, more = b"", True
+    while more:
+        message = await receive()
+        body, more = body + message["body"], message["more_body"]
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % len(body))]})
+    await send({"type": "http.response.body", "body": body})
+
+
 def test_a_request_that_was_on_its_way_when_the_server_stopped_is_answered():
     answer = b"HTTP/1.1 204 No Content\r\ndate: now\r\nconnection: close\r\n\r\n"
     assert served(empty, GET, stopping=True) == answer

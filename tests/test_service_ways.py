@@ -177,7 +177,7 @@ def test_a_name_given_twice_is_refused_in_every_form(client, problem, case, name
         (SINGLE, twice()), (SINGLE, twice(', "include": ["groups"]')), (BATCH, f"[{twice()}]"),
         (BATCH, twice(', "include": ["groups"], "tolerance": 1e-3')),
         (BATCH, twice().replace(f"{case['v0']}", "[1, 2]", 1)), (BATCH, twice(', "f": null')),
-        ("/v1/law", twice(', "field": "v0"')), ("/v1/solve-for", twice(', "find": "y0", "mu_macro": 0.1')),
+        ("/v1/law", twice(', "start": 1, "stop": 2')), ("/v1/solve-for", twice(', "unknown": "y0", "target": 0.1')),
     ):  # fmt: skip
         (fault,) = problem(client.post(path, content=body, headers=JSON), 422)["errors"]
         assert (fault["field"], fault["reason"]) == (name, "is given more than once")

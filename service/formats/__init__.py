@@ -6,9 +6,9 @@ negotiation and the OpenAPI description use the registry.
 
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeVar
 
-from ..errors import BatchTooLargeError, InvalidFieldsError, MalformedBodyError, refusal, repeated
+from ..errors import BatchTooLargeError, FieldFault, InvalidFieldsError, MalformedBodyError, refusal, repeated
 from ..evaluation import Answers, Batch
 
 __all__ = [
@@ -54,6 +54,7 @@ class Format(Protocol):
         """The answer, piece by piece."""
 
 
+T = TypeVar("T")
 FORMATS: list[Format] = []
 MOST_MEMBERS = 16  # of an object of columns: the inputs and the options
 
@@ -115,24 +116,28 @@ def unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def decode(text: bytearray) -> Any:
-    """The value of a JSON text.  NaN and Infinity are accepted here; their fields are refused later.
+def decode(text: bytearray, kind: type[T]) -> T:
+    """The object or list of a JSON text.  NaN and Infinity are accepted here; their fields are refused later.
 
     The numbers are read by functions of Python, so that other threads run meanwhile.
 
     Raises
     ------
     MalformedBodyError, InvalidFieldsError
-        Not JSON; an integer with too many digits, or a name that is given more than once.
+        Not JSON; not of this kind, an integer with too many digits, or a name that is given more than once.
     """
     try:
-        return json.loads(
+        found = json.loads(
             text.decode(), object_pairs_hook=unique_names, parse_float=lambda digits: float(digits), parse_int=_integer
         )
     except RecursionError:
         raise MalformedBodyError("the body is nested too deeply") from None
     except ValueError as error:
         raise MalformedBodyError(f"the body is not JSON: {error}") from None
+    if not isinstance(found, kind):
+        reason = "must be an object of columns or a list of rows"
+        raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())])
+    return found
 
 
 def _integer(digits: str) -> int:

@@ -18,7 +18,7 @@ import orjson
 from msgspec import UNSET, UnsetType
 
 from .. import numbers
-from ..errors import FieldFault, InvalidFieldsError, missing_inputs, refusal, safe_value
+from ..errors import FieldFault, missing_inputs, refusal, safe_value
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason, angular_frequency
 from ..hints import TOO_FREQUENT, number_hint, unknown_name
 from ..kernel import BOUNDS, FIELDS, INPUTS, MOST_HZ, POSITIVE, REGIME_NAMES, SOURCES, Array
@@ -101,18 +101,11 @@ class Columns:
             stated = {name: value for name, value in given.items() if value is not None or name == "k"}
             columns = {name: _converted(stated[name]) for name in INPUTS if name in stated}
         except (msgspec.MsgspecError, ValueError, TypeError, OverflowError, RecursionError):
-            return self._read_values(text, max_batch)
+            return read_values(decode(text, dict), max_batch)
         # More colons than members: a name is given twice, or a string holds one.
         if text.count(b":") != len(given) + len(stated.get("std", ())):
-            return self._read_values(text, max_batch)
+            return read_values(decode(text, dict), max_batch)
         return _batch(columns, {}, [], max_batch), {name: stated[name] for name in OPTIONS if name in stated}
-
-    def _read_values(self, text: bytearray, max_batch: int) -> tuple[Batch, dict[str, Any]]:
-        found = decode(text)
-        if not isinstance(found, dict):
-            reason = "must be an object of columns or a list of rows"
-            raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())])
-        return read_values(found, max_batch)
 
     def write(self, answers: Answers, label: Mapping[str, Any]) -> Iterator[bytes]:
         """See :class:`Format`."""

@@ -15,7 +15,6 @@ import numpy as np
 import orjson
 from msgspec import UNSET, UnsetType
 
-from ..errors import FieldFault, InvalidFieldsError
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
 from ..hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA, TOO_FREQUENT, unknown_name
 from ..kernel import FIELDS, INPUTS, MOST_HZ, RAD_PER_CYCLE, Array
@@ -64,10 +63,7 @@ class Rows:
         limit_values(text, max_batch, len(INPUTS) + 1)
         batch = decode_rows(text)
         if batch is None:
-            found = decode(text)
-            if not isinstance(found, list):
-                reason = "must be an object of columns or a list of rows"
-                raise InvalidFieldsError(f"the body {reason}", [FieldFault("body", reason, found, path=())])
+            found = decode(text, list)
             batch = read_values(found) if len(found) <= max_batch else None
         if batch is None or batch.size > max_batch:
             raise too_large(max_batch)
