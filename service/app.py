@@ -15,7 +15,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
-import numpy as np
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
@@ -29,10 +28,9 @@ from starlette.staticfiles import StaticFiles
 from mumacro.errors import MumacroError
 from mumacro.processors import processors
 
-from . import __version__, numbers
+from . import __version__
 from .connection import Connection
 from .errors import answer_problem, invalid_request
-from .formats.columns import numbers_ready
 from .guard import Guard, Keys, Work, path_of
 from .logs import AccessLog
 from .metrics import Metrics
@@ -67,16 +65,7 @@ def _stand_back() -> None:
 def load(tables: Tables) -> None:
     """Load the tables, then the compiled code that the first answers do not need."""
     tables.load()
-    _load_more(tables)
-
-
-def _load_more(tables: Tables) -> None:
-    if tables.loaded:
-        # One whole case: an empty object would not call the kernel that fills the columns given by one number.
-        case = bytearray(b'{"mu0":[0.3],"Fz":10,"k":1e6,"y0":2e-6,"omega":1.3e5,"v0":0.01}\0')
-        numbers.read_columns(np.frombuffer(case, dtype=np.uint8), 0, len(case) - 1, np.empty((6, 1)))
-        numbers_ready(now=True)
-        tables.warm_up_more()
+    tables.warm_up_more()
 
 
 async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
@@ -89,7 +78,7 @@ async def _start(app: FastAPI, threads: ThreadPoolExecutor) -> None:
     _freeze()
     tables.ready = tables.fault is None
     try:
-        await loop.run_in_executor(threads, _load_more, tables)
+        await loop.run_in_executor(threads, tables.warm_up_more)
     except Exception:
         _log.exception("some compiled code could not be loaded")
     _freeze()

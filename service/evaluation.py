@@ -80,6 +80,13 @@ class Answers:
     errors: list[dict[str, Any]]
     extras: dict[str, Array] = field(default_factory=dict)
 
+    def part(self, start: int, stop: int) -> "Answers":
+        """The answers from ``start`` to ``stop``; there must be no bad case."""
+        part = slice(start, stop)
+        extras = {name: column[part] for name, column in self.extras.items()}
+        columns = self.mu_macro[part], self.mu_ratio[part], self.error_bound[part], self.source[part]
+        return Answers(stop - start, *columns, 0, [], extras)
+
 
 def default_answer(table: LoadedTable, inputs: tuple[float, ...]) -> tuple[dict[str, Any], int]:
     """The default answer to six legal inputs, as plain Python values, and the code of its source."""

@@ -1,8 +1,9 @@
-"""Compiled reader of plain numeric columns: from JSON text to arrays, without the interpreter's lock.
+"""Compiled reader of batches in JSON: from text to arrays, without the interpreter's lock.
 
-It accepts only ordinary columns: one object of the six inputs (``f`` for ``omega``), each a list of numbers or one
-number, ``null`` for ``k``.  :mod:`service.formats.columns` reads everything else.  Why no library is used here:
-docs/decisions/0011-wire.md.
+It accepts only the usual form: an object of the six inputs (``f`` for ``omega``), each a list of numbers or one number,
+or a list of such objects with one number each.  ``k`` may be null or "rigid", an unused ``omega`` or ``f`` null.  Other
+members of an object are skipped; the caller reads them.  Every other text has size 0: :mod:`service.formats` reads it
+again and finds the reason.  Why no library is used here: docs/decisions/0011-wire.md.
 
 Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at a gigabyte per second", Software:
 Practice and Experience 51 (2021), exactly rounded for up to 19 significant digits; numbers with more are not ordinary.
@@ -17,11 +18,15 @@ from mumacro.kernel_cache import kernel, part
 
 from .kernel import FIELDS, MOST_HZ, RAD_PER_CYCLE, Array
 
-__all__ = ["NO_ROOM", "read_columns"]
+__all__ = ["BLOCK", "CASE", "MOST_SPANS", "NO_ROOM", "ROWS", "load", "read", "read_lines"]
 
 Bytes = NDArray[np.uint8]
-#: what :func:`read_columns` returns where there is no room for the cases
+#: forms of a text: an object of numbers, one with lists, a list of objects
+CASE, BLOCK, ROWS = range(3)
+#: the size of a text that has more cases than there is room for
 NO_ROOM = -1
+#: members other than inputs that an object may have
+MOST_SPANS = 3
 
 _U = np.uint64
 _SMALLEST, _LARGEST = -342, 308  # decimal exponents
@@ -34,6 +39,8 @@ _ZEROS, _UPPER, _LIFT = _U(0x3030303030303030), _U(0xF0F0F0F0F0F0F0F0), _U(0x060
 _PAIRS, _WEIGHT_1, _WEIGHT_2 = _U(0x000000FF000000FF), _U(0x000F424000000064), _U(0x0000271000000001)
 _EIGHT = _U(100_000_000)
 _NAMES = np.array([int.from_bytes(name.encode(), "little") for name in (*FIELDS, "f")], dtype=np.uint64)
+_RIGID = np.frombuffer(b'"rigid"', dtype=np.uint8)
+_INFINITE = _U(0x7FF0_0000_0000_0000)
 _K, _OMEGA, _F = FIELDS.index("k"), FIELDS.index("omega"), len(FIELDS)
 
 
@@ -181,27 +188,41 @@ def _number(text: Bytes, i: int) -> tuple[np.uint64, int]:
 
 
 @_inlined
-def _is_null(text: Bytes, i: int) -> bool:
+def _null(text: Bytes, i: int) -> bool:
     found: bool = text[_U(i)] == 110 and text[_U(i + 1)] == 117 and text[_U(i + 2)] == 108 and text[_U(i + 3)] == 108
     return found
 
 
+@_inlined
+def _rigid(text: Bytes, i: int) -> int:
+    """Index after ``null`` or ``"rigid"`` at ``i``, or -1."""
+    if _null(text, i):
+        return i + 4
+    for j in range(_RIGID.size):
+        if text[_U(i + j)] != _RIGID[_U(j)]:
+            return -1
+    return i + int(_RIGID.size)
+
+
 @_compiled
-def _list(text: Bytes, i: int, row: NDArray[np.uint64], nullable: bool) -> tuple[int, int]:
-    """(index after the list whose first entry is expected at ``i``, entries), or (-1, _); (-2, _): no room."""
+def _values(text: Bytes, i: int, row: NDArray[np.uint64], stiff: bool) -> tuple[int, int]:
+    """(index after the number or list at ``i``, its entries, 0 for a number), or (-1, _); (-2, _): no room."""
     n = 0
-    i = _space(text, i)
-    if text[_U(i)] == 93:
-        return i + 1, 0
+    listed = text[_U(i)] == 91
+    if listed:
+        i = _space(text, i + 1)
     while True:
         if n == row.size:
             return -2, n
         bits, end = _number(text, i)
         if end < 0:
-            if not (nullable and _is_null(text, i)):
+            end = _rigid(text, i) if stiff else -1
+            if end < 0:
                 return -1, n
-            bits, end = _U(0x7FF0_0000_0000_0000), i + 4
+            bits = _INFINITE
         row[_U(n)] = bits
+        if not listed:
+            return end, 0
         n += 1
         i = _space(text, end)
         if text[_U(i)] == 93:
@@ -229,88 +250,197 @@ def _field(text: Bytes, i: int) -> tuple[int, int]:
     return -1, i
 
 
+@_inlined
+def _member_end(text: Bytes, i: int, stop: int) -> int:
+    """Index of the comma or brace after the member at ``i``, or -1.  Its own text is not checked."""
+    depth, quoted = 0, False
+    while i < stop:
+        c = text[_U(i)]
+        if quoted:
+            i += int(c == 92)
+            quoted = c != 34
+        elif c == 34:
+            quoted = True
+        elif depth == 0 and (c == 44 or c == 125):
+            return i
+        elif c == 91 or c == 123:
+            depth += 1
+        elif c == 93 or c == 125:
+            depth -= 1
+        i += 1
+    return -1
+
+
+@_inlined
+def _repeat(words: NDArray[np.uint64], first: int, size: int, listed: int) -> bool:
+    """Repeat the values that hold for all cases; False where one is out of bounds, which is no reason of one case."""
+    for row in range(6):
+        if not listed >> row & 1:
+            bits = words[row, first]
+            if bits >= _SIGN or (bits == _0 and row < 3):
+                return False
+            for case in range(first, first + size):
+                words[row, case] = bits
+    return True
+
+
+@_inlined
+def _hertz(words: NDArray[np.uint64], first: int, size: int) -> bool:
+    """Turn f into omega; False where one is too large."""
+    for case in range(first, first + size):
+        f = _U(words[_OMEGA, case]).view(np.float64)
+        if f > MOST_HZ:
+            return False
+        words[_OMEGA, case] = np.float64(f * RAD_PER_CYCLE).view(np.uint64)
+    return True
+
+
 @_compiled
-def _object(text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: int) -> tuple[int, int, int]:
-    """(cases, bits of the inputs that came as lists, whether f is there); 0 cases for what is not ordinary."""
-    size, seen, listed = -1, 0, 0
-    i = _space(text, i)
+def _object(
+    text: Bytes, i: int, stop: int, words: NDArray[np.uint64], first: int, spans: NDArray[np.int64]
+) -> tuple[int, int, int, int]:
+    """(index after the object at ``i``, cases, bits of the inputs that came as lists, other members).
+
+    0 cases: not ordinary.  ``words`` are the bits of the columns.
+    """
+    size, named, seen, listed, others = -1, 0, 0, 0, 0
     if text[_U(i)] != 123:
-        return 0, 0, 0
+        return i, 0, 0, 0
     while True:
-        field, i = _field(text, _space(text, i + 1))
-        row = _OMEGA if field == _F else field
-        if field < 0 or seen >> row & 1:
-            return 0, 0, 0
-        seen |= 1 << row | (int(field == _F) << 6)
-        i = _space(text, i)
-        if text[_U(i)] != 58:
-            return 0, 0, 0
-        i = _space(text, i + 1)
-        if text[_U(i)] == 91:
-            i, n = _list(text, i + 1, words[row, first:], row == _K)
-            if i == -2:
-                return NO_ROOM, 0, 0
-            if i < 0 or n == 0 or (listed and n != size):
-                return 0, 0, 0
-            size = n
-            listed |= 1 << row
+        start = _space(text, i + 1)
+        field, i = _field(text, start)
+        if field < 0:
+            if others == spans.shape[0] or text[_U(start)] != 34:
+                return i, 0, 0, 0
+            i = _member_end(text, start, stop)
+            if i < 0:
+                return i, 0, 0, 0
+            spans[others, 0], spans[others, 1] = start, i
+            others += 1
         else:
-            bits, end = _number(text, i)
-            if end < 0:
-                if row != _K or not _is_null(text, i):
-                    return 0, 0, 0
-                bits, end = _U(0x7FF0_0000_0000_0000), i + 4
-            elif bits >= _SIGN or (bits == _0 and row < 3):
-                return 0, 0, 0  # a bad number that would hold for every case: refused by service.formats.columns
-            if first == words.shape[1]:
-                return NO_ROOM, 0, 0
-            words[row, first] = bits
-            i = end
-        i = _space(text, i)
+            row = _OMEGA if field == _F else field
+            if named >> field & 1:
+                return i, 0, 0, 0
+            named |= 1 << field
+            i = _space(text, i)
+            if text[_U(i)] != 58:
+                return i, 0, 0, 0
+            i = _space(text, i + 1)
+            if row == _OMEGA and _null(text, i):
+                i += 4
+            elif seen >> row & 1:
+                return i, 0, 0, 0
+            else:
+                i, n = _values(text, i, words[row, first:], row == _K)
+                if i < 0 or (n and listed and n != size):
+                    return i, NO_ROOM if i == -2 else 0, 0, 0
+                seen |= 1 << row | int(field == _F) << 6
+                if n:
+                    size = n
+                    listed |= 1 << row
+            i = _space(text, i)
         if text[_U(i)] == 125:
             break
         if text[_U(i)] != 44:
-            return 0, 0, 0
-    i += 1
-    while i < stop and (text[_U(i)] == 32 or text[_U(i)] == 13 or text[_U(i)] == 9 or text[_U(i)] == 10):
-        i += 1  # not beyond stop: there may be a newline and the next line
-    if i != stop or listed == 0 or seen & 63 != 63:
-        return 0, 0, 0
-    return size, listed, seen >> 6
+            return i, 0, 0, 0
+    if seen & 63 != 63:
+        return i, 0, 0, 0
+    if not listed:
+        size = 1
+    if listed and not _repeat(words, first, size, listed):
+        return i, 0, 0, 0
+    if seen >> 6 and not _hertz(words, first, size):
+        return i, 0, 0, 0
+    return i + 1, size, listed, others
 
 
 @_compiled
-def _spread(words: NDArray[np.uint64], first: int, size: int, listed: int) -> None:
-    """Repeat the values that hold for all cases."""
-    for row in range(6):
-        if not listed >> row & 1:
-            words[row, first : first + size] = words[row, first]
+def _lines(
+    text: Bytes,
+    lines: NDArray[np.int64],
+    words: NDArray[np.uint64],
+    edges: NDArray[np.int64],
+    forms: NDArray[np.int64],
+    spans: NDArray[np.int64],
+) -> tuple[int, int, int]:
+    """(lines that were read, 0 or NO_ROOM for the next one, members other than inputs in the last one)."""
+    first, others = edges[0], 0  # edges[0] is 0: a literal 0 would compile the callees twice
+    for n in range(lines.shape[0]):
+        i, stop = _space(text, lines[n, 0]), lines[n, 1]
+        rows = text[_U(i)] == 91
+        while True:
+            if rows:
+                i = _space(text, i + 1)
+            i, size, listed, others = _object(text, i, stop, words, first, spans)
+            if size <= 0 or (rows and (listed or others)):
+                return n, min(size, 0), 0
+            first += size
+            if not rows:
+                break
+            i = _space(text, i)
+            if text[_U(i)] != 44:
+                break
+        if rows:
+            if text[_U(i)] != 93:
+                return n, 0, 0
+            i += 1
+        while i < stop and (text[_U(i)] == 32 or text[_U(i)] == 13 or text[_U(i)] == 9 or text[_U(i)] == 10):
+            i += 1  # not beyond stop: there may be a newline and the next line
+        if i != stop:
+            return n, 0, 0
+        edges[n + 1] = first
+        forms[n] = ROWS if rows else BLOCK if listed else CASE
+    return int(lines.shape[0]), 0, others
 
 
-def read_columns(text: Bytes, start: int, stop: int, columns: Array, first: int = 0) -> int:
-    """Read text[start:stop], which one more byte must follow, into the columns from case ``first`` on.
+def read(text: Bytes, columns: Array) -> tuple[int, int, list[list[int]]]:
+    """Read a text into columns.
 
     Parameters
     ----------
     text : NDArray[uint8]
-        Ends in a 0 byte, or in another byte that ends a number.
-    start, stop : int
-        White space at the start is skipped; at the end there must be none.
+        The last byte is no part of it: 0, or another that ends a number.  White space at both ends is skipped.
     columns : ndarray
         Shape (6, room); filled with the six inputs, k = inf for rigid contact.
-    first : int
 
     Returns
     -------
-    int
+    size : int
         Number of cases; 0: not ordinary; NO_ROOM: too many.
+    form : int
+        CASE, BLOCK or ROWS.
+    spans : list
+        Where the texts of the members that are not inputs begin and end.
     """
-    size, listed, frequency = _object(text, start, stop, columns.view(np.uint64), first)
-    if size > 0:
-        _spread(columns.view(np.uint64), first, size, listed)
-        if frequency:
-            omega = columns[_OMEGA, first : first + size]
-            if omega.max() > MOST_HZ:
-                return 0
-            omega *= RAD_PER_CYCLE
-    return int(size)
+    edges, form, spans = np.zeros(2, np.int64), np.zeros(1, np.int64), np.empty((MOST_SPANS, 2), np.int64)
+    _, fault, others = _lines(text, np.array([[0, text.size - 1]]), columns.view(np.uint64), edges, form, spans)
+    return int(edges[1]) or fault, int(form[0]), spans[:others].tolist()
+
+
+def read_lines(text: Bytes, lines: NDArray[np.int64], columns: Array) -> tuple[list[int], list[int]]:
+    """Read lines into columns, one after another, up to the first that is not ordinary or has other members.
+
+    Parameters
+    ----------
+    text : NDArray[uint8]
+        One byte follows the last line.
+    lines : NDArray[int64]
+        Shape (n, 2): where each begins and ends, without its newline.
+    columns : ndarray
+        Shape (6, room).
+
+    Returns
+    -------
+    edges : list of int
+        0, and for each line that was read the number of cases up to its end.
+    forms : list of int
+        CASE, BLOCK or ROWS for each of these lines.
+    """
+    edges, forms = np.zeros(len(lines) + 1, np.int64), np.empty(len(lines), np.int64)
+    done, _, _ = _lines(text, lines, columns.view(np.uint64), edges, forms, np.empty((0, 2), np.int64))
+    return edges[: done + 1].tolist(), forms[:done].tolist()
+
+
+def load() -> None:
+    """Compile or load the reader, so that no request waits for it."""
+    read(np.frombuffer(bytearray(b"0"), dtype=np.uint8), np.empty((6, 1)))

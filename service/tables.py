@@ -15,7 +15,7 @@ from starlette.requests import Request
 
 from mumacro import Surrogate, TableError
 
-from . import API_VERSION, __version__
+from . import API_VERSION, __version__, numbers
 from .errors import FieldFault, InvalidFieldsError, NotReadyError
 from .kernel import Kernel
 from .metrics import first_cell
@@ -131,11 +131,12 @@ class Tables:
         self.warm = False  # whether everything compiled is loaded, not only what the first answers need
 
     def load(self, before_answers: Callable[[list[dict[str, Any]]], None] | None = None) -> None:
-        """Load all tables.  A refused table makes the service not ready; it never stops the process.
+        """Load all tables and the reader of batches.  A refused table makes the service not ready; it stops nothing.
 
         ``before_answers`` is called with the labels of the tables before the first request is answered.
         """
         try:
+            numbers.load()
             tables = [LoadedTable.open(path) for path in table_files(self.paths)]
             names = [table.surrogate.id for table in tables]
             for table in tables:

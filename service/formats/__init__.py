@@ -8,11 +8,23 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Protocol, TypeVar
 
-from ..errors import BatchTooLargeError, FieldFault, InvalidFieldsError, MalformedBodyError, refusal, repeated
+import numpy as np
+
+from .. import numbers
+from ..errors import (
+    BatchTooLargeError,
+    FieldFault,
+    InvalidFieldsError,
+    MalformedBodyError,
+    RequestError,
+    refusal,
+    repeated,
+)  # fmt: skip
 from ..evaluation import Answers, Batch
 
 __all__ = [
-    "FORMATS", "Format", "choose", "decode", "limit_values", "media_types", "register", "too_large", "unique_names",
+    "FORMATS", "OPTIONS", "Format", "choose", "decode", "limit_values", "media_types", "read_plain", "register",
+    "too_large", "unique_names",
 ]  # fmt: skip
 
 
@@ -56,6 +68,8 @@ class Format(Protocol):
 
 T = TypeVar("T")
 FORMATS: list[Format] = []
+#: members of an object of columns that are no inputs
+OPTIONS = ("include", "tolerance", "std")
 MOST_MEMBERS = 16  # of an object of columns: the inputs and the options
 
 
@@ -81,6 +95,27 @@ def too_large(max_batch: int) -> BatchTooLargeError:
         f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON",
         max_batch=max_batch,
     )
+
+
+def read_plain(text: bytearray, max_batch: int, form: int) -> tuple[Batch, dict[str, Any]] | None:
+    """The cases and options of a body in the usual form, BLOCK or ROWS; None for any other body."""
+    text.append(0)
+    try:
+        columns = np.empty((6, min(max_batch, len(text) // 2)))  # only written pages take memory
+        size, found, spans = numbers.read(np.frombuffer(text, dtype=np.uint8), columns)
+    finally:
+        text.pop()
+    if size <= 0 or found != form:
+        return None
+    try:
+        members = b",".join(text[start:stop] for start, stop in spans)
+        options = decode(bytearray(b"{" + members + b"}"), dict) if spans else {}
+    except RequestError:
+        return None  # the whole body is read again and gives the reason
+    if not options.keys() <= set(OPTIONS):
+        return None
+    given = {name: value for name, value in options.items() if value is not None}
+    return Batch(size, [column[:size] for column in columns]), given
 
 
 def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:

@@ -1,12 +1,12 @@
 """NDJSON: every line is answered with a line as soon as it arrives.
 
-Large streams mostly hold blocks: lines with an object of lists.  Several blocks are read, evaluated and written
-together, in memory that is used again.  Lines of one case each are answered together too.  Every other line, and every
-line with a bad case, is answered alone, like a batch.
+Lines in the usual form are read, evaluated and written together, in memory that is used again.  Every other line, and
+every line with a bad case, is answered alone, like a batch.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,8 +17,8 @@ from ..errors import RequestError, problem_of
 from ..evaluation import Answers, Batch, answer_batch
 from ..tables import LoadedTable, signature
 from . import register
-from .columns import REGIMES_OF, SOURCES_OF, dump, numbers_ready
-from .rows import decode_rows, objects
+from .columns import write_columns
+from .rows import objects, write_rows
 
 __all__ = ["LineAnswers", "Spans"]
 
@@ -26,7 +26,6 @@ __all__ = ["LineAnswers", "Spans"]
 Spans = Sequence[tuple[int, int, int]]
 
 _CASES = 8192  # cases of blocks that are evaluated together
-_SHORT_LINE = 1024  # bytes of one case on a line of its own
 _ONE_OF = ("BatchColumns", "Case")
 
 
@@ -103,59 +102,44 @@ class LineAnswers:
         self._path = path
         self._room = min(_CASES, max_batch)
         self._columns: Any = None
-        self._end = dump({"errors": [], "n_errors": 0, **signature(table)})[1:] + b"\n"
 
     def pieces(self, text: bytearray, spans: Spans) -> Iterator[bytes]:
         """The answers to some lines of ``text``, which has one byte after the last line."""
-        together = self._cases(text, spans) if len(spans) > 1 else None
-        if together is not None:
-            yield from together
-            return
-        seen = np.frombuffer(text, dtype=np.uint8)
-        edges = [0]  # index of the first case of each block that is read and not yet answered
-        for index, (start, end, number) in enumerate(spans):
-            size = self._read(seen, start, end, edges[-1])
-            if size < 0 and len(edges) > 1:
-                yield from self._blocks(text, spans, index, edges)
-                edges = [0]
-                size = self._read(seen, start, end, 0)
-            if size > 0:
-                edges.append(edges[-1] + size)
-                continue
-            yield from self._blocks(text, spans, index, edges)
-            edges = [0]
-            yield from self._line(text[start:end], number)
-        yield from self._blocks(text, spans, len(spans), edges)
-
-    def _read(self, seen: Any, start: int, end: int, first: int) -> int:
-        if self._include or not numbers_ready():
-            return 0
+        lines = np.array([span[:2] for span in spans], dtype=np.int64)
         if self._columns is None:
             self._columns = np.empty((6, self._room))
-        while end > start and seen[end - 1] in (13, 32, 9):
-            end -= 1
-        return numbers.read_columns(seen, start, end, self._columns, first)
+        done = 0
+        while done < len(spans):
+            seen = np.frombuffer(text, dtype=np.uint8)
+            edges, forms = numbers.read_lines(seen, lines[done : done + self._room], self._columns)
+            together = self._together(edges, forms) if forms else None
+            if together is not None:
+                yield from together
+            else:
+                for start, end, number in spans[done : done + max(len(forms), 1)]:
+                    yield from self._line(text[start:end], number)
+            done += max(len(forms), 1)
 
-    def _blocks(self, text: bytearray, spans: Spans, stop: int, edges: list[int]) -> Iterator[bytes]:
-        """Answer the blocks that were read from the lines before ``stop``."""
-        size = edges[-1]
-        if size == 0:
-            return
-        batch = Batch(size, [column[:size] for column in self._columns])
-        answers = answer_batch(self._table, batch, (), {})
+    def _together(self, edges: list[int], forms: list[int]) -> Iterator[bytes] | None:
+        """The answers to the lines that were read; None if one of them has a bad case."""
+        batch = Batch(edges[-1], [column[: edges[-1]] for column in self._columns])
+        answers = answer_batch(self._table, batch, self._include, self._std)
         if answers.n_bad:
-            for start, end, number in spans[stop - len(edges) + 1 : stop]:
-                yield from self._line(text[start:end], number)
-            return
+            return None
         self._count(self._table, answers)
-        regimes, sources = REGIMES_OF[answers.source].tolist(), SOURCES_OF[answers.source].tolist()
-        for start, end in pairwise(edges):
-            part = slice(start, end)
-            columns = {
-                "mu_macro": answers.mu_macro[part], "mu_ratio": answers.mu_ratio[part], "regime": regimes[part],
-                "error_bound": answers.error_bound[part], "source": sources[part],
-            }  # fmt: skip
-            yield orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)[:-1] + b"," + self._end
+        return self._written(answers, edges, forms)
+
+    def _written(self, answers: Answers, edges: list[int], forms: list[int]) -> Iterator[bytes]:
+        label = signature(self._table)
+        for form, group in groupby(zip(forms, pairwise(edges), strict=True), itemgetter(0)):
+            parts = [part for _, part in group]
+            if form == numbers.CASE:
+                yield b"\n".join(map(orjson.dumps, objects(answers, parts[0][0], parts[-1][1], label))) + b"\n"
+                continue
+            write = write_columns if form == numbers.BLOCK else write_rows
+            for start, stop in parts:
+                yield from write(answers.part(start, stop), label)
+                yield b"\n"
 
     def _line(self, line: bytearray, number: int) -> Iterator[bytes]:
         try:
@@ -164,23 +148,6 @@ class LineAnswers:
             yield bytes(problem_of(error, f"{self._path}#line={number}").body) + b"\n"
         else:
             yield b"".join(answered) + b"\n"
-
-    def _cases(self, text: bytearray, spans: Spans) -> Iterator[bytes] | None:
-        """Answer lines of one case each together; None for other lines."""
-        if any(end - start > _SHORT_LINE for start, end, _ in spans):
-            return None
-        lines = [line for line in (text[start:end].strip() for start, end, _ in spans) if line]
-        if not all(line.startswith(b"{") and line.endswith(b"}") and line.count(b"{") == 1 for line in lines):
-            return None
-        batch = decode_rows(bytearray(b"[" + b",".join(lines) + b"]"))
-        if batch is None or batch.size != len(lines) or not lines:
-            return None
-        answers = answer_batch(self._table, batch, self._include, self._std)
-        if answers.n_bad:
-            return None
-        self._count(self._table, answers)
-        made = objects(answers, 0, answers.size, signature(self._table))
-        return iter([b"\n".join(map(orjson.dumps, made)) + b"\n"])
 
 
 register(Lines())

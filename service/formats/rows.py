@@ -1,46 +1,26 @@
 """JSON rows: a list of objects, each one case.  A bad row affects only itself.
 
-msgspec reads ordinary rows, a quarter of a megabyte at a time, since it holds the interpreter's lock.  If it refuses a
-body, :func:`read_values` reads it again, row by row, and gives the reasons.
+Compiled code (:mod:`service.numbers`) reads ordinary rows into arrays.  Any other body is read again, row by row, and
+gives the reasons.
 """
 
-import math
-from array import array
 from collections.abc import Iterator, Mapping
-from operator import attrgetter
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
-import msgspec
 import numpy as np
 import orjson
-from msgspec import UNSET, UnsetType
 
+from .. import numbers
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
 from ..hints import ONE_FREQUENCY, STATE_K, STATE_OMEGA, TOO_FREQUENT, unknown_name
-from ..kernel import FIELDS, INPUTS, MOST_HZ, RAD_PER_CYCLE, Array
+from ..kernel import FIELDS, INPUTS, MOST_HZ, RAD_PER_CYCLE
 from ..quantities import nested
-from . import decode, limit_values, register, too_large
+from . import decode, limit_values, read_plain, register, too_large
 from .columns import REGIMES_OF, SOURCES_OF, dump, is_bool, read_entry
 
-__all__ = ["decode_rows", "objects", "read_row", "read_values"]
+__all__ = ["objects", "read_row", "read_values", "write_rows"]
 
-_PIECE = 256 * 1024  # bytes that are decoded at a time
 _SLICE = 8192  # cases that are written at a time
-
-
-class _Row(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    """The usual form of a row."""
-
-    mu0: float
-    Fz: float
-    k: float | Literal["rigid"] | None
-    y0: float
-    v0: float
-    omega: float | UnsetType | None = UNSET
-    f: float | UnsetType | None = UNSET
-
-
-_decoder = msgspec.json.Decoder(list[_Row])
 
 
 class Rows:
@@ -60,81 +40,18 @@ class Rows:
 
     def read(self, text: bytearray, max_batch: int) -> tuple[Batch, dict[str, Any]]:
         """See :class:`Format`."""
+        plain = read_plain(text, max_batch, numbers.ROWS)
+        if plain is not None:
+            return plain
         limit_values(text, max_batch, len(INPUTS) + 1)
-        batch = decode_rows(text)
-        if batch is None:
-            found = decode(text, list)
-            batch = read_values(found) if len(found) <= max_batch else None
-        if batch is None or batch.size > max_batch:
+        found = decode(text, list)
+        if len(found) > max_batch:
             raise too_large(max_batch)
-        return batch, {}
+        return read_values(found), {}
 
     def write(self, answers: Answers, label: Mapping[str, Any]) -> Iterator[bytes]:
         """See :class:`Format`."""
-        yield b'{"results":['
-        for start in range(0, answers.size, _SLICE):
-            text = orjson.dumps(objects(answers, start, start + _SLICE))
-            yield text[1:-1] if start == 0 else b"," + text[1:-1]
-        yield b"]," + dump({"errors": answers.errors, "n_errors": answers.n_bad, **label})[1:]
-
-
-def decode_rows(text: bytearray) -> Batch | None:
-    """Ordinary rows as columns; None for any other body.
-
-    The text is cut at ``},``.  If every piece is a list of rows, the pieces together are one list of rows.  A cut
-    within a string makes a piece that is not a list.
-    """
-    begin, last = text.find(b"["), text.rfind(b"]")
-    if begin < 0 or last < begin or text[:begin].strip() or text[last + 1 :].strip():
-        return None
-    parts: list[list[Array]] = []
-    start, members = begin + 1, 0
-    try:
-        while True:
-            end = text.find(b"},", start + _PIECE, last) if last - start > _PIECE else -1
-            stop = last if end < 0 else end + 1
-            rows = _decoder.decode(b"[" + text[start:stop] + b"]")
-            if not rows and parts:
-                return None  # a comma with nothing after it
-            found = _columns(rows)
-            if found is None:
-                return None
-            parts.append(found[0])
-            members += found[1]
-            if end < 0:
-                break
-            start = end + 2
-    except (msgspec.MsgspecError, ValueError, RecursionError):
-        return None
-    if text.count(b":", begin, last) != members:
-        return None  # a name is given twice
-    columns = parts[0] if len(parts) == 1 else [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
-    return Batch(columns[0].size, columns)
-
-
-def _columns(rows: list[_Row]) -> tuple[list[Array], int] | None:
-    """Rows as columns, and how many members they have; None where a frequency is missing, given twice or too large."""
-    named: dict[str, Any] = {name: list(map(attrgetter(name), rows)) for name in INPUTS}
-    unset = named["f"].count(UNSET)
-    try:
-        k = array("d", named["k"])
-    except TypeError:
-        k = array("d", [math.inf if type(value) is not float else value for value in named["k"]])
-    try:
-        omega = array("d", named["omega"])
-        if any(type(value) is float for value in named["f"]):
-            return None
-    except TypeError:
-        pairs = list(zip(named["omega"], named["f"], strict=True))
-        if any(
-            (type(omega) is float) == (type(f) is float) or (type(f) is float and f > MOST_HZ) for omega, f in pairs
-        ):
-            return None
-        omega = array("d", [omega if type(omega) is float else RAD_PER_CYCLE * f for omega, f in pairs])
-        unset += named["omega"].count(UNSET)
-    columns = {name: array("d", named[name]) for name in FIELDS if name not in ("k", "omega")}
-    columns.update(k=k, omega=omega)
-    return [np.frombuffer(columns[name]) if rows else np.empty(0) for name in FIELDS], len(INPUTS) * len(rows) - unset
+        return write_rows(answers, label)
 
 
 def read_values(found: list[Any]) -> Batch:
@@ -178,6 +95,15 @@ def read_row(row: Any) -> tuple[list[float], Reason | None]:
             return [], ("f", TOO_FREQUENT)
         values["omega"] = RAD_PER_CYCLE * values["f"]
     return [values[name] for name in FIELDS], None
+
+
+def write_rows(answers: Answers, label: Mapping[str, Any]) -> Iterator[bytes]:
+    """An object with the list of results, piece by piece."""
+    yield b'{"results":['
+    for start in range(0, answers.size, _SLICE):
+        text = orjson.dumps(objects(answers, start, start + _SLICE))
+        yield text[1:-1] if start == 0 else b"," + text[1:-1]
+    yield b"]," + dump({"errors": answers.errors, "n_errors": answers.n_bad, **label})[1:]
 
 
 def objects(answers: Answers, start: int, stop: int, label: Mapping[str, Any] | None = None) -> list[Any]:
