@@ -77,13 +77,18 @@ class Kernel:
 
     def details(self, columns: Mapping[str, Array], gradient: bool) -> Details:
         """Groups and, if requested, slopes of legal cases; six columns (n,), k = inf is rigid."""
-        given: dict[str, Any] = dict(columns)
+        one = columns["k"].size == 1  # the library answers plain floats ten times faster than arrays of one
+        given: dict[str, Any] = {name: column.item() if one else column for name, column in columns.items()}
         answer = self.surrogate.evaluate(**given, gradient=gradient, groups=True)
-        slopes, bounds = dict(answer.gradient or {}), dict(answer.gradient_bound or {})
+        slopes, bounds = (
+            {name: np.atleast_1d(slope) for name, slope in (found or {}).items()}
+            for found in (answer.gradient, answer.gradient_bound)
+        )
         if gradient:  # a rigid contact has no slope along k
             rigid = np.isinf(columns["k"])
             slopes["k"], bounds["k"] = (np.where(rigid, np.nan, part["k"]) for part in (slopes, bounds))
-        return Details(answer.v_tilde, answer.y_tilde, answer.length_scale, slopes, bounds)
+        v, y, length = (np.atleast_1d(group) for group in (answer.v_tilde, answer.y_tilde, answer.length_scale))
+        return Details(v, y, length, slopes, bounds)
 
     @property
     def checksum(self) -> str:
