@@ -43,7 +43,6 @@ from measuring import IMAGES, ROOT, free_port, machine, markdown, progress, quan
 from mumacro.dimensional import FIELDS
 from service.evaluation import answer_batch
 from service.formats import choose
-from service.formats.columns import numbers_ready
 from service.quantities import QUANTITIES
 from service.tables import LoadedTable
 
@@ -59,6 +58,7 @@ SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
 ENOUGH_S = 0.6  # smallest processor time for a figure: the clock ticks in hundredths
 KINDS = {
     "columns": "application/json",
+    "gzip": "application/json",
     "rows": "application/json",
     "lines": "application/x-ndjson",
     "arrow": "application/vnd.apache.arrow.stream",
@@ -67,7 +67,8 @@ AT_ONCE = (1, 4, 8)  # the last: as many as are answered in parallel
 INCLUDED = tuple(name for name in QUANTITIES if name != "std")  # which needs deviations, too
 WAITED_FOR = {100_000: 30, 1_000_000: 5}  # cases of the batches during which short requests are sent: their number
 LABELS = {
-    "columns": "JSON columns", "rows": "JSON rows", "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow"
+    "columns": "JSON columns", "gzip": "JSON columns, answer in gzip", "rows": "JSON rows",
+    "lines": "NDJSON, blocks of 1,000", "arrow": "Arrow",
 }  # fmt: skip
 
 
@@ -119,9 +120,12 @@ class Caller:
         self._raw = socket.create_connection(("127.0.0.1", port), timeout=120)
         self._raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def ask(self, path: str, body: bytes, kind: str) -> int:
+    def ask(self, path: str, body: bytes, kind: str, accept: str = "identity") -> int:
         """POST; sends and reads at the same time, as needed for a stream.  Return the status."""
-        head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
+        head = (
+            f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
+            f"Accept-Encoding: {accept}\r\n\r\n"
+        )
         sender = threading.Thread(target=self._raw.sendall, args=(head.encode() + body,))
         sender.start()
         reply = http.client.HTTPResponse(self._raw, method="POST")
@@ -245,12 +249,17 @@ def mlserver_question() -> Question:
     return Question("POST", ["/v2/models/mu_macro/infer"] * 64, bodies)
 
 
-def load(server: Server, script: Path, seconds: int, connections: int = 16) -> tuple[float, float]:
-    """Processor time [us] a request, and requests a second, with connections that send without pause."""
+def load(
+    server: Server, script: Path, seconds: int, connections: int = 16, by: Server | None = None
+) -> tuple[float, float]:
+    """Processor time [us] a request, and requests a second, with connections that send without pause.
+
+    ``by`` is a proxy that gets the requests; its own time does not count.
+    """
     before = server.cpu()
     command = ["taskset", "-c", str(CLIENT_CORE), "wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "-s", str(script)]
     done = subprocess.run(
-        [*command, f"http://127.0.0.1:{server.port}"], capture_output=True, text=True, check=True
+        [*command, f"http://127.0.0.1:{(by or server).port}"], capture_output=True, text=True, check=True
     ).stdout
     spent = server.cpu() - before
     if "Non-2xx" in done or "Socket errors" in done:
@@ -274,17 +283,23 @@ def measure_single(peers: dict[str, str], rounds: int, seconds: int, folder: Pat
     contexts = [ours(), peer("raw"), peer("fastapi"), peer("fastapi_sync")]
     contexts += [peer(name, python) for name, python in peers.items()]
     with _all(contexts) as servers:
-        scripts = [
-            (server, f"{server.name} {name}", question.script(folder))
+        scripts: list[tuple[Server, str, Path, Server | None]] = [
+            (server, f"{server.name} {name}", question.script(folder), None)
             for server in servers
             for name, question in asked[server.name]
         ]
-        for server, _, script in scripts:
-            load(server, script, 1)
-        for number in range(rounds):
-            progress(f"single cases, round {number + 1} of {rounds}")
-            for server, name, script in scripts:
-                found.setdefault(name, []).append(load(server, script, seconds))
+        proxied = servers[:2]
+        with _all([nginx([server], folder) for server in proxied]) as proxies:
+            scripts += [
+                (server, f"{server.name} POST behind nginx", post().script(folder), proxy)
+                for server, proxy in zip(proxied, proxies, strict=True)
+            ]
+            for server, _, script, proxy in scripts:
+                load(server, script, 1, by=proxy)
+            for number in range(rounds):
+                progress(f"single cases, round {number + 1} of {rounds}")
+                for server, name, script, proxy in scripts:
+                    found.setdefault(name, []).append(load(server, script, seconds, by=proxy))
     return {name: tuple(map(statistics.median, zip(*values, strict=True))) for name, values in found.items()}  # type: ignore[misc]
 
 
@@ -316,7 +331,7 @@ def columns(n: int) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
 def body_of(form: str, n: int) -> bytes:
     """n cases as sent over HTTP."""
     table = columns(n)
-    if form == "columns":
+    if form in ("columns", "gzip"):
         return orjson.dumps(table, option=orjson.OPT_SERIALIZE_NUMPY)
     if form == "rows":
         return orjson.dumps(
@@ -341,31 +356,31 @@ def measure_batches(rounds: int, folder: Path) -> dict[str, dict[int, float]]:
         for n in SIZES:
             progress(f"batches of {n}")
             for form in KINDS:
-                body = body_of(form, n)
-                rates[form][n] = _rate(server, body, KINDS[form], n, rounds, folder)
+                rates[form][n] = _rate(server, form, n, rounds, folder)
             if n <= 100_000:
-                rates["fastapi"][n] = _rate(plain, body_of("rows", n), KINDS["rows"], n, rounds, folder)
+                rates["fastapi"][n] = _rate(plain, "rows", n, rounds, folder)
     return rates
 
 
 _FILE_SCRIPT = """
 local file = io.open(%s, "rb")
 wrk.method, wrk.body = "POST", file:read("*a")
-wrk.headers["Content-Type"] = "%s"
+wrk.headers["Content-Type"], wrk.headers["Accept-Encoding"] = "%s", "%s"
 wrk.path = "%s"
 """
 
 
-def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: Path) -> float:
+def _rate(server: Server, form: str, n: int, rounds: int, folder: Path) -> float:
+    body, kind, accept = body_of(form, n), KINDS[form], "gzip" if form == "gzip" else "identity"
     caller = Caller(server.port)
-    status = caller.ask(BATCH, body, kind)  # the first batch in Arrow loads pyarrow
+    status = caller.ask(BATCH, body, kind, accept)  # the first batch in Arrow loads pyarrow
     if status != 200:
         raise RuntimeError(f"{server.name}: {status}")
     if n <= MANY_FROM:
         # with one client that waits for each response the server would sleep and wake up in between
         (folder / "body").write_bytes(body)
         script = folder / "body.lua"
-        script.write_text(_FILE_SCRIPT % (json.dumps(str(folder / "body")), kind, BATCH))
+        script.write_text(_FILE_SCRIPT % (json.dumps(str(folder / "body")), kind, accept, BATCH))
         found = []
         for _ in range(rounds):
             time.sleep(0.5)  # until batches that earlier clients left unread are released
@@ -375,7 +390,7 @@ def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: P
     for _ in range(rounds):
         before, asked = server.cpu(), 0
         while server.cpu() - before < ENOUGH_S:
-            caller.ask(BATCH, body, kind)
+            caller.ask(BATCH, body, kind, accept)
             asked += 1
         found.append(asked * n / (server.cpu() - before) / 1e6)
     return statistics.median(found)
@@ -386,7 +401,6 @@ def parts(rounds: int) -> dict[str, float]:
     n = 100_000
     table = LoadedTable.open(TABLE)
     bodies = {form: body_of(form, n) for form in ("columns", "rows")}
-    numbers_ready(now=True)
     forms = {form: choose("application/json", memoryview(body)) for form, body in bodies.items()}
     batch, _ = forms["columns"].read(bytearray(bodies["columns"]), n)
     answers = answer_batch(table, batch, (), {})
@@ -634,6 +648,7 @@ daemon off; master_process off; pid {folder}/pid; error_log {folder}/error.log w
 events {{ worker_connections 1024; }}
 http {{
   access_log off; client_max_body_size 1g; proxy_http_version 1.1; proxy_set_header Connection "";
+  proxy_set_header X-Forwarded-For $proxy_add_x_forwarded_for; proxy_set_header X-Forwarded-Proto $scheme;
   client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy; fastcgi_temp_path {folder}/fastcgi;
   uwsgi_temp_path {folder}/uwsgi; scgi_temp_path {folder}/scgi;
   upstream replicas {{ {servers} keepalive 64; }}
@@ -645,7 +660,7 @@ http {{
 def nginx(replicas: Sequence[Server], folder: Path) -> Any:
     """A proxy of one process in front of some servers, on their core."""
     port = free_port()
-    home = folder / f"nginx-{len(replicas)}"
+    home = folder / f"nginx-{port}"
     home.mkdir(exist_ok=True)
     servers = " ".join(f"server 127.0.0.1:{replica.port};" for replica in replicas)
     (home / "nginx.conf").write_text(_NGINX.format(folder=home, servers=servers, port=port))
@@ -766,7 +781,14 @@ def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    colours = {"columns": "#c1272d", "rows": "#e08214", "lines": "#7b4fa3", "arrow": "#1f5fa8", "fastapi": "#7f7f7f"}
+    colours = {
+        "columns": "#c1272d",
+        "gzip": "#e8898d",
+        "rows": "#e08214",
+        "lines": "#7b4fa3",
+        "arrow": "#1f5fa8",
+        "fastapi": "#7f7f7f",
+    }
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
     for form, values in rates.items():
         sizes = np.array(list(values))
@@ -790,6 +812,8 @@ def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path
 NAMES = {
     "mumacro POST": "mumacro, `POST`, checked, logged, counted",
     "mumacro GET": "mumacro, `GET`, the same, with entity tag",
+    "mumacro POST behind nginx": "mumacro, `POST`, behind nginx",
+    "raw POST behind nginx": "raw ASGI and orjson, `POST`, behind nginx",
     "raw POST": "raw ASGI and orjson, `POST`, nothing checked",
     "raw GET": "raw ASGI and orjson, `GET`, nothing checked",
     "fastapi POST": "FastAPI, models in and out, `async def`",
@@ -846,7 +870,7 @@ def report(
     single = measure_single(peers, options.rounds, options.seconds, folder)
     table = []
     for name, (spent, rate) in single.items():
-        floor = single["raw GET" if name.endswith("GET") else "raw POST"][0]
+        floor = single.get(f"raw {name.partition(' ')[2]}", single["raw POST"])[0]
         table.append([NAMES[name], quantity(spent, 3), quantity(rate, 3), f"{floor / spent:.2f}"])
     sections = {
         "single": markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .hints import TOO_FREQUENT
 from .kernel import BOUNDS, FIELDS, RAD_PER_CYCLE, REGIME_NAMES, SOURCES, Array
 from .quantities import QUANTITIES, Cases, compute, nested, parts_of
-from .schemas import InputStd
+from .schemas import InputStd, deviations
 from .tables import LoadedTable, signature
 
 __all__ = [
@@ -109,8 +109,7 @@ def answer_case(
     if include:
         columns = [np.array([value]) for value in inputs]
         numbers = np.array([values["mu_macro"]]), np.array([values["error_bound"]]), np.array([source], dtype=np.int8)
-        deviations = std.of_inputs() if std is not None else {}
-        found = _quantities(table, columns, *numbers, include, deviations)
+        found = _quantities(table, columns, *numbers, include, deviations(std))
         kinds = {part.path: part.kind for part in parts_of(include)}
         values.update(nested({path: kinds[path](column[0]) for path, column in found.items()}))
     values.update(signature(table))

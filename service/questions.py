@@ -24,10 +24,10 @@ from .schemas import (
     QueryPositive,
     Stiffness,
     canonical,
+    check_std,
     examples,
     relation,
     split_names,
-    std_fault,
 )
 
 __all__ = ["MAX_CURVES", "MAX_POINTS", "MAX_TARGETS", "LawAnswer", "LawFamilyAnswer", "LawQuery", "LawRequest",
@@ -110,11 +110,6 @@ class _Five(BaseModel):
         return found
 
 
-def _check_std(form: Any) -> None:
-    if (form.std is not None) != ("std" in (form.include or ())):
-        raise std_fault(form.std is None)
-
-
 class SolveForRequest(_Five):
     """Which value of one input gives a wanted mu_macro."""
 
@@ -139,7 +134,7 @@ class SolveForRequest(_Five):
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
-        _check_std(self)
+        check_std(self)
         if self.quantity == "mu_ratio" and self.unknown == "mu0":
             raise relation("quantity", "must be mu_macro where mu0 is the unknown")
         return self
@@ -183,7 +178,7 @@ class LawRequest(_Five):
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
-        _check_std(self)
+        check_std(self)
         if self.scale == "log" and self.start == 0.0:
             raise relation("start", "must be > 0 on a logarithmic scale; for a range from 0 set scale to linear")
         for name, values in (self.family or {}).items():

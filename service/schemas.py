@@ -25,7 +25,7 @@ __all__ = [
     "INCLUDES", "MAX_INCLUDE", "Answered", "BatchColumns", "BatchFault", "BatchQuery", "Case", "CaseAnswer",
     "CaseQuery", "CaseRequest", "ColumnsAnswer", "Health", "InputStd", "NotNegative", "Options", "Positive", "Problem",
     "Result", "RowsAnswer", "Stiffness", "TableAnswer", "TableChoice", "TableLabel", "canonical",
-    "examples", "relation", "split_names", "std_fault",
+    "check_std", "deviations", "examples", "relation", "split_names",
 ]  # fmt: skip
 
 INCLUDES = tuple(QUANTITIES)
@@ -77,12 +77,6 @@ class Case(BaseModel):
     f: Frequency | None = Field(None, description=_TEXTS["f"])
     v0: NotNegative = Field(description=_TEXTS["v0"])
 
-    def fault(self) -> PydanticCustomError | None:
-        """The relation between fields that does not hold, or None."""
-        if (self.omega is None) == (self.f is None):
-            return frequency_fault(self.f is not None)
-        return None
-
     def inputs(self) -> tuple[float, float, float, float, float, float]:
         """The six inputs in the order of FIELDS; k = inf is rigid contact."""
         k, omega = self.k, self.omega
@@ -107,9 +101,8 @@ class Case(BaseModel):
             ]
             entries.append({"type": frequency_fault(value.get("f") is not None), "loc": (), "input": None})
             raise ValidationError.from_exception_data(cls.__name__, entries) from None
-        fault = made.fault()
-        if fault is not None:
-            raise fault
+        if (made.omega is None) == (made.f is None):
+            raise frequency_fault(made.f is not None)
         return made
 
 
@@ -139,12 +132,6 @@ class InputStd(BaseModel):
             raise relation("f", "give the standard deviation of omega or of f, not of both")
         return self
 
-    def of_inputs(self) -> dict[str, float]:
-        """By name of the input, omega in place of f."""
-        found = {name: getattr(self, name) for name in FIELDS}
-        found["omega"] += RAD_PER_CYCLE * self.f
-        return found
-
 
 class Options(BaseModel):
     """The options of a request: everything but its cases."""
@@ -157,8 +144,7 @@ class Options(BaseModel):
 
     @model_validator(mode="after")
     def _std_where_asked(self) -> Self:
-        if (self.std is not None) != ("std" in (self.include or ())):
-            raise std_fault(self.std is None)
+        check_std(self)
         return self
 
     def names(self) -> tuple[str, ...]:
@@ -166,10 +152,21 @@ class Options(BaseModel):
         return canonical(self.include)
 
 
-def std_fault(missing: bool) -> PydanticCustomError:
-    """The fault of standard deviations that are missing, or given without ``std`` in ``include``."""
-    reason = "is required if include has std" if missing else "has no effect unless include has std"
-    return relation("std", reason)
+def check_std(form: Any) -> None:
+    """Refuse standard deviations without ``std`` in ``include``, and ``std`` without standard deviations."""
+    if (form.std is not None) != ("std" in (form.include or ())):
+        raise relation(
+            "std", "is required if include has std" if form.std is None else "has no effect unless include has std"
+        )
+
+
+def deviations(std: InputStd | None) -> dict[str, float]:
+    """Standard deviations by name of the input, omega in place of f; empty if there are none."""
+    if std is None:
+        return {}
+    found = {name: getattr(std, name) for name in FIELDS}
+    found["omega"] += RAD_PER_CYCLE * std.f
+    return found
 
 
 def canonical(include: Any) -> tuple[str, ...]:
@@ -178,25 +175,8 @@ def canonical(include: Any) -> tuple[str, ...]:
     return tuple(name for name in QUANTITIES if name in asked) if asked else ()
 
 
-class CaseRequest(Case):
+class CaseRequest(Options, Case):
     """One case and the options of its answer; ``omega`` or ``f``, exactly one of them."""
-
-    include: IncludeList | None = Field(None, description=_INCLUDE)
-    tolerance: Positive | None = Field(None, description=_TOLERANCE)
-    std: InputStd | None = Field(None, description=_STD)
-
-    def fault(self) -> PydanticCustomError | None:
-        """The relation between fields that does not hold, or None."""
-        found = super().fault()
-        if found is not None:
-            return found
-        if (self.std is not None) != ("std" in (self.include or ())):
-            return std_fault(self.std is None)
-        return None
-
-    def names(self) -> tuple[str, ...]:
-        """Included names once each, in the order of the registry."""
-        return canonical(self.include)
 
 
 # --- queries ------------------------------------------------------------------------------------------

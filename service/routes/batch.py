@@ -29,7 +29,7 @@ from ..guard import BATCH_PATH, CLOSE, SMALL_BODY, Work, check_media_type
 from ..metrics import Metrics
 from ..openapi import batch_operation, problems
 from ..quantities import cost_of
-from ..schemas import BatchQuery, Options
+from ..schemas import BatchQuery, Options, deviations
 from ..tables import LoadedTable, Tables, TablesDep, signature, tables_of
 from . import once_each
 
@@ -127,8 +127,7 @@ class BatchResponse(Response):
         table = self._batches.tables.pick(options.tolerance, place)
         include = options.names()
         cost = batch.size * cost_of(include) * (1.0 if not include or self._batches.tables.warm else 1e9)
-        std = options.std.of_inputs() if options.std is not None else {}
-        answers = await self._run(partial(answer_batch, table, batch, include, std), cost)
+        answers = await self._run(partial(answer_batch, table, batch, include, deviations(options.std)), cost)
         del batch
         self._batches.count(table, answers)
         pieces = _gathered(chosen.write(answers, signature(table)))
@@ -202,10 +201,15 @@ class BatchResponse(Response):
         more = "content-length" not in self._request.headers
         options, place = self._options({}, "parameter")
         table = batches.tables.pick(options.tolerance, place)
-        std = options.std.of_inputs() if options.std is not None else {}
         include = options.names()
         answers = LineAnswers(
-            table, include, std, batches.max_batch, self._line, batches.count, self._request.scope["path"]
+            table,
+            include,
+            deviations(options.std),
+            batches.max_batch,
+            self._line,
+            batches.count,
+            self._request.scope["path"],
         )
         text = bytearray() if more else await self._body(receive)
         self._place()
@@ -249,8 +253,7 @@ class BatchResponse(Response):
         batch, given = chosen.read(line, self._batches.max_batch)
         options, place = self._options(given, "pointer")
         table = self._batches.tables.pick(options.tolerance, place)
-        std = options.std.of_inputs() if options.std is not None else {}
-        answers = answer_batch(table, batch, options.names(), std)
+        answers = answer_batch(table, batch, options.names(), deviations(options.std))
         if answers.n_bad and not batch.listed:  # one case, and no list that could hold a null for it
             raise refusal([FieldFault(error["field"] or "body", error["reason"]) for error in answers.errors])
         self._batches.count(table, answers)

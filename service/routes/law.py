@@ -20,6 +20,7 @@ from ..kernel import FIELDS, RAD_PER_CYCLE, UNITS
 from ..openapi import problems
 from ..quantities import nested
 from ..questions import LawAnswer, LawFamilyAnswer, LawQuery, LawRequest
+from ..schemas import deviations
 from ..tables import LoadedTable, TablesDep, signature
 from . import JsonRoute, no_query, once_each, parameters_of
 
@@ -120,8 +121,7 @@ def _curve(table: LoadedTable, form: LawRequest, values: Any, case: dict[str, An
     if quantities:
         full = {"k": math.inf, **{name: math.inf if value is None else value for name, value in case.items()}}
         columns_of = [values if name == along else np.array([full[name]]) for name in FIELDS]
-        std = form.std.of_inputs() if form.std else {}
-        more = answer_batch(table, Batch(values.size, columns_of), quantities, std)
+        more = answer_batch(table, Batch(values.size, columns_of), quantities, deviations(form.std))
         answer.update(nested({path: column.tolist() for path, column in more.extras.items()}))
     return answer
 

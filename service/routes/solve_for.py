@@ -17,7 +17,7 @@ from ..formats.rows import objects
 from ..kernel import FIELDS, RAD_PER_CYCLE, UNITS
 from ..openapi import problems
 from ..questions import SolveForAnswer, SolveForRequest
-from ..schemas import canonical
+from ..schemas import canonical, deviations
 from ..tables import LoadedTable, TablesDep, signature
 from . import JsonRoute, no_query
 
@@ -92,7 +92,7 @@ def _included(table: LoadedTable, form: SolveForRequest, solution: Solution, unk
         return iter(())
     full = {"k": math.inf, **{name: math.inf if value is None else value for name, value in case.items()}}
     columns = [values if name == unknown else np.array([full[name]]) for name in FIELDS]
-    answers = answer_batch(table, Batch(values.size, columns), include, form.std.of_inputs() if form.std else {})
+    answers = answer_batch(table, Batch(values.size, columns), include, deviations(form.std))
     return iter([entry or {} for entry in objects(answers, 0, values.size)])
 
 
