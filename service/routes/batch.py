@@ -25,7 +25,7 @@ from ..formats import FORMATS, Format, choose
 from ..formats.columns import dump
 from ..formats.lines import LineAnswers
 from ..formats.rows import objects
-from ..guard import BATCH_PATH, CLOSE, SMALL_BODY, Work, check_media_type
+from ..guard import AT_ONCE, BATCH_PATH, CLOSE, SMALL_BODY, Work, check_media_type
 from ..metrics import Metrics
 from ..openapi import batch_operation, problems
 from ..quantities import cost_of
@@ -134,7 +134,7 @@ class BatchResponse(Response):
         await self._send(send, chosen.media_type, pieces, cost=size / _BYTES_PER_UNIT + cost, table=table)
 
     async def _run(self, work: Any, cost: float) -> Any:
-        if cost > 4000.0:
+        if cost > AT_ONCE:
             self._place()
         return await self._batches.work.run(work, cost)
 
