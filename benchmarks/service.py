@@ -356,9 +356,10 @@ def measure_batches(rounds: int, folder: Path) -> dict[str, dict[int, float]]:
         for n in SIZES:
             progress(f"batches of {n}")
             for form in KINDS:
-                rates[form][n] = _rate(server, form, n, rounds, folder)
+                accept = "gzip" if form == "gzip" else "identity"
+                rates[form][n] = _rate(server, body_of(form, n), KINDS[form], n, rounds, folder, accept)
             if n <= 100_000:
-                rates["fastapi"][n] = _rate(plain, "rows", n, rounds, folder)
+                rates["fastapi"][n] = _rate(plain, body_of("rows", n), KINDS["rows"], n, rounds, folder)
     return rates
 
 
@@ -370,8 +371,7 @@ wrk.path = "%s"
 """
 
 
-def _rate(server: Server, form: str, n: int, rounds: int, folder: Path) -> float:
-    body, kind, accept = body_of(form, n), KINDS[form], "gzip" if form == "gzip" else "identity"
+def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: Path, accept: str = "identity") -> float:
     caller = Caller(server.port)
     status = caller.ask(BATCH, body, kind, accept)  # the first batch in Arrow loads pyarrow
     if status != 200:

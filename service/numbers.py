@@ -1,9 +1,10 @@
 """Compiled reader of batches in JSON: from text to arrays, without the interpreter's lock.
 
 It accepts only the usual form: an object of the six inputs (``f`` for ``omega``), each a list of numbers or one number,
-or a list of such objects with one number each.  ``k`` may be null or "rigid", an unused ``omega`` or ``f`` null.  Other
-members of an object are skipped; the caller reads them.  Every other text has size 0: :mod:`service.formats` reads it
-again and finds the reason.  Why no library is used here: docs/decisions/0011-wire.md.
+or a list of such objects with one number each.  ``k`` may be null or "rigid", an unused ``omega`` or ``f`` null; any
+other null of one case is a NaN.  Other members of an object are skipped; the caller reads them.  Every other text has
+size 0: :mod:`service.formats` reads it again and finds the reason.  Why no library is used here:
+docs/decisions/0011-wire.md.
 
 Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at a gigabyte per second", Software:
 Practice and Experience 51 (2021), exactly rounded for up to 19 significant digits; numbers with more are not ordinary.
@@ -40,7 +41,7 @@ _PAIRS, _WEIGHT_1, _WEIGHT_2 = _U(0x000000FF000000FF), _U(0x000F424000000064), _
 _EIGHT = _U(100_000_000)
 _NAMES = np.array([int.from_bytes(name.encode(), "little") for name in (*FIELDS, "f")], dtype=np.uint64)
 _RIGID = np.frombuffer(b'"rigid"', dtype=np.uint8)
-_INFINITE = _U(0x7FF0_0000_0000_0000)
+_INFINITE, _NAN = _U(0x7FF0_0000_0000_0000), _U(0x7FF8_0000_0000_0000)
 _K, _OMEGA, _F = FIELDS.index("k"), FIELDS.index("omega"), len(FIELDS)
 
 
@@ -216,10 +217,12 @@ def _values(text: Bytes, i: int, row: NDArray[np.uint64], stiff: bool) -> tuple[
             return -2, n
         bits, end = _number(text, i)
         if end < 0:
-            end = _rigid(text, i) if stiff else -1
+            if stiff:
+                bits, end = _INFINITE, _rigid(text, i)
+            elif _null(text, i):
+                bits, end = _NAN, i + 4
             if end < 0:
                 return -1, n
-            bits = _INFINITE
         row[_U(n)] = bits
         if not listed:
             return end, 0
@@ -277,7 +280,7 @@ def _repeat(words: NDArray[np.uint64], first: int, size: int, listed: int) -> bo
     for row in range(6):
         if not listed >> row & 1:
             bits = words[row, first]
-            if bits >= _SIGN or (bits == _0 and row < 3):
+            if bits > _INFINITE or (bits == _0 and row < 3):
                 return False
             for case in range(first, first + size):
                 words[row, case] = bits
@@ -286,10 +289,10 @@ def _repeat(words: NDArray[np.uint64], first: int, size: int, listed: int) -> bo
 
 @_inlined
 def _hertz(words: NDArray[np.uint64], first: int, size: int) -> bool:
-    """Turn f into omega; False where one is too large."""
+    """Turn f into omega; False where one is too large or null."""
     for case in range(first, first + size):
         f = _U(words[_OMEGA, case]).view(np.float64)
-        if f > MOST_HZ:
+        if not f <= MOST_HZ:
             return False
         words[_OMEGA, case] = np.float64(f * RAD_PER_CYCLE).view(np.uint64)
     return True

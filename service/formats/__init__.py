@@ -20,7 +20,9 @@ from ..errors import (
     refusal,
     repeated,
 )  # fmt: skip
-from ..evaluation import Answers, Batch
+from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
+from ..hints import number_hint
+from ..kernel import FIELDS
 
 __all__ = [
     "FORMATS", "OPTIONS", "Format", "choose", "decode", "limit_values", "media_types", "read_plain", "register",
@@ -115,7 +117,11 @@ def read_plain(text: bytearray, max_batch: int, form: int) -> tuple[Batch, dict[
     if not options.keys() <= set(OPTIONS):
         return None
     given = {name: value for name, value in options.items() if value is not None}
-    return Batch(size, [column[:size] for column in columns]), given
+    reasons: dict[int, Reason] = {}
+    for name, column in zip(FIELDS, columns[:, :size], strict=True):
+        for index in np.flatnonzero(np.isnan(column))[:MAX_ERRORS].tolist():
+            reasons.setdefault(index, (name, number_hint(None, name)))
+    return Batch(size, list(columns[:, :size]), reasons), given
 
 
 def limit_values(text: bytearray, max_batch: int, per_case: int) -> None:
