@@ -117,9 +117,10 @@ def read_plain(text: bytearray, max_batch: int, form: int) -> tuple[Batch, dict[
     if not options.keys() <= set(OPTIONS):
         return None
     given = {name: value for name, value in options.items() if value is not None}
+    missing = np.isnan(columns[:, :size])
     reasons: dict[int, Reason] = {}
-    for name, column in zip(FIELDS, columns[:, :size], strict=True):
-        for index in np.flatnonzero(np.isnan(column))[:MAX_ERRORS].tolist():
+    for name, where in zip(FIELDS, missing, strict=True) if missing.any() else ():
+        for index in np.flatnonzero(where)[:MAX_ERRORS].tolist():
             reasons.setdefault(index, (name, number_hint(None, name)))
     return Batch(size, list(columns[:, :size]), reasons), given
 
