@@ -39,7 +39,7 @@ router = APIRouter(tags=["answers"])
 
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are taken
-_LINES = 1024 * 1024  # bytes of lines that are answered together
+_LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
 _NO_QUERY = BatchQuery()
 
