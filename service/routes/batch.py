@@ -225,9 +225,11 @@ class BatchResponse(Response):
             })  # fmt: skip
             number = 0
             while True:
-                cut = len(text) if not more else text.rfind(b"\n") + 1
-                for lines in _cut(text, cut, _LINES):
-                    pieces, count = await work.run(partial(_answered, answers, lines, number))
+                if not more and not text.endswith(b"\n"):
+                    text += b"\n"
+                cut = text.rfind(b"\n") + 1
+                for start, stop in _cut(text, cut, _LINES):
+                    pieces, count = await work.run(partial(_answered, answers, text, start, stop, number))
                     number += count
                     for piece in pieces:
                         await work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
@@ -309,20 +311,19 @@ class _Pieces:
         return text, self._more
 
 
-def _cut(text: bytearray, stop: int, most: int) -> Iterator[bytearray]:
-    """Whole lines of the text before ``stop``, some at a time, with one byte after the last."""
+def _cut(text: bytearray, stop: int, most: int) -> Iterator[tuple[int, int]]:
+    """Where some whole lines of the text before ``stop`` begin and end, one after another."""
     start = 0
     while start < stop:
         end = stop if stop - start <= most else text.find(b"\n", start + most, stop) + 1 or stop
-        piece = text[start:end]
-        yield piece if piece.endswith(b"\n") else piece + b"\n"
+        yield start, end
         start = end
 
 
-def _answered(answers: LineAnswers, text: bytearray, number: int) -> tuple[list[bytes], int]:
+def _answered(answers: LineAnswers, text: bytearray, start: int, stop: int, number: int) -> tuple[list[bytes], int]:
     """The answers to some lines, and the number of lines; blank lines are counted and have no answer."""
-    spans, start, count = [], 0, 0
-    while start < len(text):
+    spans, count = [], 0
+    while start < stop:
         end = text.find(b"\n", start)
         count += 1
         if text[start] not in b" \t\r\n" or text[start:end].strip():
