@@ -46,7 +46,7 @@ from service.formats import choose
 from service.quantities import QUANTITIES
 from service.tables import LoadedTable
 
-CHOICES = ("includes", "waiting", "streams", "once", "start", "replicas", "advice")
+CHOICES = ("single", "includes", "waiting", "streams", "once", "start", "replicas", "advice")
 PAGE = ROOT / "docs" / "service.md"
 PLACES = {"over-http": ROOT / "README.md"}  # all others are on the page
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
@@ -269,18 +269,26 @@ def load(
     return 1e6 * spent / requests, float(words[words.index("Requests/sec:") + 1])
 
 
-def measure_single(peers: dict[str, str], rounds: int, seconds: int, folder: Path) -> dict[str, tuple[float, float]]:
+def measure_single(options: argparse.Namespace, folder: Path) -> dict[str, tuple[float, float]]:
     """Median processor time [us] and rate for every server and kind of request."""
+    rounds, seconds = options.rounds, options.seconds
+    peers = {
+        name: python
+        for python in [sys.executable, *options.peers]
+        for name in ("umbridge", "mlserver")
+        if has(python, name)
+    }
     asked: dict[str, list[tuple[str, Question]]] = {
         "mumacro": [("POST", post()), ("GET", get())],
         "raw": [("POST", post()), ("GET", get())],
+        "inside": [("POST", post())],
         "fastapi": [("POST", post())],
         "fastapi_sync": [("POST", post())],
         "umbridge": [("POST", umbridge_question())],
         "mlserver": [("POST", mlserver_question())],
     }
     found: dict[str, list[tuple[float, float]]] = {}
-    contexts = [ours(), peer("raw"), peer("fastapi"), peer("fastapi_sync")]
+    contexts = [ours(), peer("raw"), peer("inside"), peer("fastapi"), peer("fastapi_sync")]
     contexts += [peer(name, python) for name, python in peers.items()]
     with _all(contexts) as servers:
         scripts: list[tuple[Server, str, Path, Server | None]] = [
@@ -816,11 +824,21 @@ NAMES = {
     "raw POST behind nginx": "raw ASGI and orjson, `POST`, behind nginx",
     "raw POST": "raw ASGI and orjson, `POST`, nothing checked",
     "raw GET": "raw ASGI and orjson, `GET`, nothing checked",
+    "inside POST": "the same as a middleware of FastAPI, `POST`",
     "fastapi POST": "FastAPI, models in and out, `async def`",
     "fastapi_sync POST": "FastAPI, models in and out, `def`",
     "umbridge POST": "UM-Bridge's Python server, a constant",
     "mlserver POST": "MLServer, its first input",
 }
+
+
+def single_table(single: dict[str, tuple[float, float]]) -> str:
+    """One case: every server beside the floor that gets the same requests in the same way."""
+    table = []
+    for name, (spent, rate) in single.items():
+        floor = single.get(f"raw {name.partition(' ')[2]}", single["raw POST"])[0]
+        table.append([NAMES[name], quantity(spent, 3), quantity(rate, 3), f"{floor / spent:.2f}"])
+    return markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table)
 
 
 def overview(single: dict[str, tuple[float, float]], rates: dict[str, dict[int, float]]) -> str:
@@ -861,20 +879,8 @@ def report(
     options: argparse.Namespace, folder: Path
 ) -> tuple[dict[str, str], dict[str, dict[int, float]], dict[str, float]]:
     """Measure everything; return the sections of the page."""
-    peers = {
-        name: python
-        for python in [sys.executable, *options.peers]
-        for name in ("umbridge", "mlserver")
-        if has(python, name)
-    }
-    single = measure_single(peers, options.rounds, options.seconds, folder)
-    table = []
-    for name, (spent, rate) in single.items():
-        floor = single.get(f"raw {name.partition(' ')[2]}", single["raw POST"])[0]
-        table.append([NAMES[name], quantity(spent, 3), quantity(rate, 3), f"{floor / spent:.2f}"])
-    sections = {
-        "single": markdown(["one case", "processor time [us]", "requests/s", "floor / this"], table),
-    }
+    single = measure_single(options, folder)
+    sections = {"single": single_table(single)}
     rates = measure_batches(options.rounds, folder)
     alone = parts(options.rounds)
     rows = [
@@ -912,6 +918,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         if options.only:
             measures = others(options, Path(name))
+            measures["single"] = lambda: single_table(measure_single(options, Path(name)))
             sections: dict[str, str] = {chosen: measures[chosen]() for chosen in options.only}
         else:
             sections, rates, alone = report(options, Path(name))

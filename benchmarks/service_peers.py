@@ -1,8 +1,8 @@
 """The servers for comparison: ``python benchmarks/service_peers.py NAME PORT``.
 
-``raw``: ASGI and orjson only, without checks: the cost of the server underneath.  ``fastapi`` and
-``fastapi_sync``: models in and out, as in its tutorial.  ``umbridge``: the Python server of UM-Bridge.
-``mlserver``: writes a model's folder and starts MLServer.
+``raw``: ASGI and orjson only, without checks: the cost of the server underneath.  ``inside``: the same, answered by
+a middleware of a FastAPI application.  ``fastapi`` and ``fastapi_sync``: models in and out, as in its tutorial.
+``umbridge``: the Python server of UM-Bridge.  ``mlserver``: writes a model's folder and starts MLServer.
 """
 
 import json
@@ -47,6 +47,24 @@ def raw() -> Any:
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         await send({"type": "http.response.body", "body": body})
 
+    return app
+
+
+def inside() -> Any:
+    """The floor as a middleware: no application that lets other middleware see its requests is faster."""
+    from fastapi import FastAPI
+
+    floor = raw()
+
+    class Floor:
+        def __init__(self, app: Any) -> None:
+            self.app = app
+
+        async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+            await (floor if scope["type"] == "http" else self.app)(scope, receive, send)
+
+    app = FastAPI()
+    app.add_middleware(Floor)
     return app
 
 
@@ -167,7 +185,8 @@ def main(name: str, port: int) -> None:
     else:
         import uvicorn
 
-        app = raw() if name == "raw" else fastapi(sync=name == "fastapi_sync")
+        made = {"raw": raw, "inside": inside, "fastapi": lambda: fastapi(False), "fastapi_sync": lambda: fastapi(True)}
+        app = made[name]()
         uvicorn.run(app, port=port, access_log=False, server_header=False, log_level="warning")
 
 
