@@ -131,12 +131,11 @@ class Tables:
         self.warm = False  # whether everything compiled is loaded, not only what the first answers need
 
     def load(self, before_answers: Callable[[list[dict[str, Any]]], None] | None = None) -> None:
-        """Load all tables and the reader of batches.  A refused table makes the service not ready; it stops nothing.
+        """Load all tables.  A refused table makes the service not ready; it never stops the process.
 
         ``before_answers`` is called with the labels of the tables before the first request is answered.
         """
         try:
-            numbers.load()
             tables = [LoadedTable.open(path) for path in table_files(self.paths)]
             names = [table.surrogate.id for table in tables]
             for table in tables:
@@ -208,7 +207,8 @@ class Tables:
         return self.loaded
 
     def warm_up_more(self) -> None:
-        """Load or compile the code that the first answers do not need."""
+        """Load or compile the code that the first answers do not need: the reader of batches, then the quantities."""
+        numbers.load()
         for table in self.loaded[:1]:
             table.kernel.warm_up_more()
         self.warm = True

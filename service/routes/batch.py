@@ -41,6 +41,7 @@ _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are taken
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
+_LONG = 1e9  # cost of what may have to be compiled first
 _NO_QUERY = BatchQuery()
 
 
@@ -119,14 +120,15 @@ class BatchResponse(Response):
         chosen = self._chosen or choose(media_type, memoryview(text))
         query = self._options({}, "parameter")[0]
         # Reading costs by the byte, computing by the case: a small body can request much computation.
-        batch, given = await self._run(partial(chosen.read, text, self._batches.max_batch), size / _BYTES_PER_UNIT)
+        reading = size / _BYTES_PER_UNIT if self._batches.tables.warm else _LONG
+        batch, given = await self._run(partial(chosen.read, text, self._batches.max_batch), reading)
         options, place = self._options(given, "pointer") if given else (query, "parameter")
         if given and self._query.given().get("tolerance") is not None:
             place = "parameter"
         del text
         table = self._batches.tables.pick(options.tolerance, place)
         include = options.names()
-        cost = batch.size * cost_of(include) * (1.0 if not include or self._batches.tables.warm else 1e9)
+        cost = batch.size * cost_of(include) * (1.0 if not include or self._batches.tables.warm else _LONG)
         answers = await self._run(partial(answer_batch, table, batch, include, deviations(options.std)), cost)
         del batch
         self._batches.count(table, answers)
