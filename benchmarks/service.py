@@ -381,6 +381,7 @@ wrk.path = "%s"
 
 def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: Path, accept: str = "identity") -> float:
     caller = Caller(server.port)
+    time.sleep(0.5)  # until batches that earlier clients left unread are released
     status = caller.ask(BATCH, body, kind, accept)  # the first batch in Arrow loads pyarrow
     if status != 200:
         raise RuntimeError(f"{server.name}: {status}")
@@ -391,7 +392,7 @@ def _rate(server: Server, body: bytes, kind: str, n: int, rounds: int, folder: P
         script.write_text(_FILE_SCRIPT % (json.dumps(str(folder / "body")), kind, accept, BATCH))
         found = []
         for _ in range(rounds):
-            time.sleep(0.5)  # until batches that earlier clients left unread are released
+            time.sleep(0.5)
             found.append(n / load(server, script, 1, AT_ONCE[-1])[0])
         return statistics.median(found)
     found = []
