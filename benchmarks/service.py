@@ -357,6 +357,11 @@ def body_of(form: str, n: int) -> bytes:
     return bytes(sink.getvalue())
 
 
+def accepted(form: str) -> str:
+    """The Accept-Encoding of a client."""
+    return "gzip" if form == "gzip" else "identity"
+
+
 def measure_batches(rounds: int, folder: Path) -> dict[str, dict[int, float]]:
     """Million cases a second of processor time by form and size; small ones with clients that send without pause."""
     rates: dict[str, dict[int, float]] = {form: {} for form in (*KINDS, "fastapi")}
@@ -364,8 +369,7 @@ def measure_batches(rounds: int, folder: Path) -> dict[str, dict[int, float]]:
         for n in SIZES:
             progress(f"batches of {n}")
             for form in KINDS:
-                accept = "gzip" if form == "gzip" else "identity"
-                rates[form][n] = _rate(server, body_of(form, n), KINDS[form], n, rounds, folder, accept)
+                rates[form][n] = _rate(server, body_of(form, n), KINDS[form], n, rounds, folder, accepted(form))
             if n <= 100_000:
                 rates["fastapi"][n] = _rate(plain, body_of("rows", n), KINDS["rows"], n, rounds, folder)
     return rates
@@ -548,7 +552,7 @@ def measure_waiting() -> list[list[str]]:
             waits: dict[str, list[float]] = {name: [] for name in asked}
             for _ in range(WAITED_FOR[n]):
                 with ThreadPoolExecutor(1) as pool:
-                    large = pool.submit(_in_another_process, server.port, body, KINDS[form])
+                    large = pool.submit(_in_another_process, server.port, body, form)
                     while not large.done():
                         for name, (other, method, target, content) in asked.items():
                             begun = time.perf_counter()
@@ -600,13 +604,14 @@ def _note(statuses: list[int], server: Server, path: str, body: bytes, kind: str
     statuses.append(server.ask("POST", path, body, kind)[0])
 
 
-def _in_another_process(port: int, body: bytes, kind: str) -> None:
+def _in_another_process(port: int, body: bytes, form: str) -> None:
     """Send from another process: threads of one process would wait for each other, not for the server."""
     with tempfile.NamedTemporaryFile() as file:
         file.write(body)
         file.flush()
         command = ["curl", "--silent", "--show-error", "--fail", "--output", os.devnull, "--noproxy", "*"]
-        command += ["--header", f"Content-Type: {kind}", "--header", "Expect:", "--data-binary", f"@{file.name}"]
+        headers = (f"Content-Type: {KINDS[form]}", f"Accept-Encoding: {accepted(form)}", "Expect:")
+        command += [*(word for header in headers for word in ("--header", header)), "--data-binary", f"@{file.name}"]
         subprocess.run(["taskset", "-c", str(CLIENT_CORE), *command, f"http://127.0.0.1:{port}{BATCH}"], check=True)
 
 
@@ -813,7 +818,7 @@ def plot(rates: dict[str, dict[int, float]], alone: dict[str, float], path: Path
         axes.set_xlabel("cases in a batch")
         axes.grid(True, color="#e4e4e4")
         axes.spines[["top", "right"]].set_visible(False)
-    right.legend(framealpha=1.0, edgecolor="none", fontsize=8)
+    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
