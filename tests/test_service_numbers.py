@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service import numbers
+from service.errors import BatchTooLargeError
 from service.formats import columns, decode, read_plain, rows
 from service.numbers import BLOCK, CASE, NO_ROOM, ROWS
 
@@ -19,10 +20,10 @@ PAIR = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": [0.0
 ONE = {**PAIR, "v0": 0.01}
 
 
-def read(text, room=100, behind=b"\0"):
+def read(text, room=100):
     """(size, form, columns, texts of the other members)."""
     columns, data = np.empty((6, room)), text.encode()
-    size, form, spans = numbers.read(np.frombuffer(bytearray(data + behind), dtype=np.uint8), columns)
+    size, form, spans = numbers.read(np.frombuffer(bytearray(data + b"\0"), dtype=np.uint8), columns)
     return size, form, columns[:, : max(size, 0)], [data[start:stop].decode() for start, stop in spans]
 
 
@@ -159,6 +160,15 @@ def test_rows_have_the_same_cases_and_reasons_by_both_readers(changes):
     plain = read_plain(text, 100, ROWS)
     if plain is not None:
         assert batch_of(plain) == batch_of((rows.read_values(decode(text, list)), {}))
+
+
+@pytest.mark.parametrize("body", [{**PAIR, "v0": [0.01] * 101}, [ONE] * 101])
+def test_too_many_cases_are_refused_by_the_compiled_reader(body, monkeypatch):
+    read_whole = rows.Rows().read if isinstance(body, list) else columns.Columns().read
+    for module in (rows, columns):
+        monkeypatch.setattr(module, "decode", None)  # the slow reader is not called
+    with pytest.raises(BatchTooLargeError):
+        read_whole(bytearray(json.dumps(body).encode()), 100)
 
 
 def test_a_null_in_a_list_is_read_by_compiled_code():

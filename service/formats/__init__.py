@@ -19,7 +19,7 @@ from ..errors import (
     RequestError,
     refusal,
     repeated,
-)  # fmt: skip
+)
 from ..evaluation import MAX_ERRORS, Answers, Batch, Reason
 from ..hints import number_hint
 from ..kernel import FIELDS
@@ -100,14 +100,21 @@ def too_large(max_batch: int) -> BatchTooLargeError:
 
 
 def read_plain(text: bytearray, max_batch: int, form: int) -> tuple[Batch, dict[str, Any]] | None:
-    """The cases and options of a body in the usual form, BLOCK or ROWS; None for any other body."""
+    """The cases and options of a body in the usual form, BLOCK or ROWS; None for any other body.
+
+    Raises
+    ------
+    BatchTooLargeError
+    """
     text.append(0)
     try:
         columns = np.empty((6, min(max_batch, len(text) // 2)))  # only written pages take memory
         size, found, spans = numbers.read(np.frombuffer(text, dtype=np.uint8), columns)
     finally:
         text.pop()
-    if size <= 0 or found != form:
+    if size == numbers.NO_ROOM:
+        raise too_large(max_batch)
+    if size == 0 or found != form:
         return None
     try:
         members = b",".join(text[start:stop] for start, stop in spans)

@@ -80,9 +80,11 @@ class LineAnswers:
     max_batch : int
         Cases of one line.
     answer : callable
-        Answers one text as a batch of its own: (text, media type) -> pieces.
+        Answers one text as a batch of its own.
     count : callable
         Counts answers.
+    path : str
+        That of the request, for the problems of single lines.
     """
 
     def __init__(
