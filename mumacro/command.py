@@ -19,8 +19,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro.bundled import bundled_tables
-from mumacro.dimensional import FIELDS, RAD_PER_CYCLE
-from mumacro.input_names import NAMES, SI, read_number, suggestion
+from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, read_number, suggestion
 from mumacro.inverse import Root, solve_for
 from mumacro.kernel_cache import cache_folder, kernels_are_cached
 from mumacro.law import approximations, friction_law, straight_pieces, sweep_values

@@ -1,173 +1,37 @@
-"""Dimensional inputs: what is legal, the dimensionless groups, and the chain rule to the six inputs.
+"""Kernels of dimensional cases: the dimensionless groups, the answer, and the chain rule to the six inputs.
 
 y~ = y0 k / (mu0 Fz), v~ = v0 k / (mu0 Fz omega), l0 = mu0 Fz / k (eq. (5)); SI units throughout.  An infinite k is
-rigid contact, eq. (37).
+rigid contact, eq. (37).  What is legal stands in :mod:`mumacro.inputs`.
 """
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mumacro.charts import DENORMAL, MU, NO_OSCILLATION, OTHER, RIGID, ROUNDING, STATIC_LIMIT
-from mumacro.errors import InputError
 from mumacro.evaluate import answer, answer_with_slopes, common_ratio, speed_slope_at_zero
 from mumacro.kernel_cache import kernel, part
 from mumacro.outer import outer_expansion
 
 __all__ = [
-    "BOUNDS",
-    "FIELDS",
-    "MOST_HZ",
-    "POSITIVE",
-    "RAD_PER_CYCLE",
-    "UNITS",
-    "Fault",
-    "as_columns",
-    "check_inputs",
     "evaluate_case",
     "evaluate_unusual",
-    "find_faults",
     "first_bad",
     "gradient",
     "group_columns",
     "groups",
-    "length_scale",
     "other_cases",
-    "real",
     "scaled",
 ]
 
-FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
-UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
-POSITIVE = ("mu0", "Fz", "k")
-BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in FIELDS}
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
-MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
-
-
-@dataclass(frozen=True)
-class Fault:
-    """One bad value of a batch: where, which field, what was given, why it is refused."""
-
-    index: int
-    field: str
-    value: float
-    reason: str
-
-
-def _bad(name: str, values: Array) -> NDArray[np.bool_]:
-    legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
-    out: NDArray[np.bool_] = ~(legal if name == "k" else legal & np.isfinite(values))
-    return out
-
-
-def find_faults(columns: Mapping[str, ArrayLike | None]) -> list[Fault]:
-    """Every bad case of a batch, one fault (its first bad field) a case, in order.
-
-    ``columns`` maps field names to scalars or arrays that broadcast together; None for ``k`` is rigid contact.
-    """
-    names = [name for name in FIELDS if columns.get(name) is not None]
-    arrays = dict(
-        zip(names, np.broadcast_arrays(*(np.asarray(columns[n], dtype=np.float64) for n in names)), strict=True)
-    )
-    first: dict[int, Fault] = {}
-    for name in names:
-        values = arrays[name].ravel()
-        for i in np.flatnonzero(_bad(name, values)):
-            first.setdefault(int(i), Fault(int(i), name, float(values[i]), f"must be {BOUNDS[name]}"))
-    return [first[i] for i in sorted(first)]
-
-
-def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
-    """The six inputs as float64 arrays; their values are not checked.
-
-    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, or None.
-
-    Raises
-    ------
-    InputError
-        An input is missing, given twice, or not a real number.
-    """
-    converted: dict[str, Array] = {}
-    if (given.get("omega") is None) == (given.get("f") is None):
-        both = given.get("omega") is not None
-        raise InputError(
-            "omega", given.get("omega"), "given or f [Hz] in its place, " + ("not both" if both else "one of them")
-        )
-    for name in FIELDS:
-        source = "f" if name == "omega" and given.get("omega") is None else name
-        if source not in given:
-            hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
-            raise InputError(name, None, f"given{hint}")
-        value = given[source]
-        if name == "k" and value is None:
-            value = math.inf
-        array = real(source, value)
-        if source == "f":
-            with np.errstate(over="ignore"):  # infinite, which is refused as a value of f
-                array = array * RAD_PER_CYCLE
-        converted[name] = array
-    return converted
-
-
-def real(name: str, value: Any) -> Array:
-    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy would convert them.
-
-    What is masked is unknown: NaN.
-    """
-    try:
-        if isinstance(value, np.ma.MaskedArray):
-            value = np.ma.filled(value.astype(np.float64), math.nan) if value.dtype.kind in "fiub" else value.data
-        array = np.asarray(value)
-        if array.dtype.kind in "fiub":
-            return array.astype(np.float64, copy=False)
-        if array.dtype.kind == "O" and not any(isinstance(x, (str, bytes)) or x is None for x in array.ravel()):
-            return array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise InputError(name, value, "a real number or an array of them")
-
-
-def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
-    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega.
-
-    Raises
-    ------
-    InputError
-        Naming field, value, bound and, in an array, the index.
-    """
-    for name, values in columns.items():
-        bad = _bad(name, values)
-        if bad.any():
-            i = int(np.flatnonzero(bad.ravel())[0])
-            field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
-            raise InputError(field, float(told.ravel()[i]), BOUNDS[name], i if values.ndim else None)
-
 
 # --- groups ---------------------------------------------------------------------------------------------
-
-
-def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:
-    """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact."""
-    mu0, Fz, k = np.broadcast_arrays(mu0, Fz, k)
-    with np.errstate(all="ignore"):
-        quotient = Fz / k
-        out = np.asarray(mu0 * quotient)
-        low, high = np.minimum(quotient, out), np.maximum(quotient, out)
-        odd = ~((low > 1e-290) & (high < 1e290))  # there a partial result may have lost digits
-        if odd.any():
-            (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
-            out[odd] = np.ldexp(a * (b / c), i + j - n)
-    return out
 
 
 @part
@@ -218,7 +82,7 @@ def groups(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) 
 
 @part
 def first_bad(mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> int:
-    """0 for a case within :data:`BOUNDS`, else 1 + the place of its first bad field among :data:`FIELDS`."""
+    """0 for a case within the bounds of inputs.py, else 1 + the place of its first bad field among FIELDS."""
     if not 0.0 < mu0 < math.inf:
         return 1
     if not 0.0 < Fz < math.inf:

@@ -16,6 +16,7 @@ from mumacro.border import Border
 from mumacro.bundled import bundled_tables
 from mumacro.cells import block_rows, cells_2d, joined
 from mumacro.errors import InputError, TableError
+from mumacro.inputs import FIELDS, as_columns, check_inputs, length_scale, real
 from mumacro.processors import default_threads
 from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
 
@@ -141,7 +142,7 @@ class Surrogate:
 
     def warm_up(self, arrays: bool = True) -> None:
         """Load or compile the kernels of scalar calls, and of calls with ``arrays``, before they are needed."""
-        case: dict[str, Any] = dict.fromkeys(dimensional.FIELDS, 1.0)
+        case: dict[str, Any] = dict.fromkeys(FIELDS, 1.0)
         self.evaluate(**case)
         if arrays:
             self.mu_ratio(np.array([0.1, 1e4]), 2.0)
@@ -439,22 +440,20 @@ class Surrogate:
         quotient = Fz / k
         length = mu0 * quotient
         if not (1e-290 < quotient < 1e290 and 1e-290 < length < 1e290):
-            length = float(dimensional.length_scale(*(np.array(x) for x in (mu0, Fz, k))))
+            length = float(length_scale(*(np.array(x) for x in (mu0, Fz, k))))
         answer = Answer(mu0 * mu, mu, mu0 * bound, source, (v, y, length), self._certain)
         if gradient:
             out = np.empty((2, 6))
             dimensional.gradient(mu0, Fz, k, y0, omega, v0, mu, bound, source, v, y, *self._data, out)
-            answer.gradient, answer.gradient_bound = (
-                dict(zip(dimensional.FIELDS, r, strict=True)) for r in out.tolist()
-            )
+            answer.gradient, answer.gradient_bound = (dict(zip(FIELDS, r, strict=True)) for r in out.tolist())
         return answer
 
     def _evaluate(self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str) -> Any:
         if illegal not in ("nan", "raise"):
             raise InputError("illegal", illegal, '"nan" or "raise"')
-        unknown = inputs.keys() - {*dimensional.FIELDS, "f"}
+        unknown = inputs.keys() - {*FIELDS, "f"}
         if unknown:
-            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(dimensional.FIELDS)} or f")
+            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(FIELDS)} or f")
         if cases is not None:
             picked = _picked(cases)
             if twice := picked.keys() & inputs.keys():
@@ -464,14 +463,14 @@ class Surrogate:
             from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
 
             return evaluate_labelled(self, cases, inputs, gradient=gradient, groups=groups, illegal=illegal)
-        columns = dimensional.as_columns(inputs)
+        columns = as_columns(inputs)
         try:
             shape = np.broadcast_shapes(*(c.shape for c in columns.values()))
         except ValueError as error:
             shapes = {name: column.shape for name, column in columns.items()}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         if not shape or illegal == "raise":
-            dimensional.check_inputs(columns, inputs.get("f"))
+            check_inputs(columns, inputs.get("f"))
         if not shape:
             a, b, c, d, e, f = (float(column) for column in columns.values())
             return self._scalar(a, b, c, d, e, f, self._case(a, b, c, d, e, f), gradient)
@@ -484,7 +483,7 @@ class Surrogate:
         macro, mu, bound, source, v, y = batch.cases(self._data, flat, n, self.threads, groups)
         answer = Answer(macro.reshape(shape), mu.reshape(shape), bound.reshape(shape), source.reshape(shape))
         if groups:
-            length = dimensional.length_scale(*columns[:3])
+            length = length_scale(*columns[:3])
             length = np.where(answer.source_code == -1, np.nan, length)
             answer._groups, answer._certain = (v.reshape(shape), y.reshape(shape), length), self._certain
         if gradient:
@@ -492,7 +491,7 @@ class Surrogate:
                 ratio_bound = bound / flat[0]
             slopes = batch.gradients(self._data, flat, mu, ratio_bound, source, v, y, self.threads)
             parts = [np.moveaxis(slopes[:, i, :], 1, 0).reshape(6, *shape) for i in (0, 1)]
-            answer.gradient, answer.gradient_bound = (dict(zip(dimensional.FIELDS, p, strict=True)) for p in parts)
+            answer.gradient, answer.gradient_bound = (dict(zip(FIELDS, p, strict=True)) for p in parts)
         return answer
 
     def _certain(self, v_tilde: Any, y_tilde: Any) -> Any:
@@ -567,7 +566,7 @@ def _picked(cases: Any) -> dict[str, Any]:
     try:
         cases.keys()  # which a list or a string does not have
         # coordinates of a Dataset are inputs, too, although they are not keys
-        picked = {name: cases[name] for name in (*dimensional.FIELDS, "f") if name in cases}
+        picked = {name: cases[name] for name in (*FIELDS, "f") if name in cases}
     except (AttributeError, TypeError, KeyError) as error:
         raise InputError(
             "cases", type(cases).__name__, "a mapping, DataFrame or Dataset with the inputs by name"
@@ -593,7 +592,7 @@ def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
 
 def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Both broadcast together, flat, contiguous and writable (one numba signature), and their shape."""
-    v, y = dimensional.real("v_tilde", v_tilde), dimensional.real("y_tilde", y_tilde)
+    v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
     try:
         shape = np.broadcast_shapes(v.shape, y.shape)
     except ValueError as error:

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from mumacro import Surrogate
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, ROUNDING, SOURCES
-from mumacro.dimensional import BOUNDS as BOUNDS_OF_FIELDS
-from mumacro.dimensional import FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE
-from mumacro.input_names import NAMES as INPUTS
-from mumacro.input_names import SI, scale_of, suggestion
+from mumacro.inputs import BOUNDS as BOUNDS_OF_FIELDS
+from mumacro.inputs import FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE, SI, scale_of, suggestion
+from mumacro.inputs import NAMES as INPUTS
 
 __all__ = [
     "BOUNDS", "FIELDS", "INPUTS", "MOST_HZ", "POSITIVE", "RAD_PER_CYCLE", "REGIMES", "REGIME_NAMES",

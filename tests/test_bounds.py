@@ -14,7 +14,7 @@ from builder.sweep import Sweep
 from builder.verify import CASES, draw
 from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, MU, POWER, QUANTITIES, REGIME_OF_SOURCE, STICK
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 
 pytestmark = pytest.mark.slow
 

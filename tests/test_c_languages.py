@@ -7,7 +7,7 @@ import pytest
 
 from builder.export import export_table
 from mumacro import Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.__main__ import COMMANDS, main
-from mumacro.input_names import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
+from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 LAW_FROM = ("law", CASE, "--from", "1", "--to", "2", "--radius", "1")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, MumacroError, Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from mumacro.interop.derivatives import quantities
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}

@@ -13,16 +13,8 @@ from mpmath import ellipk, mpf, pi, workdps
 
 from builder.steady import solve
 from mumacro import InputError, Surrogate, dimensional
-from mumacro.dimensional import (
-    BOUNDS,
-    FIELDS,
-    POSITIVE,
-    UNITS,
-    as_columns,
-    check_inputs,
-    find_faults,
-    group_columns,
-)
+from mumacro.dimensional import group_columns
+from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, UNITS, as_columns, check_inputs
 
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-10.nc"
 PLAIN = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -359,6 +351,15 @@ def test_rigid_is_given_as_none_or_infinity_in_numbers_and_in_arrays(table: Surr
     assert mixed.mu_macro[[0, 1, 3]].tolist() == [expected.mu_macro, elastic.mu_macro, expected.mu_macro]
     assert mixed.length_scale[0] == 0.0
     assert mixed.gradient["k"][0] == 0.0
+    assert table.evaluate(**{**PLAIN, "k": "rigid"}).mu_macro == expected.mu_macro
+    worded = table.evaluate(**{**PLAIN, "k": ["Rigid", PLAIN["k"], math.nan]})
+    assert worded.source.tolist() == ["rigid", elastic.source, ""]
+
+
+@pytest.mark.parametrize("gap", [None, "", "much"])
+def test_a_gap_in_a_list_is_no_rigid_contact(table: Surrogate, gap: Any) -> None:
+    with pytest.raises(InputError, match=r"^k must be a real number"):
+        table.evaluate(**{**PLAIN, "k": ["rigid", gap]})
 
 
 @pytest.mark.parametrize("bad", ["much", [1.0, "x"], {"a": 1}, object(), 1j, [[1.0], [1.0, 2.0]]])
@@ -372,38 +373,6 @@ def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate) -> None:
     with pytest.raises(InputError, match="shapes broadcast together") as caught:
         table.evaluate(**{**PLAIN, "Fz": [1.0, 2.0], "v0": [1.0, 2.0, 3.0]})
     assert "(2,)" in str(caught.value)
-
-
-def test_faults_of_a_batch_come_in_order_one_for_a_case() -> None:
-    faults = find_faults(
-        {
-            "mu0": 0.3,
-            "Fz": [1.0, -1.0, 1.0, 0.0, 1.0],
-            "k": [1.0, math.nan, 1.0, 1.0, 1.0],
-            "y0": 0.0,
-            "omega": 1.0,
-            "v0": [0.0, 0.0, 0.0, 0.0, math.inf],
-        }
-    )
-    assert [(fault.index, fault.field) for fault in faults] == [(1, "Fz"), (3, "Fz"), (4, "v0")]
-    assert [fault.value for fault in faults] == [-1.0, 0.0, math.inf]
-    assert [fault.reason for fault in faults] == [
-        "must be finite and > 0", "must be finite and > 0", "must be finite and >= 0",
-    ]  # fmt: skip
-
-
-def test_a_bad_scalar_affects_every_case_of_a_batch() -> None:
-    faults = find_faults({**PLAIN, "omega": -1.0, "v0": [1.0, 2.0, 3.0]})
-    assert [(fault.index, fault.field) for fault in faults] == [(0, "omega"), (1, "omega"), (2, "omega")]
-
-
-def test_faultless_batches_and_rigid_contacts() -> None:
-    assert find_faults(PLAIN) == []
-    assert find_faults({**PLAIN, "k": None}) == []
-    without = {name: value for name, value in PLAIN.items() if name != "k"}
-    assert find_faults(without) == []
-    assert as_columns({**PLAIN, "v0": [1, 2]})["v0"].dtype == np.float64
-    assert as_columns({**PLAIN, "k": None})["k"] == math.inf
 
 
 # --- columns and single cases without checks ----------------------------------------------------------

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mumacro import InputError
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from mumacro.inverse import border_crossings, solve_for
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 

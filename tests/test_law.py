@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mumacro import closed_forms
-from mumacro.dimensional import FIELDS
 from mumacro.errors import InputError
+from mumacro.inputs import FIELDS
 from mumacro.law import (
     APPROXIMATIONS,
     BORDERS,

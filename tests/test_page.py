@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mumacro import closed_forms
-from mumacro.input_names import UNITS_OF
+from mumacro.inputs import UNITS_OF
 from mumacro.law import APPROXIMATIONS, BORDERS
 from service.routes import docs
 from service.routes import page as page_route

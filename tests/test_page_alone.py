@@ -10,7 +10,7 @@ import pytest
 from builder.c.wasm import compiler
 from builder.export import export_table
 from mumacro import Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from service.static_page import PageError, main, write_page
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from service.app import create_app
 from service.settings import Settings
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.charts import QUANTITIES
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 
 if TYPE_CHECKING:
     from mumacro.answer import Answer
