@@ -25,7 +25,7 @@ MU_EXPORT const mumacro_kernel *mumacro_kernel_at(int level) {
 #endif
 #if defined MUMACRO_HAS_AVX512
     if (level == 2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl"))
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
         return &mumacro_kernel_avx512;
 #endif
     return NULL;

@@ -1,0 +1,149 @@
+"""Compile mumacro/kernel into the shared object that the library opens: ``python hatch_build.py [FOLDER]``.
+
+Without FOLDER it is made in place.  hatchling calls the class below for wheels and editable installs.  The compiler is
+the one that CC names, else cc, clang or gcc, else the package ziglang, which then becomes a build dependency.  CFLAGS
+is not read: other flags give other bits.  Two variables change what is made:
+
+    MUMACRO_BUILD_DEBUG=1             no optimization, with debugger symbols and sanitizers; needs gcc or clang
+    MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in pyproject.toml, [tool.mumacro.wheels]
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+import tomllib
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from packaging.tags import platform_tags
+
+ROOT = Path(__file__).resolve().parent
+TARGETS: dict[str, str] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]["wheels"]
+ZIG = [sys.executable, "-m", "ziglang", "cc"]
+OPTIMIZED = ["-O3", "-DNDEBUG"]
+DEBUG = ["-O0", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+FLAGS = ["-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC"]
+FLAGS += DEBUG if os.environ.get("MUMACRO_BUILD_DEBUG") else OPTIMIZED
+AVX2 = ["-mavx2", "-mfma"]
+AVX512 = [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx512bw", "-mprefer-vector-width=512"]
+NO_COMPILER = "No C compiler works here (tried cc, clang and gcc)"
+PROBE = "#include <math.h>\n#include <stdint.h>\nint64_t f(double x) { return (int64_t)floor(x); }\n"
+
+
+def levels(platform: str) -> dict[str, list[str]]:
+    """The instruction levels of a platform with their flags; one of them is chosen when the library is loaded."""
+    return {"base": [], "avx2": AVX2, "avx512": AVX512} if platform.endswith(("x86_64", "amd64")) else {"base": []}
+
+
+def own_platform() -> str:
+    """The tag of this machine.  It promises no older C library: a local compiler binds to the one that is here."""
+    return next(tag for tag in platform_tags() if not tag.startswith(("manylinux", "musllinux")))
+
+
+@functools.cache
+def local_compiler() -> list[str]:
+    """The compiler of this machine, tried on a small program: it may lack headers or AVX-512.  Empty if none works."""
+    named = os.environ.get("CC")
+    # gcc for Windows stores AVX registers at addresses that are not aligned (GCC bug 54412): the program would crash.
+    names = [named] if named else [] if os.name == "nt" else ["cc", "clang", "gcc"]
+    last = list(levels(own_platform()).values())[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "probe.c").write_text(PROBE, "utf-8")
+        for name in names:
+            words = shlex.split(name, posix=os.name != "nt")
+            command = [*words, *FLAGS, *last, "-shared", "probe.c", "-o", "probe.so"]
+            try:
+                subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - the user's compiler
+            except (OSError, subprocess.CalledProcessError):
+                continue
+            return words
+    if named:
+        raise SystemExit(
+            f"CC={named} makes no shared object with {shlex.join(FLAGS + last)}: name another, or unset CC"
+        )
+    return []
+
+
+def choose(platform: str | None) -> tuple[list[str], str]:
+    """The command that compiles for a platform of ``TARGETS``, or without one for this machine; the platform."""
+    if platform and platform not in TARGETS:
+        raise SystemExit(f"MUMACRO_BUILD_PLATFORM={platform} is not one of {', '.join(TARGETS)}")
+    if not platform and (local := local_compiler()):
+        return local, own_platform()
+    if DEBUG[0] in FLAGS:
+        raise SystemExit("MUMACRO_BUILD_DEBUG needs gcc or clang on this machine: zig has no sanitizer for addresses")
+    if not find_spec("ziglang"):
+        raise SystemExit(f"{NO_COMPILER}: install one, or the package ziglang (pip install ziglang)")
+    if not platform:
+        platform = next((tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None)
+    target = ["-target", TARGETS[platform]] if platform else ["-mcpu=baseline"]
+    return [*ZIG, *target], platform or own_platform()
+
+
+def run_together(commands: list[list[str]], folder: str) -> None:
+    """Run commands at the same time; what they print goes to the user."""
+    jobs = [subprocess.Popen(command, cwd=folder) for command in commands]  # noqa: S603 - written in this file
+    codes = [job.wait() for job in jobs]
+    if any(codes):
+        raise SystemExit("The C compiler failed: see above")
+
+
+def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
+    """Compile into a folder; return the path of the shared object and its platform."""
+    compiler, platform = choose(platform)
+    system = ([], "_kernel.dll") if platform.startswith("win") else (["-lm"], "_kernel.so")
+    units = {level: ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in levels(platform).items()}
+    units["dispatch"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in levels(platform))]
+    compiler += FLAGS
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        sources = ROOT / "mumacro" / "kernel"
+        run_together(
+            [
+                [*compiler, *flags, "-c", str(sources / name), "-o", f"{unit}.o"]
+                for unit, (name, *flags) in units.items()
+            ],
+            place,
+        )
+        libraries, name = system
+        run_together([[*compiler, "-shared", *(f"{unit}.o" for unit in units), "-o", name, *libraries]], place)
+        # A running program keeps the old file: the new one takes its place and is not written into it.
+        return (Path(place) / name).replace(folder / name), platform
+
+
+class KernelHook(BuildHookInterface[Any]):
+    """A wheel gets the shared object and a tag for its platform; an editable install has it in place."""
+
+    def dependencies(self) -> list[str]:
+        """Ziglang if no compiler works here, or if another platform is asked for."""
+        if not os.environ.get("MUMACRO_BUILD_PLATFORM"):
+            if local_compiler():
+                return []
+            print(f"{NO_COMPILER}: the package ziglang compiles the kernel", file=sys.stderr)
+        return ["ziglang>=0.14"]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile, in place or into a folder of its own that ends with the wheel."""
+        if version == "editable":
+            build(ROOT / "mumacro")
+            return
+        self.folder = tempfile.TemporaryDirectory()
+        path, platform = build(Path(self.folder.name), os.environ.get("MUMACRO_BUILD_PLATFORM"))
+        build_data["force_include"][str(path)] = f"mumacro/{path.name}"
+        build_data |= {"tag": f"py3-none-{platform}", "pure_python": False}
+
+    def finalize(self, *_: Any) -> None:
+        """Remove that folder."""
+        if hasattr(self, "folder"):
+            self.folder.cleanup()
+
+
+if __name__ == "__main__":
+    path, platform = build(Path(sys.argv[1]).resolve() if sys.argv[1:] else ROOT / "mumacro")
+    print(f"{path} for {platform}, {path.stat().st_size} bytes")
