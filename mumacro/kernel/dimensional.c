@@ -205,3 +205,32 @@ static void mu_cases(const mumacro_data *data, int64_t n, const double *const *c
         mu_chunk_of_cases(data, few, in, out, start);
     }
 }
+
+/* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact. */
+static double mu_length_scale(double mu0, double Fz, double k) {
+    const double quotient = Fz / k, length = mu0 * quotient;
+    int64_t i, j, l;
+    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
+    const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
+    return mu_scale(mantissa, i + j - l);
+}
+
+static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
+                   int with_slopes, mumacro_case *out) {
+    double in[6][MU_CHUNK];
+    const double six[6] = {mu0, Fz, k, y0, omega, v0};
+    mumacro_columns columns = {NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1};
+    int8_t source;
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
+    columns.mu_macro = &out->mu_macro;
+    columns.mu_ratio = &out->mu_ratio;
+    columns.bound = &out->bound;
+    columns.v_tilde = &out->v_tilde;
+    columns.y_tilde = &out->y_tilde;
+    columns.source = &source;
+    columns.slopes = with_slopes ? out->slopes : NULL;
+    mu_chunk_of_cases(data, 1, in, &columns, 0);
+    out->source = source;
+    out->length_scale = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
+}

@@ -5,8 +5,11 @@ static void mu_borders(const mumacro_data *data, int64_t n, const double *y, dou
     for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_at(data, y[i]);
 }
 
-static void mu_border_scales(int piece, int64_t n, const double *y, double *scale) {
-    for (int64_t i = 0; i < n; ++i) scale[i] = mu_border_scale(piece, y[i]);
+static void mu_border_scales(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells) {
+    for (int64_t i = 0; i < n; ++i) {
+        of_nodes[i] = mu_border_scale(piece, y[i]);
+        of_cells[i] = piece == MU_BORDER_MID ? 1.0 : of_nodes[i];
+    }
 }
 
 static void mu_forms(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta,
@@ -37,7 +40,7 @@ static const mumacro_quantity *mu_about(int code) {
 
 static const mumacro_atlas MU_ATLAS = {
     MU_Y_STICK_LO, MU_Y_STICK_HI, MU_Y_CONT, MU_Y_MID, MU_Y_HIGH, MU_Y_TAIL, MU_S_CUT, MU_SIGMA_CUT, MU_RHO_MAX,
-    MU_FAST_KAPPA, MU_ROUNDING, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES, MU_OUTER_CELLS,
+    MU_FAST_KAPPA, MU_ROUNDING, MU_OUTER_LOG_MAX, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES, MU_OUTER_CELLS,
     MU_CHART, MU_PIECE, MU_SOURCE_NAME, MU_REGIME_NAME, MU_REGIME_OF_SOURCE,
 };
 
@@ -48,6 +51,6 @@ static const mumacro_atlas MU_ATLAS = {
 
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
-    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio, mu_borders,
-    mu_forms, mu_border_scales, mu_roots, mu_outers,
+    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio, mu_one,
+    mu_borders, mu_forms, mu_border_scales, mu_roots, mu_outers,
 };

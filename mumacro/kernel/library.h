@@ -34,7 +34,8 @@ typedef struct {
 
 /* Where blocks meet, and other constants of the atlas (charts.c). */
 typedef struct {
-    double y_stick_lo, y_stick_hi, y_cont, y_mid, y_high, y_tail, s_cut, sigma_cut, rho_max, fast_kappa, rounding;
+    double y_stick_lo, y_stick_hi, y_cont, y_mid, y_high, y_tail, s_cut, sigma_cut, rho_max, fast_kappa, rounding,
+        outer_log_max;
     int charts, sources, pieces, quantities, regimes, outer_cells;
     const mumacro_chart *chart;
     const mumacro_piece *piece;
@@ -68,6 +69,13 @@ typedef struct {
     int64_t stride;
 } mumacro_columns;
 
+/* The answer to one case; bound: of the error of mu_macro; l0 = mu0 Fz / k; slopes: d mu_macro / d input and bounds. */
+typedef struct {
+    double mu_macro, mu_ratio, bound, v_tilde, y_tilde, length_scale;
+    int source;
+    double slopes[12];
+} mumacro_case;
+
 /* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or written beyond n.  A
  * single point is an array of one.  Illegal points give NaN and the source -1. */
 typedef struct {
@@ -83,14 +91,17 @@ typedef struct {
     /* dimensional cases: columns mu0, Fz, k, y0, omega, v0, each with a stride of 1, or 0 for one value */
     void (*cases)(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
                   const mumacro_columns *out);
+    /* the same alone, in a fraction of the time: mu~; and a case, whose slopes are filled where they are wanted */
     double (*ratio)(const mumacro_data *data, double v, double y);
+    void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
+                int with_slopes, mumacro_case *out);
     /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
     /* for the builder: base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
     void (*forms)(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta, double *base,
                   double *factor);
-    /* what node values of a piece of the border are multiplied by to give v~crit */
-    void (*border_scale)(int piece, int64_t n, const double *y, double *scale);
+    /* what node values of a piece of the border, and what its cells, are multiplied by to give v~crit */
+    void (*border_scales)(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells);
     void (*normal_form_root)(int64_t n, const double *v, const double *eta, double *root);
     /* the two terms of large speed and their slopes, 5 rows of out */
     void (*outer_expansion)(int64_t n, const double *r, double *out);
