@@ -84,7 +84,7 @@ def choose(platform: str | None) -> tuple[list[str], str]:
     if not platform:
         platform = next((tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None)
     target = ["-target", TARGETS[platform]] if platform else ["-mcpu=baseline"]
-    return [*ZIG, *target], platform or own_platform()
+    return [*ZIG, *target, "-s"], platform or own_platform()
 
 
 def run_together(commands: list[list[str]], folder: str) -> None:
@@ -101,7 +101,7 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     system = ([], "_kernel.dll") if platform.startswith("win") else (["-lm"], "_kernel.so")
     units = {level: ["kernel.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in levels(platform).items()}
     units["dispatch"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in levels(platform))]
-    compiler += FLAGS
+    compiler = [*compiler, *FLAGS]
     with tempfile.TemporaryDirectory(dir=folder) as place:
         sources = ROOT / "mumacro" / "kernel"
         run_together(
