@@ -25,7 +25,8 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from packaging.tags import platform_tags
 
 ROOT = Path(__file__).resolve().parent
-TARGETS: dict[str, str] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]["wheels"]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
+TARGETS: dict[str, str] = SETTINGS["wheels"]
 ZIG = [sys.executable, "-m", "ziglang", "cc"]
 OPTIMIZED = ["-O3", "-DNDEBUG"]
 DEBUG = ["-O0", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -126,7 +127,7 @@ class KernelHook(BuildHookInterface[Any]):
             if local_compiler():
                 return []
             print(f"{NO_COMPILER}: the package ziglang compiles the kernel", file=sys.stderr)
-        return ["ziglang>=0.14"]
+        return [SETTINGS["zig"]]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, in place or into a folder of its own that ends with the wheel."""
