@@ -7,13 +7,14 @@
     python3 dev.py check           the checks without pytest
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
+    python3 dev.py wheels          the wheel of every platform and the source distribution, checked, in dist
     python3 dev.py page            the page as a folder for any static host, in build/page; needs zig, or clang and lld
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 
-Needs Python 3.11 or newer and nothing else.  The rest is installed into ``.venv`` beside this file, with
-versions and hashes from ``requirements/``; compiled kernels are kept there too, in ``.venv/kernels``; nothing
-outside of ``.venv`` is touched.  An environment is used again as long as the lock file it was made from is unchanged.
+Needs Python 3.11 or newer and nothing else.  The rest is installed into ``.venv`` beside this file, with versions and
+hashes from ``requirements/``; that includes zig where no C compiler works.  An environment is used again as long as
+its lock files are unchanged; the kernel, ``mumacro/_kernel.so``, is compiled again when its sources change.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -39,20 +41,19 @@ VENV = ROOT / ".venv"
 BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 MARKER = VENV / "mumacro-installed.json"
-KERNELS = VENV / "kernels"
 
 OLDEST = (3, 11)
 NEWER_NAMES = ("python3.13", "python3.12", "python3.11")
 
-# An environment is made from these locks.  dev.txt holds all of the other two at the same versions, so that an
-# environment for "dev" can stand in for one for "service".
+# An environment is made from these locks.  dev.txt holds all of build and service at the same versions, so that an
+# environment for "dev" can stand in for one for "service".  zig.txt is added where a compiler is missing.
 SETS = {"service": ("build", "service"), "dev": ("dev",)}
-LOCKS = ("dev", "service", "build")  # in the order of making: the first constrains the others
+LOCKS = ("dev", "service", "build", "zig")  # in the order of making: the first constrains the others
 UV = "uv==0.13.8"  # pins the resolver too: two people who lock on the same day get the same file
 
 CASE = {"mu0": "0.3", "Fz": "10", "k": "1e6", "y0": "2e-6", "omega": "1.3e5", "v0": "0.01"}
 UNITS = {"mu0": "-", "Fz": "N", "k": "N/m", "y0": "m", "omega": "rad/s", "v0": "m/s"}
-READY_S = 300.0  # a first start compiles the kernels: a minute alone on a machine, several on a busy one
+READY_S = 120.0
 STOP_S = 20.0
 
 
@@ -91,7 +92,7 @@ def environment() -> dict[str, str]:
     """The environment variables with ``.venv`` first; without those that would add other packages."""
     env = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
     env["VIRTUAL_ENV"] = str(VENV)
-    env["NUMBA_CACHE_DIR"] = str(KERNELS)
+    env.setdefault("ZIG_GLOBAL_CACHE_DIR", str(VENV / "zig"))
     env["PATH"] = f"{BIN}{os.pathsep}{env.get('PATH', os.defpath)}"
     return env
 
@@ -100,55 +101,83 @@ def lock_path(name: str) -> Path:
     return ROOT / "requirements" / f"{name}.txt"
 
 
-def digest(set_name: str) -> str:
-    return hashlib.sha256(b"".join(lock_path(name).read_bytes() for name in SETS[set_name])).hexdigest()
+def digest(*paths: Path) -> str:
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
+
+
+def current() -> dict[str, str]:
+    """Digests of what each part of ``.venv`` is made from: two sets of locks, the kernel and its sources."""
+    kernel = sorted([*(ROOT / "mumacro" / "kernel").glob("*.[ch]"), *(ROOT / "mumacro").glob("_kernel.*")])
+    return {
+        **{name: digest(*map(lock_path, locks)) for name, locks in SETS.items()},
+        "kernel": digest(ROOT / "hatch_build.py", *kernel),
+    }
 
 
 def installed() -> dict[str, str]:
-    """Digests of the sets that ``.venv`` holds; empty if it is absent, broken or incomplete."""
+    """The parts that ``.venv`` holds and that are current; empty if it is absent, broken or incomplete."""
     try:
         marker = json.loads(MARKER.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return marker if isinstance(marker, dict) and works(PYTHON) else {}
+    return dict(marker.items() & current().items()) if isinstance(marker, dict) and works(PYTHON) else {}
+
+
+def pip_install(*arguments: str | Path) -> None:
+    # Without compiling: Python compiles files on import, only a third of them.
+    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--no-compile")
+    if run(*pip, *arguments, env=environment(), quiet=True):
+        raise FailedError(f"pip could not install {' '.join(map(str, arguments))} (see above)")
+
+
+def install_locks(*names: str) -> None:
+    """Install exactly what the locks pin."""
+    print(f"Installing requirements/{' and '.join(names)}.txt", flush=True)
+    pip_install("--require-hashes", *(word for name in names for word in ("-r", lock_path(name))))
+
+
+def install_project() -> None:
+    """Install the project in place, which compiles its kernel.
+
+    Without isolation: the build backend is among the pins, so nothing unpinned is downloaded.  What it needs on this
+    machine it says itself, as it would say to pip: zig, where no compiler works.
+    """
+    question = "import hatchling.build; print(*hatchling.build.get_requires_for_build_editable())"
+    asked = subprocess.run(  # noqa: S603 - our own interpreter and words
+        [str(PYTHON), "-c", question], cwd=ROOT, env=environment(), stdout=subprocess.PIPE, text=True, check=False
+    )
+    if asked.returncode:
+        raise FailedError("the build backend could not be asked for its requirements (see above)")
+    if "ziglang" in asked.stdout:
+        install_locks("zig")
+    print("Compiling the kernel", flush=True)
+    pip_install("--no-deps", "--no-build-isolation", "-e", ".")
 
 
 def ensure(set_name: str) -> None:
-    """Install the locked set into ``.venv``; do nothing if it is there already."""
-    have = installed()
-    current = [name for name in SETS if have.get(name) == digest(name)]
-    if set_name in current or "dev" in current:
-        return
-    if not current:  # absent, or made from older locks: packages that they dropped must be removed too
-        print(f"Making {VENV} with Python {sys.version.split()[0]}", flush=True)
-        if run(sys.executable, "-m", "venv", "--clear", VENV, quiet=True):
-            raise FailedError(
-                "Python could not make a virtual environment (see above).\n"
-                "Debian and Ubuntu keep that in a package of its own: apt-get install python3-venv"
-            )
-    MARKER.unlink(missing_ok=True)
-    locks = [lock_path(name) for name in SETS[set_name]]
-    titles = " and ".join(path.relative_to(ROOT).as_posix() for path in locks)
-    print(f"Installing {titles} (a minute or two)", flush=True)
+    """Install the locked set into ``.venv`` and compile the kernel; do nothing if both are there already."""
     started = time.monotonic()
-    # Without compiling: Python compiles files on import, only a third of them.
-    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--no-compile")
-    files = [word for path in locks for word in ("-r", path)]
-    if run(*pip, "--require-hashes", *files, env=environment(), quiet=True):
-        raise FailedError(f"pip could not install {titles} (see above)")
-    # In place and without isolation: the build backend is among the pins, so nothing unpinned is downloaded.
-    if run(*pip, "--no-deps", "--no-build-isolation", "-e", ".", env=environment(), quiet=True):
-        raise FailedError("pip could not install the project itself in place (see above)")
-    MARKER.write_text(json.dumps({name: digest(name) for name in (*current, set_name)}), encoding="utf-8")
+    have = installed()
+    complete = set_name in have or "dev" in have
+    if complete and "kernel" in have:
+        return
+    MARKER.unlink(missing_ok=True)
+    if not complete:
+        if not have.keys() & SETS.keys():  # absent, or made from older locks: packages that they dropped must go too
+            print(f"Making {VENV} with Python {sys.version.split()[0]}", flush=True)
+            if run(sys.executable, "-m", "venv", "--clear", VENV, quiet=True):
+                raise FailedError(
+                    "Python could not make a virtual environment (see above).\n"
+                    "Debian and Ubuntu keep that in a package of its own: apt-get install python3-venv"
+                )
+        install_locks(*SETS[set_name])
+    install_project()
+    names = {set_name, "kernel", *have}
+    MARKER.write_text(json.dumps({name: made for name, made in current().items() if name in names}), encoding="utf-8")
     print(f"Installed in {time.monotonic() - started:.0f} s", flush=True)
 
 
 # --- demo and serve -----------------------------------------------------------------------------------
-
-
-def announce_kernels() -> None:
-    """Print the reason for a slow first start."""
-    print(f"Starting; kernels that {KERNELS} does not hold yet are compiled first (a minute, once)", flush=True)
 
 
 def ask(port: int, path: str) -> tuple[int, str]:
@@ -200,7 +229,7 @@ def demo() -> int:
     # The demo uses the defaults, not the settings of the user's shell.
     env = {name: value for name, value in environment().items() if not name.startswith("MUMACRO_")}
     env |= {"MUMACRO_HOST": "127.0.0.1", "MUMACRO_PORT": str(port)}
-    announce_kernels()
+    print("Starting", flush=True)
     with tempfile.TemporaryFile() as log:
         server = subprocess.Popen(  # noqa: S603 - our own interpreter and module
             [str(PYTHON), "-m", "service"], cwd=ROOT, env=env, stdin=subprocess.DEVNULL, stdout=log, stderr=log
@@ -235,8 +264,6 @@ def serve(arguments: list[str]) -> int:
     """Run the service in the foreground; it receives the signals itself."""
     ensure("service")
     command = [str(PYTHON), "-m", "service", *arguments]
-    if not {"-h", "--help"} & set(arguments):
-        announce_kernels()
     os.chdir(ROOT)
     if os.name != "nt":
         os.execve(PYTHON, command, environment())  # noqa: S606 - replaces this process on purpose
@@ -266,11 +293,11 @@ def build_page(folder: str) -> int:
     return code or run(*python, "service.static_page", table, module, folder, env=environment())
 
 
-def passes(title: str, tool: str | Path, *arguments: str | Path) -> bool:
+def passes(title: str, tool: str | Path, *arguments: str | Path, **variables: str) -> bool:
     """Run one check of the environment's tools, then print its output at once."""
-    words = [str(BIN / tool), *map(str, arguments)]
+    words, env = [str(BIN / tool), *map(str, arguments)], environment() | variables
     done = subprocess.run(  # noqa: S603 - every command is written in this file
-        words, cwd=ROOT, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+        words, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
     )
     print(f"--- {title}\n{done.stdout}", end="", flush=True)
     return done.returncode == 0
@@ -282,15 +309,35 @@ def documentation_builds() -> bool:
         return passes("documentation", *docs_command(folder))
 
 
-def packages_pass() -> bool:
-    """Build the distributions in a temporary folder and check them."""
+def packages_pass(folder: Path, platforms: Iterable[str]) -> bool:
+    """Build the source distribution and the wheel of each platform into a folder, and check them."""
+    good = passes("source distribution", "hatchling", "build", "-t", "sdist", "-d", folder)
+    for name in platforms:
+        title = f"wheel for {name or 'this machine'}"
+        good &= passes(title, "hatchling", "build", "-t", "wheel", "-d", folder, MUMACRO_BUILD_PLATFORM=name)
+    wheels = sorted(folder.glob("*.whl"))
+    good &= passes("twine", "twine", "check", "--strict", *folder.iterdir())
+    good &= passes("check-wheel-contents", "check-wheel-contents", *wheels)
+    for wheel in wheels if sys.platform == "linux" else ():
+        if "linux" in wheel.name:
+            good &= passes(f"auditwheel {wheel.name}", "auditwheel", "show", wheel)
+    return good
+
+
+def packages_of_this_machine_pass() -> bool:
     with tempfile.TemporaryDirectory() as folder:
-        if not passes("wheel and sdist", "hatchling", "build", "-d", folder):
-            return False
-        built = sorted(Path(folder).iterdir())
-        wheels = [path for path in built if path.suffix == ".whl"]
-        good = passes("twine", "twine", "check", "--strict", *built)
-        return passes("check-wheel-contents", "check-wheel-contents", *wheels) and good
+        return packages_pass(Path(folder), [""])
+
+
+def wheels() -> int:
+    """Build what is published: the wheel of every platform, by zig, and the source distribution."""
+    ensure("dev")
+    install_locks("zig")
+    folder = ROOT / "dist"
+    shutil.rmtree(folder, ignore_errors=True)
+    good = packages_pass(folder, project_table()["tool"]["mumacro"]["wheels"])
+    print("The wheels are in dist" if good else "FAILED: see above")
+    return not good
 
 
 def check() -> list[str]:
@@ -316,7 +363,10 @@ def check() -> list[str]:
         "sp-repo-review": ("sp-repo-review", "--show", "err", "."),
     }
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # the longest first
-        results = {"documentation": pool.submit(documentation_builds), "packages": pool.submit(packages_pass)}
+        results = {
+            "documentation": pool.submit(documentation_builds),
+            "packages": pool.submit(packages_of_this_machine_pass),
+        }
         results |= {title: pool.submit(passes, title, *words) for title, words in commands.items()}
     return [title for title, result in results.items() if not result.result()]
 
@@ -351,12 +401,12 @@ def inputs_digest() -> str:
     table = project_table()
     project = table["project"]
     names = ("requires-python", "dependencies", "optional-dependencies")
-    inputs = [table["build-system"]["requires"], *(project[name] for name in names)]
+    inputs = [table["build-system"]["requires"], table["tool"]["mumacro"]["zig"], *(project[name] for name in names)]
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def lock(arguments: list[str]) -> int:
-    """Write requirements/dev.txt, then the other two as parts of it.
+    """Write requirements/dev.txt, then the others at its versions.
 
     ``--universal`` keeps one file right for every platform and every Python from 3.11 on.  No index is
     named in the result: the installing machine chooses it.
@@ -368,13 +418,15 @@ def lock(arguments: list[str]) -> int:
             raise FailedError("Python could not make a virtual environment (see above)")
         if run(bin_ / PYTHON.name, "-m", "pip", "--disable-pip-version-check", "install", UV, quiet=True):
             raise FailedError(f"pip could not install {UV} (see above)")
-        build = Path(folder) / "build.in"
+        build, zig = Path(folder) / "build.in", Path(folder) / "zig.in"
         # hatchling needs editables to install in place.
         build.write_text("\n".join([*project_table()["build-system"]["requires"], "editables"]), "utf-8")
+        zig.write_text(project_table()["tool"]["mumacro"]["zig"], "utf-8")
         sources: dict[str, list[str | Path]] = {
             "dev": ["pyproject.toml", "--extra", "dev", build],
             "service": ["pyproject.toml", "--extra", "service", "--constraint", lock_path("dev")],
             "build": [build, "--constraint", lock_path("dev")],
+            "zig": [zig],
         }
         for name in LOCKS:
             out = Path(folder) / f"{name}.txt"
@@ -436,6 +488,8 @@ def main(arguments: list[str]) -> int:
             code = build_page("build/page")
             print("The page is in build/page; try it:  python3 -m http.server -d build/page" if code == 0 else "FAILED")
             return code
+        if word == "wheels" and not rest:
+            return wheels()
         if word == "serve":
             return serve(rest)
         if word == "exec" and rest:

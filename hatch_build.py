@@ -25,7 +25,8 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from packaging.tags import platform_tags
 
 ROOT = Path(__file__).resolve().parent
-TARGETS: dict[str, str] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]["wheels"]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
+TARGETS: dict[str, str] = SETTINGS["wheels"]
 ZIG = [sys.executable, "-m", "ziglang", "cc"]
 OPTIMIZED = ["-O3", "-DNDEBUG"]
 DEBUG = ["-O0", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -84,7 +85,7 @@ def choose(platform: str | None) -> tuple[list[str], str]:
     if not platform:
         platform = next((tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None)
     target = ["-target", TARGETS[platform]] if platform else ["-mcpu=baseline"]
-    return [*ZIG, *target], platform or own_platform()
+    return [*ZIG, *target, "-s"], platform or own_platform()
 
 
 def run_together(commands: list[list[str]], folder: str) -> None:
@@ -101,7 +102,7 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     system = ([], "_kernel.dll") if platform.startswith("win") else (["-lm"], "_kernel.so")
     units = {level: ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in levels(platform).items()}
     units["dispatch"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in levels(platform))]
-    compiler += FLAGS
+    compiler = [*compiler, *FLAGS]
     with tempfile.TemporaryDirectory(dir=folder) as place:
         sources = ROOT / "mumacro" / "kernel"
         run_together(
@@ -126,7 +127,7 @@ class KernelHook(BuildHookInterface[Any]):
             if local_compiler():
                 return []
             print(f"{NO_COMPILER}: the package ziglang compiles the kernel", file=sys.stderr)
-        return ["ziglang>=0.14"]
+        return [SETTINGS["zig"]]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, in place or into a folder of its own that ends with the wheel."""
