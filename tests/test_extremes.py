@@ -84,7 +84,8 @@ def test_mu_is_linear_in_creeping_speeds_above_one(y: float) -> None:
         if found.mu_ratio > TINY:
             assert found.mu_ratio / v == close(expected.mu_ratio / 1e-60, rel=1e-15)
         assert found.power == close(expected.power, rel=1e-14)
-        assert found.stick_fraction == close(expected.stick_fraction, rel=1e-13)
+        # the limit v~ -> 0; below v~ = 1e-147 it is a difference of angles, each to the last digit of pi/2
+        assert found.stick_fraction == close(2.0 / math.pi * math.atan2(1.0, math.sqrt(y - 1.0)), abs=1.5e-16)
 
 
 @pytest.mark.parametrize("y", [1.05, 1.3, 2.0, 5.0, 30.0, 1e3])
@@ -170,14 +171,14 @@ def test_layers_at_the_turns_depend_on_one_number(x: float) -> None:
 @pytest.mark.parametrize("r", [1e-160, 1e-9, 1e-3, 1.0, 30.0, 1e6])
 def test_rigid_contact_is_the_closed_form(r: float) -> None:
     mu, deficit, power = rigid(1e3, r * 1e3)
-    assert mu == close(float(outer(r)), rel=4e-16)
+    assert mu == close(float(outer(r)), rel=1e-15)  # 4.4e-16 off at r = 30, where the other is right to the last digit
     assert deficit == close(0.25 * r * r if r < 1e-8 else 1.0 - float(outer(r)), rel=1e-8, abs=1e-15)
     if r > 1e3:
         assert power == close(r * 1e3 * 2.0 / math.pi, rel=1e-10)
     else:
         tau = (np.arange(4000) + 0.5) * (math.pi / 4000)
         mean = np.mean(np.cos(tau) ** 2 / np.sqrt(1.0 + (r * np.cos(tau)) ** 2))
-        assert power == close(1e3 * r * r * mean, rel=1e-13)
+        assert power == close(1e3 * r * mean * r, rel=1e-13, abs=5e-324)  # at r = 1e-160 it has six digits
 
 
 def test_no_step_where_rigid_contact_takes_over() -> None:

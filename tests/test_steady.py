@@ -149,8 +149,8 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     assert (stick_mean + out[SUM_UX]) / math.pi == close(res[steady.MU_RATIO], abs=1e-15)
     assert (shaker + out[WORK]) / math.pi == close(res[steady.POWER], abs=1e-13 * (1.0 + y))
     assert out[PATH] / math.pi == close(res[steady.SLIP_SPEED], rel=1e-15)
-    # the work of drive and shaker equals the dissipation
-    assert (drive + shaker + v * out[SUM_UX] + out[WORK]) / math.pi == close(res[steady.SLIP_SPEED], rel=1e-12)
+    # the work of drive and shaker during slip equals the dissipation: during stick they do none together, see above
+    assert (v * out[SUM_UX] + out[WORK]) / math.pi == close(res[steady.SLIP_SPEED], rel=2e-15)
     # and slip ends, mirrored, exactly where stick started
     assert out[SIGMA] == close(start, abs=1e-14)
 
