@@ -145,6 +145,14 @@ def test_quantiles_enclose_the_exact_ones() -> None:
         np.testing.assert_allclose(above - below, 1e-3)
 
 
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_a_quantile_of_few_values_is_one_of_them(n: int) -> None:
+    values, q = np.linspace(0.05, 0.95, n), np.linspace(0.0, 1.0, 41)
+    below, above = quantiles(da.from_array(values, chunks=3), q, bins=1000)
+    exact = np.quantile(values, q, method="inverted_cdf")
+    assert np.all((below <= exact) & (exact <= above))
+
+
 @pytest.mark.parametrize(
     ("values", "q", "field"),
     [([0.5, 1.5], 0.5, "values"), ([0.5, -0.1], 0.5, "values"), ([math.nan], 0.5, "values"), ([0.5], 1.1, "q")],

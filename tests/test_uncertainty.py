@@ -1,7 +1,8 @@
-"""Gradient and power compared with the full model: solves at random inputs, a time integration."""
+"""Gradient and power compared with the full model, with closed forms, with a time integration."""
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.stats import norm, qmc
@@ -53,6 +54,35 @@ def test_the_gradient_is_that_of_the_full_model(surrogate, place):
         f = full_model(np.array(list(case.values()))[:, None] + step)
         slope = (8.0 * (f[2] - f[1]) - (f[3] - f[0])) / (12.0 * 1e-4)  # d mu_macro / d ln input, fourth order
         assert gradient[name] * value == close(slope, rel=1e-7, abs=3e-10), name
+
+
+def closed_form(mu0, Fz, k, y0, omega, v0):
+    """mu_macro in 40 digits: eq. (35) for rigid contact, creep to first order in v0 for an elastic one below y~ = 1."""
+    if k == math.inf:
+        return mu0 * 2 / mpmath.pi * mpmath.ellipk(-((y0 * omega / v0) ** 2))
+    v, y = v0 * k / (mu0 * Fz * omega), y0 * k / (mu0 * Fz)
+    return mu0 * (mpmath.sqrt(1 - y * y) + mpmath.pi * v / (2 * (1 - y * y)))
+
+
+RIGID = [{"k": math.inf, "v0": CASE["y0"] * CASE["omega"] / ratio} for ratio in (1e-4, 0.1, 1.0, 30.0, 1e6)]
+AT_REST = [{"v0": 0.0, "y0": 3e-6 * share} for share in (1e-4, 0.3, 0.99)]
+
+
+@pytest.mark.parametrize("place", RIGID + AT_REST)
+def test_the_gradient_is_that_of_the_closed_form(surrogate, place):
+    case = {**CASE, **place}
+    one, many = (surrogate.evaluate({**case, "mu0": mu0}, gradient=True) for mu0 in (0.3, np.full(3, 0.3)))
+    for i, (name, value) in enumerate(case.items()):
+        with mpmath.workdps(40):
+            inputs = tuple(mpmath.mpf(x) for x in case.values())
+            slope = (
+                0.0 if value == math.inf else float(mpmath.diff(closed_form, inputs, tuple(np.eye(6, dtype=int)[i])))
+            )
+        # relative to the input, rounding may move it by a digit of mu_macro
+        assert one.gradient[name] == close(slope, rel=1e-12, abs=3e-17 / value if value else 0.0), name
+        assert abs(one.gradient[name] - slope) <= one.gradient_bound[name], name
+        np.testing.assert_array_equal(many.gradient[name], one.gradient[name])
+        np.testing.assert_array_equal(many.gradient_bound[name], one.gradient_bound[name])
 
 
 @pytest.mark.slow

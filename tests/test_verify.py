@@ -2,21 +2,25 @@
 
 import copy
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from builder.measure import block_errors
+from builder.measure import SEAMS, block_errors, fast_from
 from builder.sweep import Sweep
-from builder.verify import CASES, draw, monotony, seam_jumps, verify
+from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, verify
 from comparing import close
 from mumacro import Surrogate
-from mumacro.charts import CHARTS, MU, NAMES, POWER, QUANTITIES, SOURCES, STICK
+from mumacro.charts import CHARTS, MU, NAMES, POWER, QUANTITIES, SIGMA_CUT, SOURCES, STICK
 from mumacro.table import Table, read_table
 
 pytestmark = pytest.mark.slow
 
+Array = NDArray[np.float64]
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-7.nc"
 
 
@@ -89,6 +93,31 @@ def test_a_jump_at_a_seam_is_found(sound: Surrogate) -> None:
     assert seam_jumps(sound) <= 2e-7
     for block in ("stick_slip_mid", "continuous_high"):
         assert seam_jumps(damaged(block, 1.0 + 1e-4)) >= 9e-5
+
+
+class Stepped:
+    """A table whose ratio and slopes are larger by a thousandth beyond one line."""
+
+    def __init__(self, table: Surrogate, beyond: Callable[[Surrogate, Array, Array], Array]) -> None:
+        self.v_tilde_crit = table.v_tilde_crit
+        self.mu_ratio = lambda v, y: table.mu_ratio(v, y) * (1.0 + 1e-3 * beyond(table, v, y))
+        self.slopes = lambda v, y: [part + 1e-3 * beyond(table, v, y) for part in table.slopes(v, y)]
+
+
+@pytest.mark.parametrize(
+    "beyond",
+    [
+        *(lambda _s, _v, y, seam=seam: y > seam for seam in SEAMS),
+        lambda s, v, y: v > s.v_tilde_crit(y),
+        lambda s, v, y: v > s.v_tilde_crit(y) * SIGMA_CUT**2,
+        lambda s, v, y: v > fast_from(s, y),
+    ],
+    ids=[*map(str, SEAMS), "border", "edge of the corner", "closed form"],
+)
+def test_a_step_at_any_seam_is_found(sound: Surrogate, beyond: Callable[..., Array]) -> None:
+    stepped: Any = Stepped(sound, beyond)
+    for jumps in (seam_jumps, seam_slope_jumps):
+        assert jumps(stepped, 100) > 9e-4 > 10.0 * jumps(sound, 100)
 
 
 def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
