@@ -270,7 +270,7 @@ def _rigid_as_infinity(value: Any) -> Any:
     """A stiffness, or an array of them, with infinity for the word ``rigid``."""
     if isinstance(value, str):
         return math.inf if is_rigid(value) else value
-    if isinstance(value, dict) or not np.iterable(value):
+    if not (isinstance(value, (list, tuple)) or hasattr(value, "__array__")):
         return value
     return [math.inf if isinstance(x, str) and is_rigid(x) else x for x in value]
 
