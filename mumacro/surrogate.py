@@ -443,19 +443,16 @@ class Surrogate:
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
         """The answer to one case; None where it is illegal."""
         try:
-            mu_macro, mu_ratio, bound, v, y, length, source, *slopes = _KERNEL.one(
-                self._data, six, 19 if gradient else 7
-            )
+            found = _KERNEL.one(self._data, six, 19 if gradient else 7)
         except OverflowError:  # a whole number beyond double range
             return None
-        if source < 0:
+        if found[6] < 0.0:
             return None
-        groups = v, y, length
-        if not gradient:
-            return Answer(mu_macro, mu_ratio, bound, int(source), groups, self._certain)
-        answer = AnswerWithGradient(mu_macro, mu_ratio, bound, int(source), groups, self._certain)
-        answer.gradient = dict(zip(FIELDS, slopes[:6], strict=True))
-        answer.gradient_bound = dict(zip(FIELDS, slopes[6:], strict=True))
+        kind: type[Answer[float]] = AnswerWithGradient if gradient else Answer
+        answer = kind(found[0], found[1], found[2], int(found[6]), (found[3], found[4], found[5]), self._certain)
+        if gradient:
+            answer.gradient = dict(zip(FIELDS, found[7:13], strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
         return answer
 
     def _evaluate(self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str) -> Any:
