@@ -62,7 +62,7 @@ def test_the_manifest_gives_a_pod_nothing_that_it_does_not_need(repository):
 # --- the build ---------------------------------------------------------------------------------------
 
 
-def _build(repository, *arguments, code="", folder=None, **variables):
+def _build(repository, *arguments, code="", **variables):
     """Run hatch_build.py of a checkout; `code` runs first."""
     program = f"{code}\nimport runpy; runpy.run_path('hatch_build.py', run_name='__main__')"
     env = {name: value for name, value in os.environ.items() if name != "CC"} | variables
