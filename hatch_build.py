@@ -100,7 +100,7 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     """Compile into a folder; return the path of the shared object and its platform."""
     compiler, platform = choose(platform)
     system = ([], "_kernel.dll") if platform.startswith("win") else (["-lm"], "_kernel.so")
-    units = {level: ["kernel.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in levels(platform).items()}
+    units = {level: ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in levels(platform).items()}
     units["dispatch"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in levels(platform))]
     compiler = [*compiler, *FLAGS]
     with tempfile.TemporaryDirectory(dir=folder) as place:

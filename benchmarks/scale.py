@@ -29,7 +29,7 @@ from measuring import machine, markdown, progress, quantity, write_section
 from builder.assemble import build_table
 from builder.sweep import CHUNK, COLUMNS, Sweep, solve_chunk
 from mumacro import Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from mumacro.processors import processors
 from mumacro.scale import sobol
 

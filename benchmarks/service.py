@@ -40,7 +40,7 @@ import numpy as np
 import orjson
 from measuring import IMAGES, ROOT, free_port, machine, markdown, progress, quantity, write_section
 
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from service.evaluation import answer_batch
 from service.formats import choose
 from service.quantities import QUANTITIES
@@ -726,7 +726,7 @@ _LIBRARY = """
 import time
 import numpy as np
 import mumacro
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 s = mumacro.open()
 case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01)
 s.evaluate(**case)

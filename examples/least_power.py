@@ -17,7 +17,7 @@ import numpy as np
 import openmdao.api as om
 
 from mumacro import Surrogate
-from mumacro.dimensional import UNITS
+from mumacro.inputs import UNITS
 from mumacro.interop.openmdao import Friction
 
 TABLE = Path(__file__).resolve().parent.parent / "tables" / "mumacro-1e-10.nc"

@@ -26,7 +26,7 @@ from builder.measure import SEAMS
 from builder.sweep import Sweep
 from builder.verify import _both_sides
 from mumacro import Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]

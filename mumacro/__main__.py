@@ -17,7 +17,7 @@ from mumacro import command
 from mumacro.bundled import bundled_tables
 from mumacro.command import ImpossibleError, OneLineParser, UsageError
 from mumacro.errors import InputError, MumacroError
-from mumacro.input_names import NAMES
+from mumacro.inputs import NAMES
 from mumacro.version import __version__
 
 __all__ = ["main"]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-__all__ = ["Answer"]
+__all__ = ["Answer", "AnswerWithGradient"]
+
+#: float for one case; an array of float64 for many, or what holds labels in its place
+Number = TypeVar("Number")
 
 # by code; the last entry is that of -1, an illegal case
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
@@ -17,7 +20,7 @@ _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 
 
-class Answer:
+class Answer(Generic[Number]):
     """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the broadcast shape else.
 
     Attributes
@@ -48,16 +51,17 @@ class Answer:
         "source_code",
     )  # fmt: skip
 
+    gradient: dict[str, Number] | None
+    gradient_bound: dict[str, Number] | None
+
     def __init__(
         self,
-        mu_macro: Any,
-        mu_ratio: Any,
-        error_bound: Any,
+        mu_macro: Number,
+        mu_ratio: Number,
+        error_bound: Number,
         source_code: Any,
-        groups: tuple[Any, Any, Any] | None = None,
+        groups: tuple[Number, Number, Number] | None = None,
         certain: Callable[[Any, Any], Any] | None = None,
-        gradient: dict[str, Any] | None = None,
-        gradient_bound: dict[str, Any] | None = None,
         look_up: Callable[[Any, Any], Any] | None = None,
     ) -> None:
         self.mu_macro = mu_macro
@@ -66,27 +70,26 @@ class Answer:
         self.source_code = source_code
         self._groups = groups
         self._certain = certain
-        self.gradient = gradient
-        self.gradient_bound = gradient_bound
         self._look_up = look_up
+        self.gradient = self.gradient_bound = None
 
-    def _group(self, place: int, name: str) -> Any:
+    def _group(self, place: int, name: str) -> Number:
         if self._groups is None:
             raise AttributeError(f"{name} was not requested: evaluate(..., groups=True)")
         return self._groups[place]
 
     @property
-    def v_tilde(self) -> Any:
+    def v_tilde(self) -> Number:
         """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient were requested."""
         return self._group(0, "v_tilde")
 
     @property
-    def y_tilde(self) -> Any:
+    def y_tilde(self) -> Number:
         """Dimensionless amplitude y0 k/(mu0 Fz) [-]; as v_tilde."""
         return self._group(1, "y_tilde")
 
     @property
-    def length_scale(self) -> Any:
+    def length_scale(self) -> Number:
         """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde."""
         return self._group(2, "length_scale")
 
@@ -123,4 +126,13 @@ class Answer:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
         names += ["v_tilde", "y_tilde", "length_scale"] if self._groups is not None else []
         names += ["gradient", "gradient_bound"] if self.gradient is not None else []
-        return f"Answer({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
+        return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
+
+
+class AnswerWithGradient(Answer[Number]):
+    """An answer with the slopes by input, see :class:`Answer`."""
+
+    __slots__ = ()
+
+    gradient: dict[str, Number]
+    gradient_bound: dict[str, Number]

@@ -8,19 +8,18 @@ coefficients.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, overload
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mumacro import charts
 from mumacro.charts import Axis
+from mumacro.library import BLOCK_COLUMNS, PIECE_COLUMNS, kernels
 
 if TYPE_CHECKING:
     from mumacro.table import Block, BorderPiece
@@ -34,9 +33,9 @@ __all__ = [
     "cells_2d",
     "chebyshev_coefficients",
     "interpolation_matrix",
-    "joined",
     "nodes",
-    "patch_value",
+    "outer_cells",
+    "quantity_cells",
 ]
 
 Array = NDArray[np.float64]
@@ -96,16 +95,20 @@ def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
     return x, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
 
 
-def cells_1d(axis: Axis, values: Array, cells: int) -> Array:
-    """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node ``values`` (n,).
-
-    On the logarithmic piece they hold v~crit itself, on the others the tabulated quotient.
-    """
+def cells_1d(piece: int, values: Array, cells: int) -> Array:
+    """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node ``values`` (n,)."""
+    axis = charts.BORDER_PIECES[piece][1]
     x, at = cell_positions(axis, cells)
-    local = interpolation_matrix(values.size, at) @ chebyshev_coefficients(values)
-    if axis.name == "ln_y":
-        local = local * np.exp(0.5 * x)
-    local = local.reshape(cells, WIDTH)
+    y = axis.amplitude(x)
+    with np.errstate(invalid="ignore"):  # both are infinite at y~ = infinity
+        of_nodes, of_cells = kernels[-1].border_scales(piece, y)
+        scale = np.where(of_nodes == of_cells, 1.0, of_nodes / of_cells)
+    local = interpolation_matrix(values.size, at) @ chebyshev_coefficients(values) * scale
+    return _to_powers(local.reshape(cells, WIDTH))
+
+
+def _to_powers(local: Array) -> Array:
+    """Power-basis coefficients, highest power first, of values (cells, WIDTH) at the points of each cell."""
     # the mean apart: the change of basis multiplies rounding errors by a hundred
     mean = local.mean(axis=1)
     out: Array = np.ascontiguousarray((local - mean[:, None]) @ _TO_POWERS.T)
@@ -127,7 +130,7 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     return np.asarray(power, dtype=np.float64).reshape(-1, WIDTH, WIDTH)
 
 
-def joined(patches: Sequence[Array]) -> Array:
+def _joined(patches: Sequence[Array]) -> Array:
     """The patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line: a row lies in one."""
     shape = (sum(p.shape[0] for p in patches), WIDTH, WIDTH)
     raw = np.empty(math.prod(shape) + WIDTH)
@@ -137,112 +140,48 @@ def joined(patches: Sequence[Array]) -> Array:
 
 def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     """The stored border for evaluation: coefficients (cells, WIDTH) and pieces (3, PIECE_COLUMNS)."""
-    coefficients, rows, first = [], np.zeros((len(pieces), charts.PIECE_COLUMNS)), 0
+    coefficients, rows, first = [], np.zeros((len(pieces), PIECE_COLUMNS)), 0
     worst = max(piece.max_rel_error for piece in pieces)
-    for row, (_, axis, _), piece in zip(rows, charts.BORDER_PIECES, pieces, strict=True):
-        coefficients.append(cells_1d(axis, piece.values, piece.cells))
-        row[charts.PIECE_FIRST], row[charts.PIECE_ERROR] = first, worst
-        row[charts.PIECE_OFFSET], row[charts.PIECE_STEP] = _count(axis, piece.cells)
+    for index, piece in enumerate(pieces):
+        coefficients.append(cells_1d(index, piece.values, piece.cells))
+        rows[index] = first, *_count(charts.BORDER_PIECES[index][1], piece.cells), worst
         first += piece.cells
     return np.concatenate(coefficients), rows
 
 
 def block_rows(blocks: Sequence[Block]) -> Array:
-    """The array of blocks for evaluation, (OTHER + 1, BLOCK_COLUMNS): geometry, errors, allowances for rounding."""
-    rows, first = np.zeros((charts.OTHER + 1, charts.BLOCK_COLUMNS)), 0
-    for index, (chart, block) in enumerate(zip(charts.CHARTS, blocks, strict=True)):
-        row = rows[index]
+    """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
+    rows, first = np.zeros((len(charts.SOURCES) + 1, BLOCK_COLUMNS)), 0
+    for row, chart, block in zip(rows, charts.CHARTS, blocks, strict=False):
         na, nb = block.cells
-        row[charts.FIRST], row[charts.CELLS_B] = first, nb
-        row[charts.OFFSET_A], row[charts.STEP_A] = _count(chart.a, na)
-        row[charts.OFFSET_B], row[charts.STEP_B] = _count(chart.b, nb)
-        row[charts.ERROR :] = block.errors.ravel()
-        row[charts.ERROR] += charts.rounding_of(index)
-        row[charts.FLOOR] = charts.floor_of(index)
+        row[:6] = first, nb, *_count(chart.a, na), *_count(chart.b, nb)
         first += na * nb
     return rows
 
 
-# --- the value of one cell ------------------------------------------------------------------------------
-#
-# LLVM does not turn eight scalar Horner chains into one vector chain by itself; written out, it is twice as fast
-# (docs/decisions/0003-vector-patch.md).  LLVM splits the vectors where the hardware has shorter ones.
-
-_I32 = ir.IntType(32)
-
-
-def patch_value(coef: Any, p: int, u: float, w: float) -> float:
-    """Value of patch ``p`` of ``coef`` (patches, 8, 8) at local coordinates u, w in [-1, 1].
-
-    Rows hold falling powers of w, columns falling powers of u.
-    """
-    row = coef[p, 0]
-    for k in range(1, WIDTH):
-        row = row * w + coef[p, k]
-    # the sum over powers of u by halves: u^4, u^2, u
-    u2 = u * u
-    four = row[:4] * (u2 * u2) + row[4:]
-    two = four[:2] * u2 + four[2:]
-    return two[0] * u + two[1]  # type: ignore[no-any-return]  # numpy's own float
+def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
+    """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors of slopes."""
+    name, errors = charts.QUANTITY_NAMES[quantity], np.zeros((len(charts.SOURCES) + 1, 2))
+    patches, slope_errors = [], []
+    for error, chart, block in zip(errors, charts.CHARTS, blocks, strict=False):
+        cells = block.cells[0] * block.cells[1]
+        nodes = block.nodes.get(name)
+        patches.append(
+            np.zeros((cells, WIDTH, WIDTH)) if nodes is None else cells_2d(chart.a, chart.b, nodes, block.cells)
+        )
+        value, along_v, along_y = block.errors[name]
+        error[0] = value
+        if quantity == charts.MU:
+            error += chart.rounding, chart.floor
+        slope_errors.append(block.slope_errors.get(name, np.broadcast_to([along_v, along_y], (cells, 2))))
+    return _joined(patches), errors, np.concatenate(slope_errors)
 
 
-def _vector(n: int) -> ir.VectorType:
-    return ir.VectorType(ir.DoubleType(), n)
-
-
-def _index(positions: list[int]) -> ir.Constant:
-    return ir.Constant(ir.VectorType(_I32, len(positions)), positions)
-
-
-def _splat(builder: Any, x: Any, n: int) -> Any:
-    undefined = ir.Constant(_vector(n), ir.Undefined)
-    return builder.shuffle_vector(
-        builder.insert_element(undefined, x, ir.Constant(_I32, 0)), undefined, _index([0] * n)
-    )
-
-
-def _part(builder: Any, v: Any, start: int, n: int) -> Any:
-    return builder.shuffle_vector(v, ir.Constant(v.type, ir.Undefined), _index(list(range(start, start + n))))
-
-
-def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
-    return builder.fadd(builder.fmul(a, b, flags=("contract",)), c, flags=("contract",))
-
-
-@intrinsic
-def _patch_vector(_typing: Any, coef: Any, _p: Any, _u: Any, _w: Any) -> Any:
-    signature = types.float64(coef, types.int64, types.float64, types.float64)
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        array, p, u, w = args
-        data = context.make_array(sig.args[0])(context, builder, array).data
-        base = builder.gep(data, [builder.mul(p, ir.Constant(ir.IntType(64), WIDTH * WIDTH))])
-        rows = builder.bitcast(base, _vector(WIDTH).as_pointer())
-
-        def row(k: int) -> Any:
-            return builder.load(builder.gep(rows, [ir.Constant(_I32, k)]), align=8)
-
-        wide = _splat(builder, w, WIDTH)
-        acc = row(0)
-        for k in range(1, WIDTH):
-            acc = _multiply_add(builder, acc, wide, row(k))
-        u2 = builder.fmul(u, u)
-        u4 = builder.fmul(u2, u2)
-        four = _multiply_add(builder, _part(builder, acc, 0, 4), _splat(builder, u4, 4), _part(builder, acc, 4, 4))
-        two = _multiply_add(builder, _part(builder, four, 0, 2), _splat(builder, u2, 2), _part(builder, four, 2, 2))
-        high = builder.extract_element(two, ir.Constant(_I32, 0))
-        low = builder.extract_element(two, ir.Constant(_I32, 1))
-        return _multiply_add(builder, high, u, low)
-
-    return signature, codegen
-
-
-@overload(patch_value, inline="always")
-def _compiled_patch_value(coef: Any, p: Any, u: Any, w: Any) -> Any:  # noqa: ARG001 (numba reads the signature)
-    if coef.layout != "C":  # patches are found by their place in memory
-        return None
-
-    def body(coef: Any, p: Any, u: Any, w: Any) -> Any:
-        return _patch_vector(coef, p, u, w)  # type: ignore[call-arg]  # numba supplies the typing context
-
-    return body
+@functools.cache
+def outer_cells() -> Array:
+    """Coefficients (cells, 2, WIDTH) of f and g + r f'/2 of the limit of large speed, in cells of ln (1 + r^2)."""
+    kernel = kernels[-1]
+    cells, top = kernel.atlas.outer_cells, kernel.atlas.outer_log_max
+    r = np.sqrt(np.expm1((np.arange(cells)[:, None] + 0.5 + 0.5 * LOCAL) * top / cells))
+    f, g, slope, _, _ = kernel.outer_expansion(r.ravel()).T
+    return np.stack([_to_powers(x.reshape(cells, WIDTH)) for x in (f, g + 0.5 * slope)], axis=1)

@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro.charts import normal_form_root
-from mumacro.outer import outer_expansion
+from mumacro.library import kernels
 
 __all__ = [
     "BORDER_CONSTANT",
@@ -92,7 +91,8 @@ def second_order(r: ArrayLike) -> Any:
     to second order, reduced to complete elliptic integrals.  The error of (35) with this term is O(v~^-4).
     Absolute accuracy is rounding; for r << 1 the value tends to r^2/4 and its relative accuracy is 1e-16/r^2.
     """
-    return np.vectorize(lambda x: outer_expansion(x)[1], otypes=[np.float64])(r)
+    r = _float(r)
+    return kernels[-1].outer_expansion(r.ravel())[:, 1].reshape(r.shape)[()]
 
 
 def static_limit(y: ArrayLike) -> Any:
@@ -297,4 +297,5 @@ def border_blend(y: ArrayLike) -> Any:
 
 def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
     """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).  eta = y~ - 1."""
-    return np.vectorize(normal_form_root, otypes=[np.float64])(v, eta)
+    v, eta = np.broadcast_arrays(_float(v), _float(eta))
+    return kernels[-1].normal_form_root(v.ravel(), eta.ravel()).reshape(v.shape)[()]

@@ -19,10 +19,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mumacro.bundled import bundled_tables
-from mumacro.dimensional import FIELDS, RAD_PER_CYCLE
-from mumacro.input_names import NAMES, SI, read_number, suggestion
+from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, read_number, suggestion
 from mumacro.inverse import Root, solve_for
-from mumacro.kernel_cache import cache_folder, kernels_are_cached
 from mumacro.law import approximations, friction_law, straight_pieces, sweep_values
 from mumacro.surrogate import Surrogate
 
@@ -129,8 +127,6 @@ def open_table(which: str | None) -> Surrogate:
 
     A first use compiles the kernels, which is reported on stderr.
     """
-    if not kernels_are_cached():
-        print(f"compiling kernels into {cache_folder() or 'memory'} (once)", file=sys.stderr, flush=True)
     try:
         return Surrogate.open(None if which is None else float(which))
     except ValueError:

@@ -118,6 +118,10 @@ class Group:
         attribute.read(numbers)
         return numbers.reshape(-1)[0] if numbers.size == 1 else numbers
 
+    def has_variable(self, name: str) -> bool:
+        """Whether there is such a variable."""
+        return bool(self._id.links.exists(name.encode()))
+
     # --- numbers ------------------------------------------------------------------------------------
 
     def array(self, name: str, most: int) -> Array:

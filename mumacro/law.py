@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mumacro import closed_forms
 from mumacro.answer import Answer
-from mumacro.dimensional import FIELDS, POSITIVE
 from mumacro.errors import InputError
+from mumacro.inputs import FIELDS, POSITIVE
 from mumacro.inverse import Crossing, border_crossings, checked_case
 from mumacro.surrogate import Surrogate
 

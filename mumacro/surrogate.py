@@ -5,24 +5,31 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mumacro import batch, charts, closed_forms, dimensional, evaluate
-from mumacro.answer import Answer
+from mumacro import batch, charts, closed_forms
+from mumacro.answer import Answer, AnswerWithGradient
 from mumacro.border import Border
 from mumacro.bundled import bundled_tables
-from mumacro.cells import block_rows, cells_2d, joined
+from mumacro.cells import block_rows, outer_cells, quantity_cells
 from mumacro.errors import InputError, TableError
+from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, real
+from mumacro.library import Data, kernels
 from mumacro.processors import default_threads
 from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
 
 __all__ = ["Surrogate"]
 
 Array = NDArray[np.float64]
-_PLACED = charts.CORNER, charts.FAST, charts.OTHER  # sources that common_ratio does not evaluate
+_KERNEL = kernels[-1]
+_CODES = {name: code for code, name in enumerate(charts.QUANTITY_NAMES)}
+#: types of one real number, which take the short way
+_NUMBERS = frozenset(
+    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
+)
 
 
 class Surrogate:
@@ -53,10 +60,9 @@ class Surrogate:
         self.max_rel_error = float(table.attributes.get("verified_max_rel_error", math.nan))
         self.border = Border(table.border)
         _check_border(table.border, self.path)
-        pairs = list(zip(charts.CHARTS, table.blocks, strict=True))
-        coef = joined([cells_2d(chart.a, chart.b, block.values, block.cells) for chart, block in pairs])
-        self._data: batch.Data = (coef, block_rows(table.blocks), *self.border.arrays)
-        self._other_coef: dict[int, Array] = {}
+        self._data = Data(*self.border.arrays, block_rows(table.blocks), outer_cells())
+        self._data.put(charts.MU, *quantity_cells(table.blocks, charts.MU))
+        self._pointer = self._data.pointer
 
     @classmethod
     def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Surrogate:
@@ -74,7 +80,7 @@ class Surrogate:
         Returns
         -------
         Surrogate
-            Ready for use; kernels compile at the first call, see :meth:`mumacro.Surrogate.warm_up`.
+            Ready for use.
 
         Raises
         ------
@@ -99,10 +105,13 @@ class Surrogate:
         image = read_image(self.path) if self._image is None else self._image
         return _reopen, (str(self.path), self.checksum, self._asked_threads, image)
 
+    def __repr__(self) -> str:
+        return f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most {self.max_abs_error:.1e}>"
+
     def on_one_thread(self) -> Surrogate:
         """The same table, whose calls start no thread."""
-        other = Surrogate(self.table, self.path, 1, self._image)
-        other._other_coef = self._other_coef
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, _asked_threads=1)
         return other
 
     @property
@@ -124,12 +133,12 @@ class Surrogate:
                 "regime": charts.REGIMES[chart.regime],
                 "coordinates": [chart.a.name, chart.b.name],
                 "ranges": [[chart.a.low, chart.a.high], [chart.b.low, chart.b.high]],
-                "shape": list(block.values.shape),
+                "shape": [block.a.size, block.b.size],
                 "cells": list(block.cells),
                 "quantity": chart.quantity,
                 "verified_max_abs_error": block.max_abs_error,
                 "verified_max_rel_error": block.max_rel_error,
-                "errors": {name: row.tolist() for name, row in zip(charts.QUANTITIES, block.errors, strict=True)},
+                "errors": {name: block.errors[name].tolist() for name in self.table.quantities},
             }
             for chart, block in zip(charts.CHARTS, self.table.blocks, strict=True)
         ]
@@ -137,22 +146,13 @@ class Surrogate:
     @property
     def memory(self) -> int:
         """Bytes of the cells that an evaluation of mu~ reads."""
-        return sum(array.nbytes for array in self._data)
-
-    def warm_up(self, arrays: bool = True) -> None:
-        """Load or compile the kernels of scalar calls, and of calls with ``arrays``, before they are needed."""
-        case: dict[str, Any] = dict.fromkeys(dimensional.FIELDS, 1.0)
-        self.evaluate(**case)
-        if arrays:
-            self.mu_ratio(np.array([0.1, 1e4]), 2.0)
-            self.evaluate(**{**case, "v0": np.array([0.0, 0.01])}, gradient=True)
-            self.v_tilde_crit(np.array([0.5]))
-            self.power_with_bound(0.1, 0.5)
+        arrays = self._data.border, self._data.pieces, self._data.blocks, *self._data.quantities[charts.MU]
+        return sum(array.nbytes for array in arrays)
 
     def self_check(self) -> None:
         """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
         for v, y, expected in ((0.1, 0.5, KNOWN_STICK_SLIP), (2.0, 1.0, KNOWN_CONTINUOUS)):
-            mu, bound, _ = evaluate.common_ratio(v, y, *self._data)
+            mu, bound, _ = self.ratio_with_bound(v, y)
             if not abs(mu - expected) <= bound + 1e-15:
                 raise TableError(self.path, f"known answer at v~={v}, y~={y} is {expected!r}, the table gives {mu!r}")
 
@@ -182,16 +182,15 @@ class Surrogate:
         >>> round(s.mu_ratio(0.1, 0.5), 9)
         0.94200429
         """
-        if type(v_tilde) is float and type(y_tilde) is float:
-            mu, _, source = evaluate.common_ratio(v_tilde, y_tilde, *self._data)
-            if source < charts.FAST and source != charts.CORNER:
+        if type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
+            mu = _KERNEL.ratio(self._pointer, v_tilde, y_tilde)
+            if mu == mu:
                 return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        if not shape:
-            mu, _, source = evaluate.answer(charts.MU, float(v[0]), float(y[0]), *self._data)
-            _refuse_illegal(source, v, y, "finite and >= 0")
-            return mu
-        return batch.ratios(self._data, v, y, self.threads, bounds=False)[0].reshape(shape)
+        found = batch.values(charts.MU, self._data, v, y, self.threads, details=False)[0]
+        if not shape and math.isnan(found[0]):
+            _refuse_illegal(-1, v, y, "finite and >= 0")
+        return _shaped(found, shape)
 
     def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
         """mu~ [-], the bound of its absolute error [-], and the source code (index into SOURCES).
@@ -204,11 +203,7 @@ class Surrogate:
         >>> round(mu, 6), bound < 1e-12, int(source)
         (0.942004, True, 5)
         """
-        v, y, shape = _points(v_tilde, y_tilde)
-        found = batch.ratios(self._data, v, y, self.threads, bounds=True)
-        if not shape:
-            _refuse_illegal(int(found[2][0]), v, y, "finite and >= 0")
-        return _shaped(found[0], shape), _shaped(found[1], shape), _shaped(found[2], shape)
+        return self._quantity("mu_ratio", v_tilde, y_tilde)
 
     def v_tilde_crit(self, y_tilde: ArrayLike) -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
@@ -258,7 +253,7 @@ class Surrogate:
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
-        return self._quantity(charts.POWER, v_tilde, y_tilde)
+        return self._quantity("power", v_tilde, y_tilde)[:2]
 
     def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
@@ -266,7 +261,7 @@ class Surrogate:
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
         """
-        return self._quantity(charts.STICK, v_tilde, y_tilde)
+        return self._quantity("stick_fraction", v_tilde, y_tilde)[:2]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
@@ -293,41 +288,66 @@ class Surrogate:
         >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
         '-1.000e-05'
         """
-        if of not in charts.QUANTITIES:
-            raise InputError("of", of, f"one of {', '.join(charts.QUANTITIES)}")
-        which = charts.QUANTITIES.index(of)
+        if of not in self.table.quantities:
+            raise InputError("of", of, f"one of {', '.join(self.table.quantities)}")
         v, y, shape = _points(v_tilde, y_tilde)
-        rows = batch.slopes(which, self._of(which), v, y, self.threads)
+        rows = batch.slopes(_CODES[of], self._with(of), v, y, self.threads)
         if not shape and math.isnan(rows[0, 0]):
             _refuse_illegal(-1, v, y, "finite and >= 0")
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
 
-    def _of(self, which: int) -> batch.Data:
-        """What the kernels read for a quantity; its cells are cut on first use."""
-        if which == charts.MU:
-            return self._data
-        coef = self._other_coef.get(which)
-        if coef is None:
-            patches = []
-            for chart, block in zip(charts.CHARTS, self.table.blocks, strict=True):
-                values = block.power if which == charts.POWER else block.stick
-                none = np.zeros((block.a.size, block.b.size))
-                patches.append(cells_2d(chart.a, chart.b, values if values.size else none, block.cells))
-            coef = self._other_coef[which] = joined(patches)
-        return (coef, *self._data[1:])
+    def _with(self, quantity: str) -> Data:
+        """What the kernel reads, with the cells of a quantity; they are cut on first use."""
+        code = _CODES[quantity]
+        if code not in self._data.quantities:
+            if quantity not in self.table.quantities:
+                raise TableError(self.path, f"holds no {quantity}: build it anew, python -m builder build")
+            self._data.put(code, *quantity_cells(self.table.blocks, code))
+        return self._data
 
-    def _quantity(self, which: int, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+    def _quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+        """Value, bound and source."""
+        data = self._with(name)
         v, y, shape = _points(v_tilde, y_tilde)
-        value, bound, source = batch.quantity(which, self._of(which), v, y, self.threads)
-        if not shape:
-            _refuse_illegal(int(source[0]), v, y, ">= 0")
-        return _shaped(value, shape), _shaped(bound, shape)
+        value, bound, source = batch.values(_CODES[name], data, v, y, self.threads)
+        if not shape and source is not None:
+            _refuse_illegal(int(source[0]), v, y, "finite and >= 0" if name == "mu_ratio" else ">= 0")
+        return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
     # --- dimensional ----------------------------------------------------------------------------------
 
+    @overload
+    def evaluate(
+        self, *, mu0: float, Fz: float, k: float | None, y0: float, v0: float, omega: float = ..., f: float = ...,
+        gradient: Literal[True], groups: bool = ..., illegal: str = ...,
+    ) -> AnswerWithGradient[float]: ...  # fmt: skip
+
+    @overload
+    def evaluate(
+        self, *, mu0: float, Fz: float, k: float | None, y0: float, v0: float, omega: float = ..., f: float = ...,
+        gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ...,
+    ) -> Answer[float]: ...  # fmt: skip
+
+    @overload
+    def evaluate(
+        self, cases: Mapping[str, Any] = ..., /, *, gradient: Literal[True], groups: bool = ..., illegal: str = ...,
+        **inputs: ArrayLike | None,
+    ) -> AnswerWithGradient[Array]: ...  # fmt: skip
+
+    @overload
+    def evaluate(
+        self, cases: Mapping[str, Any] = ..., /, *, gradient: Literal[False] = ..., groups: bool = ...,
+        illegal: str = ..., **inputs: ArrayLike | None,
+    ) -> Answer[Array]: ...  # fmt: skip
+
+    @overload
+    def evaluate(
+        self, cases: Any = ..., /, *, gradient: bool = ..., groups: bool = ..., illegal: str = ..., **inputs: Any
+    ) -> Any: ...
+
     def evaluate(
         self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan", **inputs: Any
-    ) -> Answer:
+    ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
         Parameters
@@ -379,21 +399,22 @@ class Surrogate:
         [13, 5, -1]
         """
         if cases is None and len(inputs) == 6 and illegal in ("nan", "raise"):
-            try:
-                found = self._scalar_if_plain(inputs, gradient)
-            except KeyError:
-                found = None
-            if found is not None:
-                return found
-        answer: Answer = self._evaluate(cases, inputs, gradient, groups, illegal)
-        return answer
+            six = _plain_numbers(inputs)
+            if six is not None:
+                answer = self._one(six, gradient)
+                if answer.source_code >= 0:
+                    return answer
+        return self._evaluate(cases, inputs, gradient, groups, illegal)
 
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
-    ) -> tuple[float, float, int]:
-        """(mu~, bound of mu~, source code) of one case in plain floats, k = inf for rigid contact; -1 if illegal."""
-        mu, bound, source, _, _ = self._case(mu0, Fz, k, y0, omega, v0)
-        return mu, bound, source
+    ) -> tuple[float, float, float, int]:
+        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats, k = inf for rigid contact.
+
+        An illegal case gives NaN and -1.
+        """
+        found = _KERNEL.one(self._data, (mu0, Fz, k, y0, omega, v0), False)
+        return found.mu_macro, found.mu_ratio, found.bound, found.source
 
     def evaluate_columns(
         self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None
@@ -408,53 +429,27 @@ class Surrogate:
             n = max(c.size for c in columns) if all(c.size for c in columns) else 0
         if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
             raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
-        macro, mu, bound, source, _, _ = batch.cases(self._data, columns, n, 1, groups=False)
-        return macro, mu, bound, source
+        return batch.cases(self._data, columns, n, 1, groups=False, gradient=False)[:4]
 
-    def _case(
-        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
-    ) -> tuple[float, float, int, float, float]:
-        found: tuple[float, float, int, float, float] = dimensional.evaluate_case(
-            mu0, Fz, k, y0, omega, v0, *self._data
-        )
-        if found[2] in _PLACED:
-            return dimensional.evaluate_unusual(mu0, Fz, k, y0, omega, v0, *self._data)
-        return found
-
-    def _scalar_if_plain(self, inputs: Mapping[str, Any], gradient: bool) -> Answer | None:
-        """The result for six legal plain floats, which need no arrays; None where an input is anything else."""
-        a, b, c, d, e, f = (
-            inputs["mu0"], inputs["Fz"], inputs["k"], inputs["y0"], inputs["omega"], inputs["v0"],
+    def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float]:
+        """The answer to one case; the source -1 where it is illegal."""
+        found = _KERNEL.one(self._data, six, gradient)
+        answer = (AnswerWithGradient if gradient else Answer)(
+            found.mu_macro, found.mu_ratio, found.bound, found.source,
+            (found.v_tilde, found.y_tilde, found.length_scale), self._certain,
         )  # fmt: skip
-        if type(a) is type(b) is type(c) is type(d) is type(e) is type(f) is float:
-            found = self._case(a, b, c, d, e, f)
-            return self._scalar(a, b, c, d, e, f, found, gradient) if found[2] >= 0 else None
-        return None
-
-    def _scalar(
-        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float,
-        found: tuple[float, float, int, float, float], gradient: bool,
-    ) -> Answer:  # fmt: skip
-        mu, bound, source, v, y = found
-        quotient = Fz / k
-        length = mu0 * quotient
-        if not (1e-290 < quotient < 1e290 and 1e-290 < length < 1e290):
-            length = float(dimensional.length_scale(*(np.array(x) for x in (mu0, Fz, k))))
-        answer = Answer(mu0 * mu, mu, mu0 * bound, source, (v, y, length), self._certain)
         if gradient:
-            out = np.empty((2, 6))
-            dimensional.gradient(mu0, Fz, k, y0, omega, v0, mu, bound, source, v, y, *self._data, out)
-            answer.gradient, answer.gradient_bound = (
-                dict(zip(dimensional.FIELDS, r, strict=True)) for r in out.tolist()
-            )
+            slopes = list(found.slopes)
+            answer.gradient = dict(zip(FIELDS, slopes[:6], strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, slopes[6:], strict=True))
         return answer
 
     def _evaluate(self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str) -> Any:
         if illegal not in ("nan", "raise"):
             raise InputError("illegal", illegal, '"nan" or "raise"')
-        unknown = inputs.keys() - {*dimensional.FIELDS, "f"}
+        unknown = inputs.keys() - {*FIELDS, "f"}
         if unknown:
-            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(dimensional.FIELDS)} or f")
+            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(FIELDS)} or f")
         if cases is not None:
             picked = _picked(cases)
             if twice := picked.keys() & inputs.keys():
@@ -464,35 +459,33 @@ class Surrogate:
             from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
 
             return evaluate_labelled(self, cases, inputs, gradient=gradient, groups=groups, illegal=illegal)
-        columns = dimensional.as_columns(inputs)
+        columns = as_columns(inputs)
         try:
             shape = np.broadcast_shapes(*(c.shape for c in columns.values()))
         except ValueError as error:
             shapes = {name: column.shape for name, column in columns.items()}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         if not shape or illegal == "raise":
-            dimensional.check_inputs(columns, inputs.get("f"))
+            check_inputs(columns, inputs.get("f"))
         if not shape:
-            a, b, c, d, e, f = (float(column) for column in columns.values())
-            return self._scalar(a, b, c, d, e, f, self._case(a, b, c, d, e, f), gradient)
+            return self._one(tuple(float(column) for column in columns.values()), gradient)
         return self._arrays(list(columns.values()), shape, gradient, gradient or groups)
 
-    def _arrays(self, columns: list[Array], shape: tuple[int, ...], gradient: bool, groups: bool) -> Answer:
-        n = math.prod(shape)
+    def _arrays(self, columns: list[Array], shape: tuple[int, ...], gradient: bool, groups: bool) -> Answer[Array]:
         # a value that holds for all cases stays one value
         flat = [_flat(c, shape) if c.size != 1 else _contiguous(c.reshape(1)) for c in columns]
-        macro, mu, bound, source, v, y = batch.cases(self._data, flat, n, self.threads, groups)
-        answer = Answer(macro.reshape(shape), mu.reshape(shape), bound.reshape(shape), source.reshape(shape))
-        if groups:
-            length = dimensional.length_scale(*columns[:3])
-            length = np.where(answer.source_code == -1, np.nan, length)
-            answer._groups, answer._certain = (v.reshape(shape), y.reshape(shape), length), self._certain
-        if gradient:
-            with np.errstate(all="ignore"):
-                ratio_bound = bound / flat[0]
-            slopes = batch.gradients(self._data, flat, mu, ratio_bound, source, v, y, self.threads)
-            parts = [np.moveaxis(slopes[:, i, :], 1, 0).reshape(6, *shape) for i in (0, 1)]
-            answer.gradient, answer.gradient_bound = (dict(zip(dimensional.FIELDS, p, strict=True)) for p in parts)
+        macro, mu, bound, source, both, slopes = batch.cases(
+            self._data, flat, math.prod(shape), self.threads, groups, gradient
+        )
+        kind: type[Answer[Array]] = AnswerWithGradient if gradient else Answer
+        answer = kind(macro.reshape(shape), mu.reshape(shape), bound.reshape(shape), source.reshape(shape))
+        if both is not None:
+            length = np.where(answer.source_code == -1, np.nan, length_scale(*columns[:3]))
+            answer._groups, answer._certain = (both[0].reshape(shape), both[1].reshape(shape), length), self._certain
+        if slopes is not None:
+            rows = slopes.reshape(12, *shape)
+            answer.gradient = dict(zip(FIELDS, rows[:6], strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, rows[6:], strict=True))
         return answer
 
     def _certain(self, v_tilde: Any, y_tilde: Any) -> Any:
@@ -514,9 +507,9 @@ KNOWN_CONTINUOUS = 0.9545954718694023
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
     """Refuse a stored border whose nodes are not near the formula for every y~: blocks are found with it."""
-    for (name, axis, _), piece in zip(charts.BORDER_PIECES, pieces, strict=True):
-        y = charts.amplitude(axis, piece.nodes)
-        crit = piece.values * (0.5 * y * y if name == "low" else np.sqrt(y))
+    for index, ((name, axis, _), piece) in enumerate(zip(charts.BORDER_PIECES, pieces, strict=True)):
+        y = axis.amplitude(piece.nodes)
+        crit = piece.values * _KERNEL.border_scales(index, y)[0]
         if not np.all(np.abs(crit / closed_forms.border_blend(y) - 1.0) < 0.01):
             raise TableError(path, f"the nodes of border/{name} are not v~crit(y~)")
 
@@ -562,12 +555,23 @@ def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | N
     return surrogate
 
 
+def _plain_numbers(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
+    """The six inputs where all are single real numbers, k None included; None for anything else."""
+    try:
+        k = inputs["k"]
+        omega = inputs["omega"] if "omega" in inputs else float(inputs["f"]) * RAD_PER_CYCLE
+        six = inputs["mu0"], inputs["Fz"], math.inf if k is None else k, inputs["y0"], omega, inputs["v0"]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
+    return six if _NUMBERS.issuperset(map(type, six)) else None
+
+
 def _picked(cases: Any) -> dict[str, Any]:
     """The inputs among the columns of a mapping, DataFrame or Dataset."""
     try:
         cases.keys()  # which a list or a string does not have
         # coordinates of a Dataset are inputs, too, although they are not keys
-        picked = {name: cases[name] for name in (*dimensional.FIELDS, "f") if name in cases}
+        picked = {name: cases[name] for name in (*FIELDS, "f") if name in cases}
     except (AttributeError, TypeError, KeyError) as error:
         raise InputError(
             "cases", type(cases).__name__, "a mapping, DataFrame or Dataset with the inputs by name"
@@ -592,8 +596,8 @@ def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
 
 
 def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
-    """Both broadcast together, flat, contiguous and writable (one numba signature), and their shape."""
-    v, y = dimensional.real("v_tilde", v_tilde), dimensional.real("y_tilde", y_tilde)
+    """Both broadcast together, flat and contiguous, and their shape."""
+    v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
     try:
         shape = np.broadcast_shapes(v.shape, y.shape)
     except ValueError as error:
@@ -602,14 +606,10 @@ def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
 
 
 def _contiguous(a: Array) -> Array:
-    """``a`` as numba's one signature has it: contiguous, aligned, writable float64."""
-    return np.require(a, np.float64, ["C", "A", "W"])
+    """``a`` as the kernel wants it: contiguous, aligned float64."""
+    return np.require(a, np.float64, ["C", "A"])
 
 
 def _flat(a: Array, shape: tuple[int, ...]) -> Array:
-    """``a`` broadcast to ``shape``, flat, contiguous and writable."""
-    if a.shape == shape:
-        return _contiguous(a).reshape(-1)
-    full = np.empty(shape)
-    full[...] = a
-    return full.reshape(-1)
+    """``a`` broadcast to ``shape``, flat and contiguous."""
+    return _contiguous(a if a.shape == shape else np.broadcast_to(a, shape)).reshape(-1)

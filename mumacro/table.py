@@ -61,7 +61,7 @@ _PLAIN = {
     "error_estimate": ("estimated absolute error of mu_ratio", ("v_tilde", "y_tilde")),
     "v_tilde_crit": ("border of continuous sliding: smallest dimensionless speed without stick", ("y_tilde",)),
 }  # fmt: skip
-_NODES = {"power": "mean power of the shaker over mu0 Fz l0 omega", "stick": "stick fraction"}
+FIRST_QUANTITIES = "mu_ratio power stick_fraction"  # of a file that does not name its quantities
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
 
 
@@ -77,21 +77,27 @@ class BorderPiece:
 
 @dataclass
 class Block:
-    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), node values (m, n), cells for evaluation, verified errors.
+    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is tabulated.
 
-    ``values``, ``power`` and, in stick-slip, ``stick`` hold what :mod:`mumacro.charts` tabulates for mu~, oscillation
-    power and stick fraction.  ``errors`` (3, 3), a row a quantity, bounds the errors of the tabulated value and of the
-    slopes along ln v~ and ln y~, both as ``mumacro.evaluate.answer_with_slopes`` scales them.
-    ``max_abs_error`` and ``max_rel_error`` are the largest found of mu~.
+    Attributes
+    ----------
+    nodes : dict of str to ndarray
+        Node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity is zero.
+    errors : dict of str to ndarray
+        By quantity (3,): bounds of the errors of what is tabulated, and of the slopes along ln v~ and ln y~ as
+        ``kernel/points.c`` scales them, over the whole block.
+    slope_errors : dict of str to ndarray
+        The last two for every cell (cells, 2), in the order of the cells; older tables have none.
+    max_abs_error, max_rel_error : float
+        The largest errors of mu~ found.
     """
 
     a: Array
     b: Array
-    values: Array
     cells: tuple[int, int]
-    power: Array
-    stick: Array = field(default_factory=lambda: np.empty(0))
-    errors: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    nodes: dict[str, Array] = field(default_factory=dict)
+    errors: dict[str, Array] = field(default_factory=lambda: {name: np.zeros(3) for name in charts.QUANTITY_NAMES})
+    slope_errors: dict[str, Array] = field(default_factory=dict)
     max_abs_error: float = 0.0
     max_rel_error: float = 0.0
 
@@ -109,6 +115,11 @@ class Table:
     error_estimate: Array
     v_tilde_crit: Array
     attributes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def quantities(self) -> list[str]:
+        """The names of the tabulated quantities, mu_ratio first."""
+        return str(self.attributes.get("quantities", FIRST_QUANTITIES)).split()
 
 
 def _digest(table: Table) -> str:
@@ -129,7 +140,8 @@ def _digest(table: Table) -> str:
         put(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
     for chart, block in zip(charts.CHARTS, table.blocks, strict=True):
         put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
-        put(block.errors, block.a, block.b, block.values, block.power, block.stick)
+        put(*(block.errors[name] for name in table.quantities), block.a, block.b)
+        put(*(part[name] for part in (block.nodes, block.slope_errors) for name in table.quantities if name in part))
     return h.hexdigest()
 
 
@@ -145,6 +157,15 @@ def _put(group: Any, name: str, data: Array, long_name: str, axes: tuple[str, ..
     variable = group.createVariable(name, "f8", axes or (name,), fill_value=False, **extra)
     variable.setncatts({"long_name": long_name, "units": "1", **attributes})
     variable[...] = data
+
+
+def _put_slope_errors(group: Any, quantity: charts.Quantity, errors: Array) -> None:
+    """The errors of slopes of every cell, over the dimensions ``cell`` and ``slope``."""
+    if "cell" not in group.dimensions:
+        group.createDimension("cell", errors.shape[0])
+        group.createDimension("slope", errors.shape[1])
+    long_name = f"errors of the slopes of {quantity.name} along ln v_tilde and ln y_tilde, as bounds scale them"
+    _put(group, f"{quantity.variable}_slope_errors", errors, long_name, ("cell", "slope"))
 
 
 def _geometry(chart: charts.Chart) -> dict[str, Any]:
@@ -175,13 +196,15 @@ def _fill(root: Any, table: Table) -> None:
         axes = (chart.a.name, chart.b.name)
         _put(group, axes[0], block.a, charts.COORDINATES[axes[0]])
         _put(group, axes[1], block.b, charts.COORDINATES[axes[1]])
-        _put(group, "value", block.values, chart.quantity, axes)
-        _put(group, "power", block.power, _NODES["power"] + ", scaled as in mumacro.charts", axes)
-        if chart.regime == charts.STICK_SLIP:
-            _put(group, "stick", block.stick, _NODES["stick"] + ", scaled as in mumacro.charts", axes)
+        for quantity in charts.QUANTITIES:
+            if quantity.name in block.nodes:
+                meaning = chart.quantity if quantity.name == "mu_ratio" else f"{quantity.meaning}, scaled for this block"
+                _put(group, quantity.variable, block.nodes[quantity.name], meaning, axes)
+            if quantity.name in block.slope_errors:
+                _put_slope_errors(group, quantity, block.slope_errors[quantity.name])
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
         group.setncatts({
-            **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32), "errors": block.errors.ravel(),
+            **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32), "errors": np.concatenate([block.errors[name] for name in table.quantities]),
             "verified_max_abs_error": block.max_abs_error, "verified_max_rel_error": block.max_rel_error,
         })  # fmt: skip
 
@@ -255,7 +278,9 @@ class _Reader:
         found = self.array(group, axis.name)
         if found.ndim != 1 or not 2 <= found.size <= MOST_NODES:
             raise self.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
-        if not np.array_equal(found, nodes(found.size, axis.low, axis.high)):
+        # the cosine's last digit differs between mathematical libraries
+        off = np.abs(found - nodes(found.size, axis.low, axis.high))
+        if np.any(off > 1e-15 * max(abs(axis.low), abs(axis.high))):
             raise self.refuse(f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart")
         return found
 
@@ -272,6 +297,15 @@ class _Reader:
         if any(np.any(error < 0.0) for error in found):
             raise self.refuse(f"{group.path}: an error is negative")
         return found
+
+    def slope_errors(self, group: hdf5.Group, quantity: charts.Quantity, block: Block) -> None:
+        """The errors of slopes of every cell, which older tables have for whole blocks only."""
+        name = f"{quantity.variable}_slope_errors"
+        if group.has_variable(name):
+            found = self.array(group, name, (block.cells[0] * block.cells[1], 2))
+            if np.any(found < 0.0):
+                raise self.refuse(f"{group.path}: an error in {name!r} is negative")
+            block.slope_errors[quantity.name] = found
 
     def same(self, group: hdf5.Group, name: str, wanted: object) -> None:
         found = group.attribute(name)
@@ -310,6 +344,10 @@ def _read(root: hdf5.Group, reader: _Reader) -> Table:
     strange = sorted(set(blocks_group.groups()) - set(charts.NAMES))
     if strange:
         raise reader.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
+    names = str(attributes.get("quantities", FIRST_QUANTITIES)).split()
+    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= {*charts.QUANTITY_NAMES}:
+        raise reader.refuse(f"attribute 'quantities' is {names}, this program knows {', '.join(charts.QUANTITY_NAMES)}")
+    quantities = [charts.QUANTITIES[charts.QUANTITY_NAMES.index(name)] for name in names]
     border, blocks = [], []
     for name, axis, _ in charts.BORDER_PIECES:
         group = border_group.group(name)
@@ -324,15 +362,15 @@ def _read(root: hdf5.Group, reader: _Reader) -> Table:
             reader.same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
         a, b = reader.nodes(group, chart.a), reader.nodes(group, chart.b)
         shape = (a.size, b.size)
-        stick = reader.array(group, "stick", shape) if chart.regime == charts.STICK_SLIP else np.empty(0)
         largest = reader.errors(group, "verified_max_abs_error", "verified_max_rel_error")
-        na, nb = reader.cells(group, 2)
-        blocks.append(
-            Block(
-                a, b, reader.array(group, "value", shape), (na, nb), reader.array(group, "power", shape), stick,
-                reader.errors(group, "errors", count=9)[0].reshape(3, 3), *(float(error[0]) for error in largest),
-            )
-        )  # fmt: skip
+        block = Block(a, b, reader.cells(group, 2), max_abs_error=float(largest[0][0]), max_rel_error=float(largest[1][0]))
+        (errors,) = reader.errors(group, "errors", count=3 * len(quantities))
+        for quantity, error in zip(quantities, errors.reshape(-1, 3), strict=True):
+            block.errors[quantity.name] = error
+            if chart.regime != charts.CONTINUOUS or quantity.while_sliding:
+                block.nodes[quantity.name] = reader.array(group, quantity.variable, shape)
+                reader.slope_errors(group, quantity, block)
+        blocks.append(block)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         plain[name] = reader.array(root, name, tuple(plain[axis].size for axis in axes) if axes else None)

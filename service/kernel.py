@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from mumacro import Surrogate
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, ROUNDING, SOURCES
-from mumacro.dimensional import BOUNDS as BOUNDS_OF_FIELDS
-from mumacro.dimensional import FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE
-from mumacro.input_names import NAMES as INPUTS
-from mumacro.input_names import SI, scale_of, suggestion
+from mumacro.inputs import BOUNDS as BOUNDS_OF_FIELDS
+from mumacro.inputs import FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE, SI, scale_of, suggestion
+from mumacro.inputs import NAMES as INPUTS
 
 __all__ = [
     "BOUNDS", "FIELDS", "INPUTS", "MOST_HZ", "POSITIVE", "RAD_PER_CYCLE", "REGIMES", "REGIME_NAMES",
@@ -63,8 +62,10 @@ class Kernel:
     def __init__(self, surrogate: Surrogate) -> None:
         self.surrogate = surrogate
 
-    def case(self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float) -> tuple[float, float, int]:
-        """(mu_macro/mu0 [-], bound of its absolute error [-], source code) of one legal case; k = inf is rigid."""
+    def case(
+        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
+    ) -> tuple[float, float, float, int]:
+        """(mu_macro, mu_macro/mu0, error_bound [-], source code) of one legal case; k = inf is rigid."""
         return self.surrogate.evaluate_case(mu0, Fz, k, y0, omega, v0)
 
     def columns(self, n: int, columns: Sequence[Array]) -> tuple[Array, Array, Array, Codes]:
@@ -99,16 +100,3 @@ class Kernel:
     def border_error(self) -> float:
         """Largest relative error of v~crit(y~) in this table [-]."""
         return self.surrogate.border.max_rel_error + ROUNDING
-
-    def warm_up(self) -> None:
-        """Compile or load what the first answers need: one case, and cases in columns."""
-        self.case(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01)
-        self.columns(1, [np.array([value]) for value in (0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01)])
-
-    def warm_up_more(self) -> None:
-        """Compile or load the rest."""
-        one = {name: np.array([value]) for name, value in zip(FIELDS, (0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01), strict=True)}
-        self.details(one, True)
-        self.details({**one, "k": np.array([math.inf])}, True)
-        surrogate = self.surrogate
-        surrogate.warm_up()

@@ -10,12 +10,10 @@ Decimal text becomes a double by the algorithm of D. Lemire, "Number parsing at 
 Practice and Experience 51 (2021), exactly rounded for up to 19 significant digits; numbers with more are not ordinary.
 """
 
-from pathlib import Path
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-
-from mumacro.kernel_cache import kernel, part
 
 from .kernel import FIELDS, MOST_HZ, RAD_PER_CYCLE, Array
 
@@ -62,8 +60,8 @@ def _powers_of_five() -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
 
 
 _FIVE_HIGH, _FIVE_LOW = _powers_of_five()
-_compiled = kernel(fuse=False, beside=Path(__file__).resolve().parent)
-_inlined = part(inline=True, fuse=False)
+_compiled = njit(nogil=True, error_model="numpy")
+_inlined = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_inlined

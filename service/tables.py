@@ -76,7 +76,6 @@ class LoadedTable:
             raise TableError(path, error.strerror or "unreadable") from error
         surrogate = Surrogate.open(path)
         kernel = Kernel(surrogate)
-        kernel.warm_up()
         surrogate.self_check()
         return cls(surrogate, kernel, stamp)
 
@@ -209,8 +208,6 @@ class Tables:
     def warm_up_more(self) -> None:
         """Load or compile the code that the first answers do not need: the reader of batches, then the quantities."""
         numbers.load()
-        for table in self.loaded[:1]:
-            table.kernel.warm_up_more()
         self.warm = True
 
 

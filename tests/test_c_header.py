@@ -15,7 +15,7 @@ from builder.c.translate import Translator
 from builder.c.types import FLOAT, Array, TranslationError, literal
 from builder.export import export_table
 from mumacro import Surrogate, charts
-from mumacro.dimensional import BOUNDS, FIELDS
+from mumacro.inputs import BOUNDS, FIELDS
 
 pytestmark = pytest.mark.slow
 

@@ -9,6 +9,7 @@ from numba.core.errors import TypingError
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from comparing import close
 from mumacro import charts
 from mumacro.cells import (
     WIDTH,
@@ -51,7 +52,7 @@ def test_nodes_are_the_zeros_of_the_chebyshev_polynomial(n: int) -> None:
     assert np.all(np.diff(x) > 0.0)
     assert x[0] > -3.0
     assert x[-1] < 5.0
-    assert chebyshev.chebval((x - 1.0) / 4.0, [0] * n + [1]) == pytest.approx(np.zeros(n), abs=1e-13)
+    assert chebyshev.chebval((x - 1.0) / 4.0, [0] * n + [1]) == close(np.zeros(n), abs=1e-13)
 
 
 @pytest.mark.parametrize("n", [1, 3, 8, 21])
@@ -59,8 +60,8 @@ def test_coefficients_interpolate(n: int) -> None:
     rng = np.random.default_rng(n)
     values = rng.normal(size=n)
     c = chebyshev_coefficients(values)
-    assert chebyshev.chebval(nodes(n, -1.0, 1.0), c) == pytest.approx(values, abs=1e-13)
-    assert interpolation_matrix(n, nodes(n, -1.0, 1.0)) @ c == pytest.approx(values, abs=1e-13)
+    assert chebyshev.chebval(nodes(n, -1.0, 1.0), c) == close(values, abs=1e-13)
+    assert interpolation_matrix(n, nodes(n, -1.0, 1.0)) @ c == close(values, abs=1e-13)
 
 
 def test_coefficients_of_a_plane_work_along_both_axes() -> None:
@@ -68,7 +69,7 @@ def test_coefficients_of_a_plane_work_along_both_axes() -> None:
     expected = rng.normal(size=(5, 9))
     x, z = nodes(5, -1.0, 1.0), nodes(9, -1.0, 1.0)
     values = chebyshev.chebgrid2d(x, z, expected)
-    assert chebyshev_coefficients(values) == pytest.approx(expected, abs=1e-13)
+    assert chebyshev_coefficients(values) == close(expected, abs=1e-13)
 
 
 @pytest.mark.parametrize("cells", [1, 3, 8])
@@ -80,7 +81,7 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
     for x in np.linspace(0.0, 1.0, 57):
         i = min(int(x * cells), cells - 1)
         found = np.polyval(local[i], 2.0 * (x * cells - i) - 1.0)
-        assert found == pytest.approx(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
+        assert found == close(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
 
 
 @pytest.mark.parametrize("cells", [(1, 1), (2, 5), (4, 3)])
@@ -92,7 +93,7 @@ def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[in
     assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
     assert coef.flags.c_contiguous
     for x, z in rng.random((80, 2)):
-        assert at(coef, cells, x, z) == pytest.approx(chebyshev.chebval2d(2 * x - 1, 2 * z - 1, c), abs=2e-10)
+        assert at(coef, cells, x, z) == close(chebyshev.chebval2d(2 * x - 1, 2 * z - 1, c), abs=2e-10)
 
 
 def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
@@ -104,8 +105,8 @@ def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
         i = (x * cells).astype(int)
         found = np.array([np.polyval(local[k], 2.0 * (t * cells - k) - 1.0) for t, k in zip(x, i, strict=True)])
         errors.append(np.abs(found - np.exp(np.sin(3.0 * x))).max())
-    assert math.log2(errors[0] / errors[1]) == pytest.approx(WIDTH, abs=1.5)
-    assert math.log2(errors[1] / errors[2]) == pytest.approx(WIDTH, abs=1.0)
+    assert math.log2(errors[0] / errors[1]) == close(WIDTH, abs=1.5)
+    assert math.log2(errors[1] / errors[2]) == close(WIDTH, abs=1.0)
 
 
 def test_neighbouring_cells_meet() -> None:
@@ -114,8 +115,8 @@ def test_neighbouring_cells_meet() -> None:
     coef = joined([cells_2d(PLAIN, PLAIN, values, (6, 6))])
     for i in range(5):
         for t in np.linspace(-1.0, 1.0, 9):
-            assert _value(coef, i * 6 + 2, 1.0, t) == pytest.approx(_value(coef, (i + 1) * 6 + 2, -1.0, t), abs=2e-12)
-            assert _value(coef, 12 + i, t, 1.0) == pytest.approx(_value(coef, 13 + i, t, -1.0), abs=2e-12)
+            assert _value(coef, i * 6 + 2, 1.0, t) == close(_value(coef, (i + 1) * 6 + 2, -1.0, t), abs=2e-12)
+            assert _value(coef, 12 + i, t, 1.0) == close(_value(coef, 13 + i, t, -1.0), abs=2e-12)
 
 
 # --- the patch itself ---------------------------------------------------------------------------------
@@ -126,7 +127,7 @@ def test_patch_is_a_polynomial_in_falling_powers() -> None:
     coef[1, 2, 5] = 3.0  # w^5 u^2
     coef[1, 7, 7] = -1.0
     for value in (patch_value, _value):
-        assert value(coef, 1, 0.5, -0.7) == pytest.approx(3.0 * (-0.7) ** 5 * 0.5**2 - 1.0, rel=1e-15)
+        assert value(coef, 1, 0.5, -0.7) == close(3.0 * (-0.7) ** 5 * 0.5**2 - 1.0, rel=1e-15)
         assert value(coef, 0, 0.5, -0.7) == 0.0
         assert value(coef, 2, 0.5, -0.7) == 0.0
 
@@ -138,8 +139,8 @@ def test_compiled_patch_equals_plain_python() -> None:
         u, w = rng.uniform(-1.0, 1.0, 2)
         expected = np.polynomial.polynomial.polyval2d(w, u, coef[p, ::-1, ::-1])
         scale = np.abs(coef[p]).sum()
-        assert patch_value(coef, p, u, w) == pytest.approx(expected, abs=4e-16 * scale)
-        assert _value(coef, p, u, w) == pytest.approx(expected, abs=4e-16 * scale)
+        assert patch_value(coef, p, u, w) == close(expected, abs=4e-16 * scale)
+        assert _value(coef, p, u, w) == close(expected, abs=4e-16 * scale)
 
 
 def test_a_patch_that_is_not_contiguous_is_refused_not_misread() -> None:
@@ -174,12 +175,12 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cell
             patch -= index * size
             assert 0 <= patch < size
             assert -1.0 - 1e-9 <= local[axis] <= 1.0 + 1e-9
-            assert local[1 - axis] == pytest.approx(-1.0, abs=1e-9)
+            assert local[1 - axis] == close(-1.0, abs=1e-9)
             visited.add(patch)
         assert visited == {i * cells[1] if axis == 0 else i for i in range(cells[axis])}
     last, u, w = _cell(blocks, len(CHARTS) * size, index, spans[0][1], spans[1][1])
     assert last == (index + 1) * size - 1
-    assert (u, w) == (pytest.approx(1.0, abs=1e-9), pytest.approx(1.0, abs=1e-9))
+    assert (u, w) == (close(1.0, abs=1e-9), close(1.0, abs=1e-9))
 
 
 def test_no_coordinate_makes_a_cell_of_another_table() -> None:
@@ -197,12 +198,12 @@ def test_both_coordinates_of_an_axis_are_inverse_and_rise_together(axis: Axis) -
     x = np.linspace(axis.low, axis.high, 2001)
     there = axis.to_evaluation(x)
     assert np.all(np.diff(there) > 0.0)
-    assert axis.to_file(there) == pytest.approx(x, rel=4e-15, abs=4e-15 * (axis.high - axis.low))
+    assert axis.to_file(there) == close(x, rel=4e-15, abs=4e-15 * (axis.high - axis.low))
     start, stop = axis.span
     assert start - 1e-15 <= there[0]
     assert there[-1] <= stop * (1.0 + 1e-15)
     at = np.linspace(start, stop, 2001)
-    assert axis.to_evaluation(axis.to_file(at)) == pytest.approx(at, rel=1e-14, abs=1e-15)
+    assert axis.to_evaluation(axis.to_file(at)) == close(at, rel=1e-14, abs=1e-15)
 
 
 def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
@@ -212,10 +213,10 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
         radius, half, phi = _corner(v, y)
         s0 = math.sqrt(2.0 * math.pi * v / phi)
         assert low < half < high
-        assert phi**3 + 2.0 * (y - 1.0) * phi == pytest.approx(math.pi * v, rel=1e-14)
-        assert radius == pytest.approx(math.hypot(s0 / SQRT2, SQRT2 * phi), rel=1e-15)
+        assert phi**3 + 2.0 * (y - 1.0) * phi == close(math.pi * v, rel=1e-14)
+        assert radius == close(math.hypot(s0 / SQRT2, SQRT2 * phi), rel=1e-15)
         angle = 2.0 / math.pi * math.atan2(2.0 * phi, s0)
-        assert ANGLE.to_file(np.array([half]))[0] == pytest.approx(angle, rel=1e-14)
+        assert ANGLE.to_file(np.array([half]))[0] == close(angle, rel=1e-14)
 
 
 @njit
@@ -225,17 +226,17 @@ def _corner(v: float, y: float) -> tuple[float, float, float]:
 
 
 def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
-    assert S.to_evaluation(np.array([0.0, 1.0])) == pytest.approx([0.0, SQRT2], abs=1e-16)
-    assert S.to_file(np.array([0.0, SQRT2])) == pytest.approx([0.0, 1.0], abs=1e-15)
+    assert S.to_evaluation(np.array([0.0, 1.0])) == close([0.0, SQRT2], abs=1e-16)
+    assert S.to_file(np.array([0.0, SQRT2])) == close([0.0, 1.0], abs=1e-15)
     rho = np.concatenate([np.geomspace(1e-30, 0.5, 50), 1.0 - np.geomspace(1e-12, 0.5, 50)])
     sigma = np.where(rho < 0.5, np.sqrt(rho), SQRT2 - np.sqrt(1.0 - rho))
     s = S.to_file(sigma)
-    assert np.sin(0.5 * math.pi * s) ** 2 == pytest.approx(rho, rel=1e-15, abs=0.0)
+    assert np.sin(0.5 * math.pi * s) ** 2 == close(rho, rel=1e-15)
     assert np.all((s >= 0.0) & (s <= 1.0))
     assert np.all(np.diff(S.to_file(np.linspace(0.0, SQRT2, 1001))) > 0.0)
     # continuous at its knot
     beside = S.to_evaluation(np.array([0.5 - 1e-15, 0.5, 0.5 + 1e-15]))
-    assert beside == pytest.approx(0.5 * SQRT2, abs=4e-15)
+    assert beside == close(0.5 * SQRT2, abs=4e-15)
 
 
 @pytest.mark.parametrize("chart", [chart for chart in CHARTS if chart.b.name == "s"], ids=lambda chart: chart.name)
@@ -247,10 +248,10 @@ def test_cells_along_s_are_on_the_nodes_axis_and_have_an_edge_at_the_knot(chart:
     s = 0.5 * (low + high) + 0.5 * (high - low) * t
     assert s.max() < high
     edges = chart.b.to_file(SQRT2 * np.arange(cells + 1) / cells)
-    assert edges[cells // 2] == pytest.approx(0.5, abs=1e-15)  # rho = 1/2, where the map changes its branch
+    assert edges[cells // 2] == close(0.5, abs=1e-15)  # rho = 1/2, where the map changes its branch
     for i in range(cells):
         if edges[i + 1] <= low:
-            assert np.all(s[i] == pytest.approx(low, abs=1e-15))  # never visited
+            assert np.all(s[i] == close(low, abs=1e-15))  # never visited
         else:
             assert np.all((s[i] > edges[i]) & (s[i] < edges[i + 1]))
     x, t = cell_positions(chart.a, 3)
@@ -266,4 +267,4 @@ def test_cells_along_s_follow_a_smooth_function() -> None:
     rng = np.random.default_rng(2)
     for x, sigma in zip(rng.random(200), SQRT2 * rng.random(200), strict=True):
         expected = math.exp(-x * chart.a.high) * math.cos(2.0 * float(chart.b.to_file(np.array([sigma]))[0]))
-        assert at(coef, (4, 12), x, sigma / SQRT2) == pytest.approx(expected, abs=2e-9)
+        assert at(coef, (4, 12), x, sigma / SQRT2) == close(expected, abs=2e-9)

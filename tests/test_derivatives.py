@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparing import close
 from mumacro import InputError, MumacroError, Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from mumacro.interop.derivatives import quantities
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -54,11 +55,11 @@ def test_slopes_at_rest_are_the_limit_of_those_beside_it(table: Surrogate, name:
     by_speed, by_amplitude = quantities(table)[name].slopes(speeds, np.full(3, y))
     if name == "stick_fraction" and y < 1.0:
         assert by_speed[0] == -math.inf
-        assert by_speed[1] == pytest.approx(order * by_speed[2], rel=0.01)
+        assert by_speed[1] == close(order * by_speed[2], rel=0.01)
     else:
-        assert by_speed[0] == pytest.approx((order * by_speed[1] - by_speed[2]) / (order - 1.0), rel=1e-4, abs=1e-5)
+        assert by_speed[0] == close((order * by_speed[1] - by_speed[2]) / (order - 1.0), rel=1e-4, abs=1e-5)
     limit = (order * by_amplitude[1] - by_amplitude[2]) / (order - 1.0)
-    assert by_amplitude[0] == pytest.approx(limit, rel=1e-4, abs=1e-5)
+    assert by_amplitude[0] == close(limit, rel=1e-4, abs=1e-5)
 
 
 def test_slopes_where_nothing_oscillates_are_zero_and_illegal_ones_are_nan(table: Surrogate) -> None:
@@ -135,7 +136,7 @@ def test_jax_transformations_compose(jax: ModuleType, in_jax: Any, table: Surrog
 
     step = 1e-5
     difference = (settled(0.1 + step) - settled(0.1 - step)) / (2.0 * step)
-    assert jax.grad(settled)(0.1) == pytest.approx(float(difference), rel=1e-7)
+    assert jax.grad(settled)(0.1) == close(float(difference), rel=1e-7)
     for slopes in (jax.vmap(jax.grad(in_jax.power))(v[:2], y), jax.grad(lambda a: in_jax.power(a, y).sum())(v[:2])):
         np.testing.assert_array_equal(slopes, quantities(table)["power"].slopes(np.asarray(v[:2]), np.asarray(y))[0])
 

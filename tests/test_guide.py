@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from comparing import close
+
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -76,4 +78,4 @@ def test_commands(page: Path, commands: dict[str, str], tmp_path: Path, request:
             (words, numbers), (shown_words, shown_numbers) = parts(done.stdout), parts(shown)
             assert words == shown_words, command
             # the last digits depend on the processor; error bounds are of rounding size
-            assert numbers == pytest.approx(shown_numbers, rel=1e-9, abs=2e-13), command
+            assert numbers == close(shown_numbers, rel=1e-9, abs=2e-13), command

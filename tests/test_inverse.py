@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from comparing import close
 from mumacro import InputError
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from mumacro.inverse import border_crossings, solve_for
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 
@@ -47,7 +48,7 @@ def test_the_forward_answer_is_inverted(surrogate, case, unknown):
     for root in solution.roots[0]:
         there = surrogate.evaluate(**{**case, unknown: root.value})
         assert there.mu_macro == root.mu_macro
-        assert root.mu_macro == pytest.approx(forward.mu_macro, rel=1e-9, abs=2.0 * forward.error_bound)
+        assert root.mu_macro == close(forward.mu_macro, rel=1e-9, abs=2.0 * forward.error_bound)
         assert root.low <= root.value <= root.high
     value = min(max(case[unknown], solution.reach.low), solution.reach.high)
     assert any(root.low <= value <= root.high for root in solution.roots[0])
@@ -57,8 +58,8 @@ def test_a_root_is_enclosed_to_the_tables_error(surrogate):
     answer = surrogate.evaluate(**CASE, gradient=True)
     root = only_root(solve_for(surrogate, "v0", answer.mu_macro, others(CASE, "v0")))
     width = answer.error_bound / answer.gradient["v0"]
-    assert root.high - 0.01 == pytest.approx(width, rel=0.05)
-    assert 0.01 - root.low == pytest.approx(width, rel=0.05)
+    assert root.high - 0.01 == close(width, rel=0.05)
+    assert 0.01 - root.low == close(width, rel=0.05)
 
 
 def test_an_enclosure_on_a_plateau_spans_it(surrogate):
@@ -75,7 +76,7 @@ def test_targets_are_solved_together_as_alone(surrogate):
     values = [roots[0].value for roots in together.roots]
     assert values == sorted(values)
     for target, value in zip(targets, values, strict=True):
-        assert only_root(solve_for(surrogate, "v0", target, others(CASE, "v0"))).value == pytest.approx(value, rel=1e-9)
+        assert only_root(solve_for(surrogate, "v0", target, others(CASE, "v0"))).value == close(value, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +87,7 @@ def test_a_monotone_unknown_reports_its_reach(surrogate, unknown, low, high):
     targets = [0.999 * low, low + 0.5 * (high - low), 1.001 * high]
     solution = solve_for(surrogate, unknown, targets, others(CASE, unknown))
     assert [len(roots) for roots in solution.roots] == [0, 1, 0]
-    assert solution.reach.mu_min == pytest.approx(low, abs=1e-10)
+    assert solution.reach.mu_min == close(low, abs=1e-10)
     assert solution.reach.mu_max == high
 
 
@@ -97,7 +98,7 @@ def test_an_end_that_is_attained_is_a_root(surrogate):
         assert only_root(solve_for(surrogate, unknown, 0.3, others(CASE, unknown))).value == 0.0
     # at rest friction vanishes from y0 = l0 on
     root = only_root(solve_for(surrogate, "y0", 0.0, {**others(CASE, "y0"), "v0": 0.0}))
-    assert root.value == pytest.approx(3e-6, rel=1e-12)
+    assert root.value == close(3e-6, rel=1e-12)
 
 
 def test_an_end_that_is_only_approached_is_none(surrogate):
@@ -123,10 +124,10 @@ def test_a_fold_has_three_roots(surrogate, unknown):
         assert len(roots) == expected
         assert [root.value for root in roots] == sorted(root.value for root in roots)
         for root in roots:
-            assert root.mu_macro == pytest.approx(target, rel=1e-12)
+            assert root.mu_macro == close(target, rel=1e-12)
     below = solve_for(surrogate, unknown, 0.3 * 0.99 * low, others(case, unknown))
     assert below.roots == ((),)
-    assert below.reach.mu_min == pytest.approx(0.3 * low, rel=1e-6)
+    assert below.reach.mu_min == close(0.3 * low, rel=1e-6)
 
 
 def test_a_range_keeps_its_roots_only(surrogate):
@@ -136,7 +137,7 @@ def test_a_range_keeps_its_roots_only(surrogate):
     assert len(every.roots[0]) == 3
     first, second, third = (root.value for root in every.roots[0])
     middle = solve_for(surrogate, "k", target, case, within=(math.sqrt(first * second), math.sqrt(second * third)))
-    assert only_root(middle).value == pytest.approx(second, rel=1e-9)
+    assert only_root(middle).value == close(second, rel=1e-9)
     half = solve_for(surrogate, "v0", 0.25, others(CASE, "v0"), within=(0.0, 1e-3))
     assert half.roots == ((),)
     assert half.reach.max_included
@@ -146,7 +147,7 @@ def test_a_range_keeps_its_roots_only(surrogate):
 def test_friction_coefficients_are_found_far_out(surrogate):
     for target in (1e-9, 0.1, 1e7):
         root = only_root(solve_for(surrogate, "mu0", target, others(CASE, "mu0")))
-        assert root.mu_macro == pytest.approx(target, rel=1e-12)
+        assert root.mu_macro == close(target, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -174,7 +175,7 @@ def test_rigid_contact_is_inverted(surrogate):
         case = {**CASE, "k": None}
         target = surrogate.evaluate(**case).mu_macro
         root = only_root(solve_for(surrogate, unknown, target, others(case, unknown)))
-        assert root.value == pytest.approx(CASE[unknown], rel=1e-9)
+        assert root.value == close(CASE[unknown], rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +203,7 @@ def test_the_border_is_where_the_regime_changes(surrogate, along, expected):
         regimes = surrogate.evaluate(**{**CASE, along: crossing.value * np.array([1 - 1e-9, 1 + 1e-9])}).regime
         assert set(regimes) == {"continuous", "stick_slip"}
         answer = surrogate.evaluate(**{**CASE, along: crossing.value})
-        assert answer.v_tilde == pytest.approx(surrogate.v_tilde_crit(answer.y_tilde), rel=1e-9)
+        assert answer.v_tilde == close(surrogate.v_tilde_crit(answer.y_tilde), rel=1e-9)
         assert crossing.mu_macro == answer.mu_macro
 
 
@@ -213,7 +214,7 @@ def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(surrogat
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}
     crossings = border_crossings(surrogate, "k", case, 1e-3, 1e3)
     assert len(crossings) == expected
-    assert all(crossing.value == pytest.approx(closest, rel=1e-3) for crossing in crossings)
+    assert all(crossing.value == close(closest, rel=1e-3) for crossing in crossings)
 
 
 def test_a_fold_just_above_its_first_ratio_is_found(surrogate):
@@ -242,7 +243,7 @@ def test_a_range_has_its_ends_exactly(scale):
     if scale == "log":
         assert sweep_values("v0", 1e-4, 10.0, 6, "log").tolist() == [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0]
     steps = np.diff(np.log(values) if scale == "log" else values)
-    assert steps == pytest.approx(steps[0], rel=1e-9)
+    assert steps == close(steps[0], rel=1e-9)
     assert np.all(np.diff(sweep_values("v0", 1.0, math.nextafter(1.0, 2.0), 9, scale)) >= 0.0)
 
 
@@ -252,9 +253,9 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate, along):
     law = friction_law(surrogate, along, values, others(CASE, along))
     for i in (0, 17, 40):
         alone = surrogate.evaluate(**{**CASE, along: values[i]})
-        assert law.answer.mu_macro[i] == pytest.approx(alone.mu_macro, rel=1e-15)
+        assert law.answer.mu_macro[i] == close(alone.mu_macro, rel=1e-15)
         static = surrogate.evaluate(**{**CASE, along: values[i], "v0": 0.0})
-        assert law.mu_static[i] == pytest.approx(static.mu_macro, rel=1e-9, abs=1e-15)
+        assert law.mu_static[i] == close(static.mu_macro, rel=1e-9, abs=1e-15)
     changes = np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1])
     assert changes == len(law.border)
 
@@ -287,7 +288,7 @@ def test_an_approximation_is_nan_outside_its_stated_range(surrogate):
     assert np.isfinite(found["rigid"]).all()
     rigid = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "k": None})
     found = approximations(surrogate, rigid, {**others(CASE, "v0"), "k": None})
-    assert found["rigid"] == pytest.approx(rigid.answer.mu_macro, rel=1e-14)
+    assert found["rigid"] == close(rigid.answer.mu_macro, rel=1e-14)
     assert np.isnan(found["creep"]).all()
     assert np.isnan(found["continuous"]).all()
     assert (rigid.mu_static == 0.0).all()
@@ -303,10 +304,10 @@ def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate, along):
     assert speeds.keys() == BORDERS.keys()
     v0 = values if along == "v0" else CASE["v0"]
     assert ((v0 >= speeds["exact"]) == (law.answer.regime == "continuous")).all()
-    assert speeds["blend"] == pytest.approx(speeds["exact"], rel=0.006)
+    assert speeds["blend"] == close(speeds["exact"], rel=0.006)
     meant = ~np.isnan(speeds["small_amplitude"])
     assert (meant == (law.answer.y_tilde <= 1.0)).all()
-    assert speeds["small_amplitude"][meant] == pytest.approx(speeds["exact"][meant], rel=0.11)
+    assert speeds["small_amplitude"][meant] == close(speeds["exact"][meant], rel=0.11)
 
 
 def test_what_never_sticks_has_no_border(surrogate):

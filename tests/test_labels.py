@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from mumacro import REGIMES, SOURCES, InputError, Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 N = 60

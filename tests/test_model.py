@@ -30,6 +30,7 @@ from builder.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
 from builder.series import COS_TAU, ORDER, SPEED, X, series
 from builder.steady import border, continuous, workspace
 from builder.stick import stick_excess
+from comparing import close
 
 Array = NDArray[np.float64]
 HALF = 0.5 * math.pi
@@ -64,9 +65,9 @@ def test_slip_and_its_integrals_agree_with_a_general_integrator(v: float, y: flo
         right_hand_side(v, y), (start, end), [angle, 0, 0, 0, 0], method="DOP853", rtol=1e-13, atol=1e-14
     ).y[:, -1]  # fmt: skip
     th, out = follow(v, y, start, angle, end)
-    assert th == pytest.approx(witness[0], abs=3e-12)
-    assert out[TURNED] == pytest.approx(witness[0] - angle, abs=3e-12)
-    assert out[SUM_UX : WORK + 1] == pytest.approx(witness[1:], abs=3e-11 * (1.0 + y))
+    assert th == close(witness[0], abs=3e-12)
+    assert out[TURNED] == close(witness[0] - angle, abs=3e-12)
+    assert out[SUM_UX : WORK + 1] == close(witness[1:], abs=3e-11 * (1.0 + y))
     assert out[SIGMA] == end
 
 
@@ -86,8 +87,8 @@ def test_stiff_steps_agree_with_a_general_integrator(v: float, y: float) -> None
     ).y[:, -1]
     th, out = follow(v, y, -HALF, 0.3, HALF)
     assert out[STEPS] < 0.5 * (out[PATH] / 7.9)  # a Taylor step is at most 0.33 ORDER = 7.9 lengths long
-    assert th == pytest.approx(witness[0], abs=1e-7)
-    assert out[SUM_UX : WORK + 1] == pytest.approx(witness[1:], rel=1e-7, abs=1e-7)
+    assert th == close(witness[0], abs=1e-7)
+    assert out[SUM_UX : WORK + 1] == close(witness[1:], rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.parametrize(("v", "y", "angle"), [(0.5, 0.3, 0.2), (2.0, 1.0, -0.7), (0.05, 3.0, 1.1), (1.2, 20.0, 0.5)])
@@ -96,7 +97,7 @@ def test_sensitivity_to_the_start_is_the_exponential_of_the_slip_path(v: float, 
     ends = [follow(v, y, -1.0, angle + k * h, 0.8)[0] for k in (-2, -1, 1, 2)]
     slope = (8.0 * (ends[2] - ends[1]) - (ends[3] - ends[0])) / (12.0 * h)
     path = follow(v, y, -1.0, angle, 0.8)[1][PATH]
-    assert slope == pytest.approx(math.exp(-path), rel=1e-9, abs=1e-11)
+    assert slope == close(math.exp(-path), rel=1e-9, abs=1e-11)
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (0.05, 3.0), (1.2, 8.0), (0.0, 1.7), (3.0, 0.0)])
@@ -111,21 +112,21 @@ def test_slip_is_a_moebius_map_of_the_half_angle_tangent(v: float, y: float, spa
     starts = [-1.3, -0.2, 0.5, 1.4]
     ends = [follow(v, y, span[0], th, span[1])[0] for th in starts]
     gap = min(abs(a - b) for i, a in enumerate(ends) for b in ends[:i])
-    assert cross_ratio(ends) == pytest.approx(cross_ratio(starts), rel=1e-14 / gap + 1e-13)
+    assert cross_ratio(ends) == close(cross_ratio(starts), rel=1e-14 / gap + 1e-13)
 
 
 @pytest.mark.parametrize("chart", [-1, 0, 1])
 def test_charts_describe_the_same_orbit(chart: int) -> None:
     plain, one = follow(0.4, 0.9, -1.0, 0.7, 0.5)
     other, two = follow(0.4, 0.9, -1.0, 0.7, 0.5, chart)
-    assert other == pytest.approx(plain, abs=2e-15)
-    assert two[TURNED : WORK + 1] == pytest.approx(one[TURNED : WORK + 1], abs=3e-15)
+    assert other == close(plain, abs=2e-15)
+    assert two[TURNED : WORK + 1] == close(one[TURNED : WORK + 1], abs=3e-15)
 
 
 def test_rechart_keeps_the_direction() -> None:
     for chart in (-1, 0, 1):
         for target in (-1, 0, 1):
-            assert rechart(0.3, chart, target) + target * HALF == pytest.approx(0.3 + chart * HALF, abs=1e-15)
+            assert rechart(0.3, chart, target) + target * HALF == close(0.3 + chart * HALF, abs=1e-15)
 
 
 @pytest.mark.parametrize("turn", [0, -1])
@@ -136,7 +137,7 @@ def test_time_may_count_from_either_turn(turn: int, sigma: float) -> None:
     assert slip(0.7, 2.0, sigma, turn, 0.2, 0, 1.4, False, w, out) == OK
     counted = out.copy()
     assert slip(0.7, 2.0, start, 0, 0.2, 0, 1.4, False, w, out) == OK
-    assert counted[: WORK + 1] == pytest.approx(out[: WORK + 1], abs=2e-14)
+    assert counted[: WORK + 1] == close(out[: WORK + 1], abs=2e-14)
 
 
 @pytest.mark.parametrize("chart", [-1, 0, 1])
@@ -147,10 +148,10 @@ def test_series_satisfies_the_equations_of_motion(chart: int) -> None:
     for t in (0.0, 0.02, 0.05):
         th = chart * HALF + polynomial.polyval(t, w[X][: ORDER + 1])
         c = -math.sin(sigma + t)
-        assert polynomial.polyval(t, w[COS_TAU][: ORDER + 1]) == pytest.approx(c, abs=1e-15)
+        assert polynomial.polyval(t, w[COS_TAU][: ORDER + 1]) == close(c, abs=1e-15)
         rate = polynomial.polyval(t, np.polynomial.polynomial.polyder(w[X][: ORDER + 1]))
-        assert rate == pytest.approx(y * c * math.cos(th) - v * math.sin(th), abs=4e-15)
-        assert polynomial.polyval(t, w[SPEED][: ORDER + 1]) == pytest.approx(
+        assert rate == close(y * c * math.cos(th) - v * math.sin(th), abs=4e-15)
+        assert polynomial.polyval(t, w[SPEED][: ORDER + 1]) == close(
             v * math.cos(th) + y * c * math.sin(th), abs=4e-15
         )  # fmt: skip
 
@@ -167,7 +168,7 @@ def test_stick_excess_is_the_deflated_stretch(chart: int, d: float) -> None:
     ux = math.cos(th) + v * d
     uy = math.sin(th) + y * (math.cos(sigma + d) - math.cos(sigma))
     excess = stick_excess(v, y, y - 1.0, x, chart, sigma, sigma + d - math.pi, d)
-    assert excess == pytest.approx((ux * ux + uy * uy - 1.0) / (d * d), rel=1e-12, abs=1e-13 / (d * d))
+    assert excess == close((ux * ux + uy * uy - 1.0) / (d * d), rel=1e-12, abs=1e-13 / (d * d))
 
 
 def test_stick_excess_at_its_double_root_is_the_fall_of_the_slip_speed() -> None:
@@ -176,7 +177,7 @@ def test_stick_excess_at_its_double_root_is_the_fall_of_the_slip_speed() -> None
     # d lam / d tau at fixed u: -y~ sin tau u_y + |w|^2 ... of u.w with u' = w, tau = sigma + pi/2
     expected = -y * math.cos(sigma) * math.sin(th) + v * v + (y * math.sin(sigma)) ** 2
     found = stick_excess(v, y, y - 1.0, th, 0, sigma, sigma - math.pi, 0.0)
-    assert found == pytest.approx(expected, rel=1e-14)
+    assert found == close(expected, rel=1e-14)
 
 
 # --- the end of slip ----------------------------------------------------------------------------------
@@ -193,7 +194,7 @@ def test_slip_ends_where_the_slip_speed_vanishes_first(v: float, y: float) -> No
     assert slip_speed(v, y, start, angle) > 0.0
     assert slip(v, y, start, 0, angle, 0, HALF, True, w, out) == OK
     stop, th = out[SIGMA], out[CHART] * HALF + out[ANGLE]
-    assert slip_speed(v, y, stop, th) == pytest.approx(0.0, abs=3e-15 * (1.0 + y))
+    assert slip_speed(v, y, stop, th) == close(0.0, abs=3e-15 * (1.0 + y))
     dense = np.linspace(start, stop - 1e-6, 400)
     assert all(slip_speed(v, y, s, follow(v, y, start, angle, s)[0]) > 0.0 for s in dense[1:])
 
@@ -226,14 +227,14 @@ def test_radau_rule_is_exact_for_polynomials_of_its_degree() -> None:
     assert RADAU_NODES[0] > 0.0
     assert np.all(RADAU_WEIGHTS > 0.0)
     for degree in range(2 * n - 1):
-        assert RADAU_WEIGHTS @ RADAU_NODES**degree == pytest.approx(1.0 / (degree + 1), rel=1e-13)
+        assert RADAU_WEIGHTS @ RADAU_NODES**degree == close(1.0 / (degree + 1), rel=1e-13)
 
 
 def test_three_radau_stages_are_the_known_ones() -> None:
     nodes, weights, _ = radau._radau(3)
     root = math.sqrt(6.0)
-    assert nodes == pytest.approx([(4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0], rel=1e-14)
-    assert weights == pytest.approx([(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0], rel=1e-14)
+    assert nodes == close([(4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0], rel=1e-14)
+    assert weights == close([(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0], rel=1e-14)
 
 
 def test_radau_differentiation_is_exact_for_polynomials_through_all_nodes() -> None:
@@ -242,4 +243,4 @@ def test_radau_differentiation_is_exact_for_polynomials_through_all_nodes() -> N
     assert RADAU_DIFF.shape == (n, n + 1)
     for degree in range(n + 1):
         slope = degree * RADAU_NODES ** max(degree - 1, 0) if degree else np.zeros(n)
-        assert RADAU_DIFF @ full**degree == pytest.approx(slope, abs=2e-11 * n)
+        assert RADAU_DIFF @ full**degree == close(slope, abs=2e-11 * n)

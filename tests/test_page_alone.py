@@ -9,8 +9,9 @@ import pytest
 
 from builder.c.wasm import compiler
 from builder.export import export_table
+from comparing import close
 from mumacro import Surrogate
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from service.static_page import PageError, main, write_page
 
 pytestmark = pytest.mark.slow
@@ -146,11 +147,11 @@ def test_its_laws_are_the_services(open_page, host, client, along, scale):
     page = open_page("", url=host.url, new=False)
     found = page.run(f"return (await import('./static/page/service.js')).post('v1/law', {asked});")
     for name in ("values", "mu_macro", "mu_static"):
-        assert found[name] == pytest.approx(expected[name], rel=1e-12), name
+        assert found[name] == close(expected[name], rel=1e-12), name
     assert found["regime"] == expected["regime"]
     assert len(found["border"]) == len(expected["border"]) == 1
     for name in ("value", "mu_macro"):
-        assert found["border"][0][name] == pytest.approx(expected["border"][0][name], rel=1e-9)
+        assert found["border"][0][name] == close(expected["border"][0][name], rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -171,4 +172,4 @@ def test_its_readout_is_the_services(open_page, host, client, changed):
         for part in path.split("."):
             mine, theirs = mine[part], theirs[part]
         assert (mine is None) == (theirs is None), path
-        assert mine is None or mine == pytest.approx(theirs, rel=1e-9), path
+        assert mine is None or mine == close(theirs, rel=1e-9), path

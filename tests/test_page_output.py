@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from comparing import close
 from mumacro.closed_forms import border_23, border_24, border_26, border_27
 from mumacro.law import APPROXIMATIONS
 from service.routes.page import ASSETS
@@ -33,7 +34,7 @@ def test_it_loads_and_shows_the_known_value(open_page, surrogate, live_server, c
     assert (page.text("#source"), page.text("#table")) == (expected.source, surrogate.id)
     for name, value in case.items():
         text = page.text(f"#bar-{name}").replace("−", "-").removesuffix(" %")
-        assert float(text) == pytest.approx(expected.gradient[name] * value / expected.mu_macro, abs=6e-4)
+        assert float(text) == close(expected.gradient[name] * value / expected.mu_macro, abs=6e-4)
     loaded = page.run("return performance.getEntriesByType('resource').map((entry) => entry.name);")
     assert len(loaded) >= len(ASSETS)
     assert {urlsplit(address).netloc for address in loaded} == {urlsplit(live_server.url).netloc}
@@ -45,7 +46,7 @@ def test_solving_for_an_input(open_page, surrogate, case):
     page.find("#solve-form button").click()  # which amplitude halves the friction?
     found = page.wait_for("#roots", r"y₀ = (\S+) µm: µ = 0.15, stick–slip, shaker (\S+) mW")
     root = surrogate.evaluate(**{**case, "y0": float(found[1]) * 1e-6})
-    assert root.mu_ratio == pytest.approx(0.5, abs=1e-5)
+    assert root.mu_ratio == close(0.5, abs=1e-5)
     page.find("#roots button").click()
     page.settle()
     assert float(page.text("#ratio")) == 0.5
@@ -76,12 +77,12 @@ def test_the_map_is_read_and_moved_on(open_page, surrogate, case):
     read = page.wait_for("#map-read", r"ṽ = (\S+), ỹ = (\S+): µ/µ₀ = (\S+), (\S+)")
     v, y, ratio = (float(read[i]) for i in (1, 2, 3))
     # three digits of the position are shown
-    assert ratio == pytest.approx(surrogate.mu_ratio(v, y), abs=0.02 * surrogate.mu_ratio(v, y))
+    assert ratio == close(surrogate.mu_ratio(v, y), abs=0.02 * surrogate.mu_ratio(v, y))
     page.touched("#map", 0.6, 0.4, click=True)
     page.settle()
-    assert float(page.text("#ratio")) == pytest.approx(ratio, rel=0.01)
-    assert float(page.text("#v-tilde")) == pytest.approx(v, rel=0.01)
-    assert float(page.text("#y-tilde")) == pytest.approx(y, rel=0.01)
+    assert float(page.text("#ratio")) == close(ratio, rel=0.01)
+    assert float(page.text("#v-tilde")) == close(v, rel=0.01)
+    assert float(page.text("#y-tilde")) == close(y, rel=0.01)
     assert page.complaints() == []
     page = open_page()
     page.find("#map").send_keys(Keys.ARROW_RIGHT, Keys.ARROW_UP)
@@ -136,8 +137,8 @@ def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page, address, s
 def test_the_map_has_a_colour_bar(open_page):
     pixels = open_page().pixels("map")
     bar = pixels[12:-50, -45, :3].astype(int)  # from 1 at the top to 0
-    assert bar[0] == pytest.approx([253, 231, 37], abs=12)
-    assert bar[-1] == pytest.approx([68, 1, 84], abs=12)
+    assert bar[0] == close([253, 231, 37], abs=12)
+    assert bar[-1] == close([68, 1, 84], abs=12)
     assert len({tuple(colour) for colour in bar.tolist()}) > 100
     law = open_page().pixels("law").reshape(-1, 4)
     assert len(np.unique(law[::50], axis=0)) > 5
@@ -148,7 +149,7 @@ def test_the_law_is_in_the_units_of_its_field(open_page, surrogate, case):
     page.touched("#law", 0.5, 0.5)
     read = page.wait_for("#law-read", r"v₀ = (\S+) mm/s: µ = (\S+),")
     expected = surrogate.evaluate(**{**case, "v0": float(read[1]) * 1e-3}).mu_macro
-    assert float(read[2]) == pytest.approx(expected, rel=1e-3)
+    assert float(read[2]) == close(expected, rel=1e-3)
     rows = page.run(
         "return [...document.querySelectorAll('#law-table tbody tr')]"
         ".map((row) => [...row.cells].map((cell) => cell.textContent));"
@@ -156,7 +157,7 @@ def test_the_law_is_in_the_units_of_its_field(open_page, surrogate, case):
     assert len(rows) == 13
     for value, mu, _ in rows:
         expected = surrogate.evaluate(**{**case, "v0": 1e-3 * float(value)}).mu_macro
-        assert float(mu) == pytest.approx(expected, rel=1e-3)
+        assert float(mu) == close(expected, rel=1e-3)
     assert page.text("#law-input") == "v₀ [mm/s]"
     page.choose("#unit-v0", "m/s")
     assert page.text("#law-input") == "v₀ [m/s]"
@@ -167,7 +168,7 @@ def test_the_law_is_in_the_units_of_its_field(open_page, surrogate, case):
     at = float(page.wait_for("#law-read", r"f = (\S+) kHz")[1])
     page.touched("#law", 0.5, 0.5, click=True)
     page.settle()
-    assert float(page.value("#field-omega")) == pytest.approx(at, rel=0.05)
+    assert float(page.value("#field-omega")) == close(at, rel=0.05)
     assert page.complaints() == []
 
 
@@ -247,18 +248,18 @@ def test_the_border_by_the_papers_equations(open_page):
     found = borders_told(page)
     assert found.keys() == small.keys()  # (26) is meant for y~ >= 1
     for numbers, formula in small.items():
-        assert found[numbers] == pytest.approx([speed * float(formula(2 / 3))], rel=1e-3)
+        assert found[numbers] == close([speed * float(formula(2 / 3))], rel=1e-3)
     assert legend_of(page, "map-legend") == [f"border by {one}" for one in ("(23)", "(24), (39)", "(26)", "(27)")]
     page = open_page("#approximations=1&y0=6e-6&scale=linear")  # y~ = 2, outside the range of (23) and (24)
     found = borders_told(page)
     assert found.keys() == {"(26)", "(27)"}
     for numbers, formula in (("(26)", border_26), ("(27)", border_27)):
-        assert found[numbers] == pytest.approx([speed * float(formula(2.0))], rel=1e-3)
+        assert found[numbers] == close([speed * float(formula(2.0))], rel=1e-3)
     # along the amplitude: at the border v0 = 10 mm/s; l0 = 3 um
     page = open_page("#approximations=1&along=y0")
     for numbers, formula in small.items():
         (amplitude,) = borders_told(page)[numbers]
-        assert speed * float(formula(amplitude / 3)) == pytest.approx(10.0, rel=2e-3)
+        assert speed * float(formula(amplitude / 3)) == close(10.0, rel=2e-3)
     page.click("#approximations")
     assert legend_of(page) == legend_of(page, "map-legend") == []
     assert page.complaints() == []
@@ -273,7 +274,7 @@ def test_the_papers_borders_are_drawn(open_page, name):
         colour = (0xB8, 0x4D, 0xFF)  # of (26), which is given for y~ >= 1: the upper three fifths of the frame
         rows, _ = np.nonzero(np.all(page.pixels(name)[..., :3] == colour, axis=-1))
         frame = page.pixels(name).shape[0] - 56
-        assert rows.max() == pytest.approx(10 + 0.6 * frame, abs=6)
+        assert rows.max() == close(10 + 0.6 * frame, abs=6)
 
 
 def test_curves_approximations_and_downloads(open_page, surrogate, tmp_path, case):
@@ -300,7 +301,7 @@ def test_curves_approximations_and_downloads(open_page, surrogate, tmp_path, cas
     v0 = 1e-3 * np.array([float(row[0]) for row in rows])
     for column, y0 in ((1, 2e-6), (-2, 0.5e-6), (-1, 2.5e-6)):
         mu = np.array([float(row[column]) for row in rows])
-        assert mu == pytest.approx(surrogate.evaluate(**{**case, "y0": y0, "v0": v0}).mu_macro, rel=1e-12)
+        assert mu == close(surrogate.evaluate(**{**case, "y0": y0, "v0": v0}).mu_macro, rel=1e-12)
     for button, name in (("#law-image", "friction-law-v0.png"), ("#map-image", "friction-map.png")):
         picture = page.download(button, tmp_path, name).read_bytes()
         assert picture.startswith(b"\x89PNG")

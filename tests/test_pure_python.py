@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from builder.steady import border, solve
+from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import QUANTITIES
 
@@ -58,10 +59,10 @@ def test_plain_python_equals_the_compiled_code(repository: Path) -> None:
 
     compiled = [solve(*point) for point in POINTS]
     for one, two in zip(plain["solved"], compiled, strict=True):
-        assert one[:2] == pytest.approx([two.mu_ratio, two.stick_fraction], rel=2e-15, abs=2e-15)
-        assert one[2] == pytest.approx(two.power, rel=1e-13)
+        assert one[:2] == close([two.mu_ratio, two.stick_fraction], rel=2e-15, abs=2e-15)
+        assert one[2] == close(two.power, rel=1e-13)
         assert one[3] == two.status == 0
-    assert plain["border"] == pytest.approx(border(0.5), rel=1e-15)
+    assert plain["border"] == close(border(0.5), rel=1e-15)
 
     s = Surrogate.open(table)
     v, y = [point[0] for point in POINTS], [point[1] for point in POINTS]
@@ -73,13 +74,13 @@ def test_plain_python_equals_the_compiled_code(repository: Path) -> None:
         "stick": s.stick_fraction(v, y),
         "crit": s.v_tilde_crit(y),
     }.items():
-        assert plain[name] == pytest.approx(expected.tolist(), rel=1e-13, abs=1e-15), name
+        assert plain[name] == close(expected.tolist(), rel=1e-13, abs=1e-15), name
     for one, two in zip(
         plain["slopes"], (x for of in QUANTITIES for x in s.slopes(v, y, of, bounds=True)), strict=True
     ):
-        assert one == pytest.approx(two.tolist(), rel=1e-7, abs=1e-12)
+        assert one == close(two.tolist(), rel=1e-7, abs=1e-12)
     answer = s.evaluate(**CASE, gradient=True)
-    assert plain["macro"] == pytest.approx(answer.mu_macro, rel=1e-14)
-    assert plain["gradient"] == pytest.approx(answer.gradient, rel=1e-9)
-    assert plain["gradient_bound"] == pytest.approx(answer.gradient_bound, rel=1e-6)
+    assert plain["macro"] == close(answer.mu_macro, rel=1e-14)
+    assert plain["gradient"] == close(answer.gradient, rel=1e-9)
+    assert plain["gradient_bound"] == close(answer.gradient_bound, rel=1e-6)
     assert plain["certain"] is answer.regime_certain is True

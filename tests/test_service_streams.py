@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 from starlette.testclient import TestClient
 
-from mumacro.dimensional import FIELDS
+from mumacro.inputs import FIELDS
 from service.app import create_app
 from service.formats import FORMATS
 from service.settings import Settings

@@ -13,6 +13,7 @@ from builder import model, sections, steady
 from builder.model import ANGLE, CHART, MIN_SPEED, NO_SLIP, OK, PATH, SIGMA, SUM_UX, WORK, slip
 from builder.steady import ADVICE, BAD_INPUT, solve, solve_raw, workspace
 from builder.sweep import Sweep
+from comparing import close
 from mumacro.closed_forms import outer, second_order
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ def test_corner_points_keep_relative_digits_at_every_distance(reference: Any) ->
     radius = [corner_radius(v, y) for v, y in zip(reference.v[at], reference.y[at], strict=True)]
     assert min(radius) < 2e-4 < 0.5 < max(radius)
     for v, y, mu in zip(reference.v[at], reference.y[at], reference.mu_ratio[at], strict=True):
-        assert solve(v, y).mu_ratio == pytest.approx(mu, rel=2e-15, abs=0.0)
+        assert solve(v, y).mu_ratio == close(mu, rel=2e-15)
 
 
 @pytest.mark.parametrize(("v", "y"), ORDINARY)
@@ -88,7 +89,7 @@ def test_naive_solver_agrees_to_its_own_error_which_halves_with_its_step(v: floa
     mu = solve(v, y).mu_ratio
     coarse, fine = (naive.mu_ratio(v, y, steps) - mu for steps in (8_000, 16_000))
     assert abs(fine) < 1e-4
-    assert coarse / fine == pytest.approx(2.0, abs=0.03)
+    assert coarse / fine == close(2.0, abs=0.03)
     assert abs(2.0 * fine - coarse) < 2e-6  # error after extrapolation of the first-order term
 
 
@@ -112,7 +113,7 @@ def test_continuous_orbit_closes_over_a_whole_period(v: float, y: float) -> None
     half_turn = chart * 0.5 * math.pi + start
     # the other half, with the shaker moving the other way, is the mirror image: start it from the mirrored angle
     assert slip(v, y, -0.5 * math.pi, 0, -start, -chart, 0.5 * math.pi, False, w, out) == OK
-    assert out[CHART] * 0.5 * math.pi + out[ANGLE] == pytest.approx(half_turn, abs=4e-15)
+    assert out[CHART] * 0.5 * math.pi + out[ANGLE] == close(half_turn, abs=4e-15)
     assert out[MIN_SPEED] > 0.0
 
 
@@ -121,8 +122,8 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     w, out, orbit, res = workspace()
     assert solve_raw(v, y, y - 1.0, w, out, orbit, res) == OK
     duration, ux0, _, uy0, start, end = orbit
-    assert duration == pytest.approx(math.pi - start + end, abs=1e-15)
-    assert math.hypot(ux0, uy0) == pytest.approx(1.0, abs=4e-16)
+    assert duration == close(math.pi - start + end, abs=1e-15)
+    assert math.hypot(ux0, uy0) == close(1.0, abs=4e-16)
 
     def ux(s: float) -> float:
         return ux0 + v * (s - start)
@@ -134,24 +135,24 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
         return v * ux(s) - y * math.sin(s) * uy(s)
 
     # slip stops where lam = 0; stick ends where |u| = 1 again, and never passes it in between
-    assert slip_speed(start) == pytest.approx(0.0, abs=1e-15 * (1.0 + y))
+    assert slip_speed(start) == close(0.0, abs=1e-15 * (1.0 + y))
     stop = start + duration
-    assert math.hypot(ux(stop), uy(stop)) == pytest.approx(1.0, abs=4e-15)
+    assert math.hypot(ux(stop), uy(stop)) == close(1.0, abs=4e-15)
     inside = np.linspace(start, stop, 20_001)[1:-1]
     assert max(math.hypot(ux(s), uy(s)) for s in inside) <= 1.0 + 4e-15
 
     stick_mean = integral(ux, start, stop)
     drive = v * stick_mean
     shaker = integral(lambda s: -y * math.sin(s) * uy(s), start, stop)
-    assert drive + shaker == pytest.approx(0.0, abs=1e-13 * (1.0 + y))  # the spring stores no net energy
+    assert drive + shaker == close(0.0, abs=1e-13 * (1.0 + y))  # the spring stores no net energy
 
-    assert (stick_mean + out[SUM_UX]) / math.pi == pytest.approx(res[steady.MU_RATIO], abs=1e-15)
-    assert (shaker + out[WORK]) / math.pi == pytest.approx(res[steady.POWER], abs=1e-13 * (1.0 + y))
-    assert out[PATH] / math.pi == pytest.approx(res[steady.SLIP_SPEED], rel=1e-15)
-    # the work of drive and shaker equals the dissipation
-    assert (drive + shaker + v * out[SUM_UX] + out[WORK]) / math.pi == pytest.approx(res[steady.SLIP_SPEED], rel=1e-12)
+    assert (stick_mean + out[SUM_UX]) / math.pi == close(res[steady.MU_RATIO], abs=1e-15)
+    assert (shaker + out[WORK]) / math.pi == close(res[steady.POWER], abs=1e-13 * (1.0 + y))
+    assert out[PATH] / math.pi == close(res[steady.SLIP_SPEED], rel=1e-15)
+    # the work of drive and shaker during slip equals the dissipation: during stick they do none together, see above
+    assert (v * out[SUM_UX] + out[WORK]) / math.pi == close(res[steady.SLIP_SPEED], rel=2e-15)
     # and slip ends, mirrored, exactly where stick started
-    assert out[SIGMA] == pytest.approx(start, abs=1e-14)
+    assert out[SIGMA] == close(start, abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +173,7 @@ def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float]
         mu, deficit, regime, stick, power, path, _ = res
         assert 0.0 <= mu <= 1.0
         assert 0.0 <= deficit <= 1.0
-        assert mu + deficit == pytest.approx(1.0, abs=1e-15)
+        assert mu + deficit == close(1.0, abs=1e-15)
         assert 0.0 <= stick <= 1.0
         assert (stick > 0.0) == (regime == steady.STICK_SLIP)
         assert power >= 0.0
@@ -186,10 +187,10 @@ def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float]
 )
 def test_amplitudes_below_the_scaled_one_report_unscaled_speeds(v: float, y: float) -> None:
     found = solve(v, y)
-    assert found.slip_speed == pytest.approx(v, rel=1e-9)
+    assert found.slip_speed == close(v, rel=1e-9)
     if found.regime == "continuous":
         assert 0.0 < found.min_slip_speed <= v
-        assert found.deficit == pytest.approx(0.25 * y * y / (1.0 + v * v), rel=1e-9)
+        assert found.deficit == close(0.25 * y * y / (1.0 + v * v), rel=1e-9)
 
 
 def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
@@ -197,9 +198,9 @@ def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
     for exponent in range(-200, -4, 4):
         v = 2.77 * 10.0**exponent
         found = solve(v, 0.8917)
-        assert found.mu_ratio == pytest.approx(math.sqrt((1.0 - 0.8917) * (1.0 + 0.8917)), abs=8.0 * v**1.0 + 1e-15)
-        assert found.slip_speed / v == pytest.approx(2.20933, rel=1e-3 if exponent > -12 else 1e-5)
-        assert v * found.mu_ratio + found.power == pytest.approx(found.slip_speed, rel=1e-14)
+        assert found.mu_ratio == close(math.sqrt((1.0 - 0.8917) * (1.0 + 0.8917)), abs=8.0 * v**1.0 + 1e-15)
+        assert found.slip_speed / v == close(2.20933, rel=1e-3 if exponent > -12 else 1e-5)
+        assert v * found.mu_ratio + found.power == close(found.slip_speed, rel=1e-14)
 
 
 # --- monotony -----------------------------------------------------------------------------------------
@@ -240,12 +241,12 @@ def test_static_limit_below_one_and_its_linear_term(y: float) -> None:
     static = math.sqrt(1.0 - y * y)  # eq. (16)
     slope = math.pi / (2.0 * (1.0 - y * y))
     errors = [solve(v, y).mu_ratio - static - slope * v for v in (1e-5, 1e-6, 1e-7)]
-    assert order(errors, 10.0) == pytest.approx(1.5, abs=0.05)
+    assert order(errors, 10.0) == close(1.5, abs=0.05)
 
 
 @pytest.mark.parametrize(("y", "constant"), [(1.1, 15.74522672), (2.0, 1.74344269), (10.0, 0.30660836)])
 def test_slope_at_zero_speed_above_one(y: float, constant: float) -> None:
-    assert solve(1e-12, y).mu_ratio / 1e-12 == pytest.approx(constant, abs=6e-9)
+    assert solve(1e-12, y).mu_ratio / 1e-12 == close(constant, abs=6e-9)
     errors = [solve(v, y).mu_ratio / v - solve(1e-14, y).mu_ratio / 1e-14 for v in (1e-3, 1e-4, 1e-5)]
     assert abs(errors[0]) > abs(errors[1]) > abs(errors[2])
 
@@ -254,23 +255,23 @@ def test_small_amplitude_limit() -> None:
     # eq. (31): 1 - mu~ = y~^2 / (4 (1 + v~^2)), relative error O(y~^2)
     for v in (0.5, 3.0, 100.0):
         errors = [solve(v, y).deficit / (y * y / (4.0 * (1.0 + v * v))) - 1.0 for y in (0.08, 0.04, 0.02)]
-        assert order(errors, 2.0) == pytest.approx(2.0, abs=0.05)
+        assert order(errors, 2.0) == close(2.0, abs=0.05)
 
 
 @pytest.mark.parametrize("r", [0.3, 1.0, 7.0])
 def test_fast_limit_and_the_order_of_its_error(r: float) -> None:
 
     bare = [solve(v, r * v).mu_ratio - float(outer(r)) for v in (50.0, 100.0, 200.0)]
-    assert order(bare, 2.0) == pytest.approx(2.0, abs=0.02)
+    assert order(bare, 2.0) == close(2.0, abs=0.02)
     speeds = [scale * max(1.0, 3.0 * r) for scale in (15.0, 30.0, 60.0)]
     corrected = [solve(v, r * v).mu_ratio - float(outer(r)) - float(second_order(r)) / v**2 for v in speeds]
-    assert order(corrected, 2.0) == pytest.approx(4.0, abs=0.1)
+    assert order(corrected, 2.0) == close(4.0, abs=0.1)
 
 
 def test_corner_follows_the_cube_root() -> None:
     # mu~ = (pi v~)^(1/3) (1 + O(v~^(2/3))) at y~ = 1
     errors = [solve(v, 1.0).mu_ratio / math.cbrt(math.pi * v) - 1.0 for v in (1e-4, 1e-6, 1e-8)]
-    assert order(errors, 100.0) == pytest.approx(2.0 / 3.0, abs=0.02)
+    assert order(errors, 100.0) == close(2.0 / 3.0, abs=0.02)
 
 
 @pytest.mark.parametrize("psi", [0.1, 0.7, 1.3])
@@ -281,7 +282,7 @@ def test_corner_follows_the_normal_form_in_every_direction(psi: float) -> None:
         phi, s0 = radius * math.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * math.cos(psi)
         v, eta = phi * s0 * s0 / (2.0 * math.pi), 0.25 * (s0 * s0 - 2.0 * phi * phi)
         errors.append(solve(v, 1.0 + eta, eta).mu_ratio / phi - 1.0)
-    assert order(errors, 2.0) == pytest.approx(2.0, abs=0.05)
+    assert order(errors, 2.0) == close(2.0, abs=0.05)
 
 
 def test_amplitude_excess_is_used_beyond_the_digits_of_the_amplitude() -> None:
@@ -290,7 +291,7 @@ def test_amplitude_excess_is_used_beyond_the_digits_of_the_amplitude() -> None:
     phi = math.cbrt(math.pi * v)
     for _ in range(60):
         phi -= (phi**3 + 2.0 * eta * phi - math.pi * v) / (3.0 * phi * phi + 2.0 * eta)
-    assert solve(v, 1.0, eta).mu_ratio == pytest.approx(phi, rel=1e-6)
+    assert solve(v, 1.0, eta).mu_ratio == close(phi, rel=1e-6)
     assert solve(v, 1.0).mu_ratio > 1.3 * phi
 
 
@@ -307,7 +308,7 @@ def test_slip_shorter_than_any_scan_step_is_found(v: float, y: float) -> None:
     assert 0.0 < slip_share < 1.0 / 24.0  # the scan for the end of stick has 24 steps
     # next to the turn of the shaker slip lasts sqrt(2 pi v~ / (y~^2 phi)), phi from the normal form
     phi = math.sqrt(1.0 - y * y) if y < 1.0 else math.cbrt(math.pi * v)
-    assert slip_share * math.pi == pytest.approx(math.sqrt(2.0 * math.pi * v / (y * y * phi)), rel=0.05)
+    assert slip_share * math.pi == close(math.sqrt(2.0 * math.pi * v / (y * y * phi)), rel=0.05)
 
 
 @pytest.mark.parametrize("y", [0.01, 0.3, 0.74, 1.0, 1.5, 4.69, 30.0, 1e3, 1e6, 4.4e7])
@@ -321,11 +322,11 @@ def test_dip_of_the_slip_speed_between_two_samples_is_seen(y: float, distance: f
     assert below.regime == "stick_slip"
     assert 0.0 < below.stick_fraction < 10.0 * math.sqrt(distance)
     assert below.min_slip_speed < 0.0  # of the continuous orbit, which is therefore not admissible
-    assert below.mu_ratio == pytest.approx(mu_crit, abs=distance)
+    assert below.mu_ratio == close(mu_crit, abs=distance)
     if distance <= 1e-8:
         # stick changes mu~ by O(distance^2) only: the continuous orbit has all digits
         smooth = sweep.solve("continuous", np.array([crit * (1.0 - distance)]), np.array([y]))["mu_ratio"][0]
-        assert below.mu_ratio == pytest.approx(smooth, rel=2e-15, abs=0.0)
+        assert below.mu_ratio == close(smooth, rel=2e-15)
 
 
 @pytest.mark.slow
@@ -355,7 +356,7 @@ def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> Non
     # mu~ was once -0.39 here, as "success", or the section failed: its root equals its edge to rounding
     found = solve(v, y)
     assert found.ok
-    assert found.mu_ratio == pytest.approx(steady.border(y)[1], rel=1e-14)
+    assert found.mu_ratio == close(steady.border(y)[1], rel=1e-14)
 
 
 def test_within_a_few_last_digits_of_the_border(sweep: Sweep) -> None:
@@ -375,7 +376,7 @@ def test_mu_minus_its_smooth_continuation_starts_quadratically_below_the_border(
     for distance in (2e-4, 1e-4):
         v = crit * (1.0 - distance)
         gaps.append(sweep.solve("full", v, y)["mu_ratio"] - sweep.solve("continuous", v, y)["mu_ratio"])
-    assert np.log2(np.abs(gaps[0] / gaps[1])) == pytest.approx(2.0, abs=0.02)
+    assert np.log2(np.abs(gaps[0] / gaps[1])) == close(2.0, abs=0.02)
 
 
 # --- inputs and failures ------------------------------------------------------------------------------

@@ -1,12 +1,14 @@
-"""Gradient and power compared with the full model: solves at random inputs, a time integration."""
+"""Gradient and power compared with the full model, with closed forms, with a time integration."""
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
 from builder.steady import solve
+from comparing import close
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 # stick-slip below and above y~ = 1, beside the border, continuous sliding, far above the border
@@ -38,8 +40,8 @@ def test_first_order_uncertainty_agrees_with_the_full_model(surrogate, sweep, pl
     length = mu0 * load / k
     sampled = mu0 * sweep.solve("full", v0 / (length * omega), y0 / length)["mu_ratio"]
     # second-order terms are of the size of the inputs' relative deviations
-    assert first_order == pytest.approx(sampled.std(), rel=0.01)
-    assert sampled.mean() == pytest.approx(answer.mu_macro, abs=0.02 * first_order)
+    assert first_order == close(sampled.std(), rel=0.01)
+    assert sampled.mean() == close(answer.mu_macro, abs=0.02 * first_order)
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -51,7 +53,36 @@ def test_the_gradient_is_that_of_the_full_model(surrogate, place):
         step[i] = 1e-4 * value * np.array([-2.0, -1.0, 1.0, 2.0])
         f = full_model(np.array(list(case.values()))[:, None] + step)
         slope = (8.0 * (f[2] - f[1]) - (f[3] - f[0])) / (12.0 * 1e-4)  # d mu_macro / d ln input, fourth order
-        assert gradient[name] * value == pytest.approx(slope, rel=1e-7, abs=3e-10), name
+        assert gradient[name] * value == close(slope, rel=1e-7, abs=3e-10), name
+
+
+def closed_form(mu0, Fz, k, y0, omega, v0):
+    """mu_macro in 40 digits: eq. (35) for rigid contact, creep to first order in v0 for an elastic one below y~ = 1."""
+    if k == math.inf:
+        return mu0 * 2 / mpmath.pi * mpmath.ellipk(-((y0 * omega / v0) ** 2))
+    v, y = v0 * k / (mu0 * Fz * omega), y0 * k / (mu0 * Fz)
+    return mu0 * (mpmath.sqrt(1 - y * y) + mpmath.pi * v / (2 * (1 - y * y)))
+
+
+RIGID = [{"k": math.inf, "v0": CASE["y0"] * CASE["omega"] / ratio} for ratio in (1e-4, 0.1, 1.0, 30.0, 1e6)]
+AT_REST = [{"v0": 0.0, "y0": 3e-6 * share} for share in (1e-4, 0.3, 0.99)]
+
+
+@pytest.mark.parametrize("place", RIGID + AT_REST)
+def test_the_gradient_is_that_of_the_closed_form(surrogate, place):
+    case = {**CASE, **place}
+    one, many = (surrogate.evaluate({**case, "mu0": mu0}, gradient=True) for mu0 in (0.3, np.full(3, 0.3)))
+    for i, (name, value) in enumerate(case.items()):
+        with mpmath.workdps(40):
+            inputs = tuple(mpmath.mpf(x) for x in case.values())
+            slope = (
+                0.0 if value == math.inf else float(mpmath.diff(closed_form, inputs, tuple(np.eye(6, dtype=int)[i])))
+            )
+        # relative to the input, rounding may move it by a digit of mu_macro
+        assert one.gradient[name] == close(slope, rel=1e-12, abs=3e-17 / value if value else 0.0), name
+        assert abs(one.gradient[name] - slope) <= one.gradient_bound[name], name
+        np.testing.assert_array_equal(many.gradient[name], one.gradient[name])
+        np.testing.assert_array_equal(many.gradient_bound[name], one.gradient_bound[name])
 
 
 @pytest.mark.slow
@@ -70,5 +101,5 @@ def test_the_power_is_that_of_a_plain_time_integration(surrogate, naive, place):
         means.append((np.mean(y * np.cos(tau) * middle[:, 1]), np.mean(middle[:, 0])))
     (p1, m1), (p2, m2) = means
     p, mu = 2.0 * p2 - p1, 2.0 * m2 - m1  # the error is proportional to the step
-    assert mu == pytest.approx(answer.mu_ratio, rel=2e-5)
-    assert p == pytest.approx(surrogate.power(v, y), rel=1e-4)
+    assert mu == close(answer.mu_ratio, rel=2e-5)
+    assert p == close(surrogate.power(v, y), rel=1e-4)

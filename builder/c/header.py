@@ -10,6 +10,7 @@ import numpy as np
 
 from mumacro import charts, dimensional, evaluate
 from mumacro.border import border_at
+from mumacro.inputs import BOUNDS, FIELDS
 from mumacro.surrogate import Surrogate
 from mumacro.table import Table
 from mumacro.version import __version__
@@ -21,7 +22,7 @@ from .types import FLOAT, INT, Array, literal
 __all__ = ["header_text", "texts", "write_header"]
 
 _HERE = Path(__file__).parent
-_SIX = [FLOAT] * len(dimensional.FIELDS)
+_SIX = [FLOAT] * len(FIELDS)
 _BANNER = """\
 /* mumacro.h: macroscopic friction of a contact that is oscillated transversely to its sliding direction.
  *
@@ -72,7 +73,7 @@ def header_text(table: Table) -> str:
         "MUMACRO_VERSION": f'"{__version__}"', "MUMACRO_TOLERANCE": literal(surrogate.tolerance),
         "MUMACRO_CHECKSUM": f'"{surrogate.checksum}"', "MUMACRO_SOURCES": str(len(charts.SOURCES)),
     }  # fmt: skip
-    errors = ["", *(f"{name} must be {dimensional.BOUNDS[name]}" for name in dimensional.FIELDS)]
+    errors = ["", *(f"{name} must be {BOUNDS[name]}" for name in FIELDS)]
     parts = [
         _BANNER % about,
         _macros(scalars),
@@ -133,7 +134,7 @@ def _translate(into: Translator, arrays: dict[str, Any]) -> None:
     into.call(questions.ratio, [FLOAT, FLOAT, *table("mu")])
     into.call(questions.case, [*_SIX, *table("mu")])
     into.call(evaluate.answer_with_slopes, [INT, FLOAT, FLOAT, *table("mu")])
-    slopes = Array((2, len(dimensional.FIELDS)), constant=False)
+    slopes = Array((2, len(FIELDS)), constant=False)
     into.call(dimensional.gradient, [*_SIX, FLOAT, FLOAT, INT, FLOAT, FLOAT, *table("mu"), slopes])
     into.call(border_at, [FLOAT, *table("mu")[2:]])
     into.call(questions.cycle, [*_SIX, *table("power")[:2], *table("stick")])

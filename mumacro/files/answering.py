@@ -12,9 +12,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
-from mumacro.dimensional import BOUNDS, FIELDS, POSITIVE, RAD_PER_CYCLE
 from mumacro.files.columns import ANSWERS, Columns, FilesError, find_columns
-from mumacro.input_names import Scale
+from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, RAD_PER_CYCLE, Scale
 from mumacro.surrogate import Surrogate
 
 __all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "numbers"]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mumacro.errors import MumacroError
-from mumacro.input_names import SI, UNITS_OF, Scale, scale_of, split_unit, suggestion
+from mumacro.inputs import SI, UNITS_OF, Scale, scale_of, split_unit, suggestion
 
 __all__ = ["ANSWERS", "Columns", "FilesError", "find_columns"]
 

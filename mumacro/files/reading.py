@@ -32,7 +32,7 @@ from mumacro.files.blocks import (
     shorten,
 )
 from mumacro.files.columns import Columns, FilesError
-from mumacro.input_names import NAMES, split_unit
+from mumacro.inputs import NAMES, split_unit
 
 __all__ = ["FORMATS", "Source", "format_of", "open_source"]
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro.charts import QUANTITIES
-from mumacro.dimensional import FIELDS
+from mumacro.charts import QUANTITY_NAMES
+from mumacro.inputs import FIELDS
 
 if TYPE_CHECKING:
     from mumacro.answer import Answer
@@ -83,7 +83,7 @@ def quantities(surrogate: Surrogate) -> Mapping[str, Quantity]:
         gradient = cases(six, gradient=True).gradient or {}
         return np.stack([gradient[name] for name in FIELDS]).reshape(6, *np.shape(six[0]))
 
-    pointwise = {name: _of_groups(surrogate, name) for name in QUANTITIES}
+    pointwise = {name: _of_groups(surrogate, name) for name in QUANTITY_NAMES}
     return {"mu_macro": Quantity(FIELDS, mu_macro, mu_macro_slopes), **pointwise}
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mumacro.answer import Answer
-from mumacro.dimensional import FIELDS
 from mumacro.errors import InputError
+from mumacro.inputs import FIELDS
 
 if TYPE_CHECKING:
     from mumacro.surrogate import Surrogate

@@ -8,8 +8,8 @@ import numpy as np
 import openmdao.api as om
 from numpy.typing import NDArray
 
-from mumacro.dimensional import FIELDS, UNITS
 from mumacro.errors import InputError
+from mumacro.inputs import FIELDS, UNITS
 from mumacro.interop.derivatives import quantities
 from mumacro.surrogate import Surrogate
 

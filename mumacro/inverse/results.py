@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from mumacro.dimensional import BOUNDS, FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE, UNITS
 from mumacro.errors import InputError
+from mumacro.inputs import BOUNDS, FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE, UNITS
 
 __all__ = ["Crossing", "Reach", "Root", "Solution", "checked_case"]
 

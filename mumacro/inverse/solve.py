@@ -31,8 +31,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.answer import Answer
-from mumacro.dimensional import POSITIVE
 from mumacro.errors import InputError
+from mumacro.inputs import POSITIVE
 from mumacro.inverse.results import Reach, Root, Solution, checked_case
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep
 from mumacro.surrogate import Surrogate

@@ -1,38 +1,32 @@
-/* Placeholder: chooses the instruction level of this processor. */
-#ifdef _WIN32
-#define MUMACRO_EXPORT __declspec(dllexport)
+/* The one function of the shared object: the kernel of an instruction level, where this processor can run it. */
+#include <stddef.h>
+
+#include "library.h"
+
+#if defined _WIN32
+#define MU_EXPORT __declspec(dllexport)
 #else
-#define MUMACRO_EXPORT __attribute__((visibility("default")))
+#define MU_EXPORT __attribute__((visibility("default")))
 #endif
 
-typedef double (*mumacro_kernel)(double, double);
-
-double mumacro_hypotenuse_base(double a, double b);
-#ifdef MUMACRO_HAS_AVX512
-double mumacro_hypotenuse_avx2(double a, double b);
-double mumacro_hypotenuse_avx512(double a, double b);
+extern const mumacro_kernel mumacro_kernel_base;
+#if defined MUMACRO_HAS_AVX2
+extern const mumacro_kernel mumacro_kernel_avx2;
+#endif
+#if defined MUMACRO_HAS_AVX512
+extern const mumacro_kernel mumacro_kernel_avx512;
 #endif
 
-static const mumacro_kernel kernels[] = {
-    mumacro_hypotenuse_base,
-#ifdef MUMACRO_HAS_AVX512
-    mumacro_hypotenuse_avx2,
-    mumacro_hypotenuse_avx512,
-#endif
-};
-
-MUMACRO_EXPORT const mumacro_kernel *mumacro_kernel_at(int level);
-MUMACRO_EXPORT int mumacro_best_level(void);
-
-const mumacro_kernel *mumacro_kernel_at(int level) { return &kernels[level]; }
-
-int mumacro_best_level(void) {
-#ifdef MUMACRO_HAS_AVX512
+MU_EXPORT const mumacro_kernel *mumacro_kernel_at(int level) {
+    if (level == 0) return &mumacro_kernel_base;
+#if defined MUMACRO_HAS_AVX2
     __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        return 2;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return 1;
+    if (level == 1 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &mumacro_kernel_avx2;
 #endif
-    return 0;
+#if defined MUMACRO_HAS_AVX512
+    if (level == 2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
+        return &mumacro_kernel_avx512;
+#endif
+    return NULL;
 }

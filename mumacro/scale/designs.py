@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from mumacro.dimensional import real
 from mumacro.errors import InputError
+from mumacro.inputs import real
 from mumacro.scale.sequence import DIMENSIONS, MOST_POINTS, shifts, sobol_points
 
 __all__ = ["CHUNK", "grid", "sobol"]

@@ -9,7 +9,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro import Surrogate
-from mumacro.input_names import UNITS_OF
+from mumacro.inputs import UNITS_OF
 from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, borders
 
 from .. import __version__

@@ -23,8 +23,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from xml.etree import ElementTree as Xml
 
-from mumacro import charts, dimensional
+from mumacro import charts
 from mumacro.errors import MumacroError
+from mumacro.inputs import FIELDS, UNITS
 from mumacro.table import Table
 from mumacro.version import __version__
 
@@ -70,7 +71,7 @@ def write_fmu3(table: Table, out: BinaryIO) -> None:
 
 
 def _write(table: Table, out: BinaryIO, version: int) -> None:
-    starts = ", ".join(repr(STARTS[name]) for name in dimensional.FIELDS)
+    starts = ", ".join(repr(STARTS[name]) for name in FIELDS)
     sources = {
         "mumacro.h": header_text(table),
         "instance.h": f"#define MUMACRO_FMU_STARTS {{{starts}}}\n" + (_HERE / "instance.h").read_text("ascii"),
@@ -196,7 +197,7 @@ def _variable(parent: Any, version: int, name: str, reference: str, text: str) -
     }  # fmt: skip
     if not given:
         about["initial"] = "calculated"
-    unit = dimensional.UNITS.get(name, "-")
+    unit = UNITS.get(name, "-")
     value = {} if unit == "-" else {"unit": unit}
     if given:
         value |= {"start": repr(STARTS[name]), "min": "0"}

@@ -1,0 +1,329 @@
+"""The six inputs of a case: names, units, bounds, other names, and what may stand for them.  The one truth of a case.
+
+The library, the files, the command line, the service and the exports take their fields from here.  A frequency
+``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one of them.  The stiffness ``k``
+is always said: a number, or rigid contact by infinity, by the word ``rigid``, or by None as a single value.
+
+**A gap is never rigid**: an empty cell, null or NaN in a column ``k`` makes its case illegal, see :data:`GAP`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import sys
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro.errors import InputError
+
+__all__ = [
+    "BOUNDS",
+    "FIELDS",
+    "GAP",
+    "MOST_HZ",
+    "NAMES",
+    "POSITIVE",
+    "RAD_PER_CYCLE",
+    "RIGID",
+    "SI",
+    "UNITS",
+    "UNITS_OF",
+    "Scale",
+    "as_columns",
+    "check_inputs",
+    "is_rigid",
+    "length_scale",
+    "read_number",
+    "real",
+    "refusal",
+    "scale_of",
+    "split_unit",
+    "suggestion",
+]
+
+Array = NDArray[np.float64]
+
+#: names that may be given, and the SI unit in words, for errors such as "give metres"
+SI = {
+    "mu0": ("-", "a plain number"),
+    "Fz": ("N", "newtons"),
+    "k": ("N/m", "newtons per metre"),
+    "y0": ("m", "metres"),
+    "omega": ("rad/s", "radians per second"),
+    "f": ("Hz", "hertz"),
+    "v0": ("m/s", "metres per second"),
+}
+NAMES = tuple(SI)
+FIELDS = tuple(name for name in NAMES if name != "f")
+UNITS = {name: SI[name][0] for name in FIELDS}
+POSITIVE = ("mu0", "Fz", "k")
+BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in FIELDS}
+RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
+RIGID = "rigid"  # the word for a stiffness without bound
+GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
+MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
+
+
+# --- names and units as text ----------------------------------------------------------------------------
+
+
+class Scale(NamedTuple):
+    """A unit in SI: value * times / over.  Small powers of ten stand in ``over``: 2 um are 2 / 1e6, rounded once."""
+
+    times: float = 1.0
+    over: float = 1.0
+
+    def si(self, value: float) -> float:
+        """``value`` in the SI unit."""
+        return value * self.times / self.over
+
+
+_LENGTH = {
+    "m": Scale(), "cm": Scale(over=1e2), "mm": Scale(over=1e3), "um": Scale(over=1e6), "µm": Scale(over=1e6),
+    "μm": Scale(over=1e6), "nm": Scale(over=1e9), "pm": Scale(over=1e12), "in": Scale(254.0, 1e4),
+}  # fmt: skip
+_FORCE = {"N": Scale(), "mN": Scale(over=1e3), "uN": Scale(over=1e6), "kN": Scale(1e3), "MN": Scale(1e6),
+          "lbf": Scale(4.4482216152605)}  # fmt: skip
+_TIME = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+#: input -> unit -> scale; the only table of units
+UNITS_OF: dict[str, dict[str, Scale]] = {
+    "mu0": {"-": Scale(), "1": Scale(), "": Scale(), "%": Scale(over=1e2)},
+    "Fz": _FORCE,
+    "k": {
+        f"{force}/{length}": Scale(up.times * down.over, up.over * down.times)
+        for force, up in _FORCE.items()
+        for length, down in _LENGTH.items()
+    },
+    "y0": _LENGTH,
+    "omega": {
+        "rad/s": Scale(), "1/s": Scale(), "krad/s": Scale(1e3), "rpm": Scale(RAD_PER_CYCLE, 60.0),
+        "1/min": Scale(RAD_PER_CYCLE, 60.0), "deg/s": Scale(RAD_PER_CYCLE, 360.0),
+    },
+    "f": {"Hz": Scale(), "1/s": Scale(), "mHz": Scale(over=1e3), "kHz": Scale(1e3), "MHz": Scale(1e6)},
+    "v0": {
+        f"{length}/{time}": Scale(scale.times, scale.over * seconds)
+        for length, scale in {**_LENGTH, "km": Scale(1e3)}.items()
+        for time, seconds in _TIME.items()
+    },
+}  # fmt: skip
+
+# Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a file that has one of
+# them while the input itself is missing is refused.
+_OTHER_NAMES = {
+    "mu": "mu0", "mus": "mu0", "muk": "mu0", "mucoulomb": "mu0", "frictioncoefficient": "mu0",
+    "coefficientoffriction": "mu0", "cof": "mu0", "µ": "mu0", "µ0": "mu0", "μ": "mu0", "μ0": "mu0",
+    "fn": "Fz", "n": "Fz", "force": "Fz", "normalforce": "Fz", "load": "Fz", "normalload": "Fz",
+    "kx": "k", "kt": "k", "ktangential": "k", "stiffness": "k", "tangentialstiffness": "k", "contactstiffness": "k",
+    "y": "y0", "amplitude": "y0", "ampl": "y0", "amp": "y0", "a": "y0", "a0": "y0",
+    "w": "omega", "om": "omega", "ω": "omega", "angularfrequency": "omega", "angularvelocity": "omega",
+    "freq": "f", "frequency": "f", "hz": "f", "f0": "f",
+    "v": "v0", "vx": "v0", "speed": "v0", "velocity": "v0", "slidingspeed": "v0", "slidingvelocity": "v0",
+}  # fmt: skip
+_OTHER_NAMES |= {name.lower(): name for name in NAMES}
+
+_IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
+_PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
+
+
+def is_rigid(text: str) -> bool:
+    """Whether a text says that the contact is rigid.
+
+    >>> is_rigid(" Rigid "), is_rigid("")
+    (True, False)
+    """
+    return text.strip().lower() == RIGID
+
+
+def refusal(name: str, value: float) -> str:
+    """Why ``value`` is no legal value of an input; NaN stands for a gap, which is never a rigid contact.
+
+    >>> refusal("v0", -1.0), refusal("k", math.nan)
+    ('must be finite and >= 0', 'is missing; write rigid or a number')
+    """
+    if name == "k":
+        return GAP if math.isnan(value) else "must be finite and > 0, or rigid"
+    return f"must be {BOUNDS['omega']}, and so must be omega = 2 pi f" if name == "f" else f"must be {BOUNDS[name]}"
+
+
+def split_unit(column: str) -> tuple[str, str | None]:
+    """Name and unit of a heading such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None where there are no brackets.
+
+    >>> split_unit("k [N/mm]"), split_unit("v0")
+    (('k', 'N/mm'), ('v0', None))
+    """
+    found = _IN_BRACKETS.fullmatch(column)
+    if found is None:
+        return column.strip(), None
+    return found[1], found[2] if found[2] is not None else found[3]
+
+
+def scale_of(name: str, unit: str) -> Scale | None:
+    """What one ``unit`` of the input ``name`` is in SI; None for a unit that is not in the table.
+
+    >>> scale_of("k", "N/mm").si(3.0)
+    3000.0
+    """
+    return UNITS_OF[name].get(unit.replace(" ", "").replace("·", ""))
+
+
+def suggestion(name: str, *, loosely: bool = True) -> str | None:
+    """The input that ``name`` is taken for, in another case, by another name or (``loosely``) misspelt; None for none.
+
+    >>> suggestion("FZ"), suggestion("F"), suggestion("stiffness"), suggestion("omga"), suggestion("temperature")
+    ('Fz', 'Fz', 'k', 'omega', None)
+    """
+    if name.strip() == "F":  # a force; without case it would be the frequency f
+        return "Fz"
+    plain = re.sub(r"[\s_.\-~^*{}$\\]", "", name).lower()
+    if plain in _OTHER_NAMES:
+        return _OTHER_NAMES[plain]
+    if loosely and len(plain) > 1:
+        near = difflib.get_close_matches(plain, _OTHER_NAMES, n=1, cutoff=0.75)
+        return _OTHER_NAMES[near[0]] if near else None
+    return None
+
+
+def read_number(name: str, text: str) -> float:
+    """The value of an input from text, in SI; ``rigid`` is an infinite stiffness.
+
+    Raises
+    ------
+    ValueError
+        The text is not a plain number; the message states what to write.
+
+    Examples
+    --------
+    >>> read_number("y0", "2e-6")
+    2e-06
+    >>> read_number("y0", "2um")
+    Traceback (most recent call last):
+    ...
+    ValueError: y0=2um: give metres, 2e-6
+    """
+    words = SI[name][1]
+    text = text.strip()
+    if name == "k" and is_rigid(text):
+        return math.inf
+    if _PLAIN.fullmatch(text):
+        return float(text)
+    with_unit = _WITH_UNIT.fullmatch(text)
+    scale = scale_of(name, with_unit[2].strip(" []()")) if with_unit else None
+    if with_unit and scale:
+        value = re.sub(r"e([+-])0*", r"e\1", f"{scale.si(float(with_unit[1])):.15g}").replace("e+", "e")
+        raise ValueError(f"{name}={text}: give {words}, {value}")
+    if _PLAIN.fullmatch(text.replace(",", ".")):
+        raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
+    hint = ", or rigid" if name == "k" else ""
+    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6{hint}")
+
+
+# --- columns --------------------------------------------------------------------------------------------
+
+
+def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
+    """The six inputs as float64 arrays; their values are not checked.
+
+    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, None or
+    ``rigid``; an array may hold the word, too.
+
+    Raises
+    ------
+    InputError
+        An input is missing, given twice, or not a real number.
+    """
+    converted: dict[str, Array] = {}
+    if (given.get("omega") is None) == (given.get("f") is None):
+        both = given.get("omega") is not None
+        raise InputError(
+            "omega", given.get("omega"), "given or f [Hz] in its place, " + ("not both" if both else "one of them")
+        )
+    for name in FIELDS:
+        source = "f" if name == "omega" and given.get("omega") is None else name
+        if source not in given:
+            hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
+            raise InputError(name, None, f"given{hint}")
+        value = given[source]
+        if name == "k" and value is None:
+            value = math.inf
+        try:
+            array = real(source, value)
+        except InputError:
+            if name != "k":
+                raise
+            array = real(source, _rigid_as_infinity(value))
+        if source == "f":
+            with np.errstate(over="ignore"):  # infinite, which is refused as a value of f
+                array = array * RAD_PER_CYCLE
+        converted[name] = array
+    return converted
+
+
+def _rigid_as_infinity(value: Any) -> Any:
+    """A stiffness, or an array of them, with infinity for the word ``rigid``."""
+    if isinstance(value, str):
+        return math.inf if is_rigid(value) else value
+    if isinstance(value, dict) or not np.iterable(value):
+        return value
+    return [math.inf if isinstance(x, str) and is_rigid(x) else x for x in value]
+
+
+def real(name: str, value: Any) -> Array:
+    """``value`` as float64; complex numbers, times, text and None are refused, also where numpy would convert them.
+
+    What is masked is unknown: NaN.
+    """
+    try:
+        if isinstance(value, np.ma.MaskedArray):
+            value = np.ma.filled(value.astype(np.float64), math.nan) if value.dtype.kind in "fiub" else value.data
+        array = np.asarray(value)
+        if array.dtype.kind in "fiub":
+            return array.astype(np.float64, copy=False)
+        if array.dtype.kind == "O" and not any(isinstance(x, (str, bytes)) or x is None for x in array.ravel()):
+            return array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(name, value, "a real number or an array of them")
+
+
+def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
+    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega.
+
+    Raises
+    ------
+    InputError
+        Naming field, value, bound and, in an array, the index.
+    """
+    for name, values in columns.items():
+        bad = _bad(name, values)
+        if bad.any():
+            i = int(np.flatnonzero(bad.ravel())[0])
+            field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
+            raise InputError(field, float(told.ravel()[i]), BOUNDS[name], i if values.ndim else None)
+
+
+def _bad(name: str, values: Array) -> NDArray[np.bool_]:
+    legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
+    out: NDArray[np.bool_] = ~(legal if name == "k" else legal & np.isfinite(values))
+    return out
+
+
+def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:
+    """l0 = mu0 Fz / k [m], eq. (5), without overflow of mu0 Fz; 0 for rigid contact."""
+    mu0, Fz, k = np.broadcast_arrays(mu0, Fz, k)
+    with np.errstate(all="ignore"):
+        quotient = Fz / k
+        out = np.asarray(mu0 * quotient)
+        low, high = np.minimum(quotient, out), np.maximum(quotient, out)
+        odd = ~((low > 1e-290) & (high < 1e290))  # there a partial result may have lost digits
+        if odd.any():
+            (a, i), (b, j), (c, n) = (np.frexp(x[odd]) for x in (mu0, Fz, k))
+            out[odd] = np.ldexp(a * (b / c), i + j - n)
+    return out

@@ -1,0 +1,90 @@
+/* Elementary functions that give the same bits everywhere, alone and in arrays: no call of a mathematical library. */
+
+#define MU_PI 3.141592653589793
+#define MU_TWO_OVER_PI 0.6366197723675814
+#define MU_LN2 0.6931471805599453
+#define MU_SQRT2 1.4142135623730951
+
+MU_INLINE double mu_min(double a, double b) { return b < a ? b : a; }
+MU_INLINE double mu_max(double a, double b) { return b > a ? b : a; }
+
+/* ln x of normal x > 0; off by at most 4e-16 of the larger of 1 and |ln x|.
+ *
+ * The exponent times ln 2, plus the interpolant of ln m at 22 Chebyshev points of 1 <= m < 2, in powers of 2 m - 3. */
+MU_INLINE mu_lanes mu_log(mu_lanes x) {
+    static const double c[22] = {
+        8.147030617423693e-12,   -2.5599340398034772e-11, 3.581167726977918e-11,   -1.137399589058893e-10,
+        4.68876933664286e-10,    -1.4937846446461467e-09, 4.634629673422033e-09,   -1.489798820617583e-08,
+        4.825438145941571e-08,   -1.5682598837570532e-07, 5.131822958476521e-07,   -1.6935019474605292e-06,
+        5.645029741591138e-06,   -1.9051975262152995e-05, 6.53210529159902e-05,    -0.00022862368522794772,
+        0.000823045267493534,    -0.003086419753098382,   0.012345679012345583,    -0.055555555555555254,
+        0.3333333333333333,      0.4054651081081644,
+    };
+    const mu_mask bits = MU_BITS(x);
+    /* a whole number below 2^52 as a double: its bits behind those of 2^52 */
+    const mu_lanes exponent = MU_NUMBER((bits >> 52) | 0x4330000000000000) - 4503599627371519.0;
+    const mu_lanes t = 2.0 * MU_NUMBER((bits & 0x000fffffffffffff) | 0x3ff0000000000000) - 3.0;
+    mu_lanes sum = mu_fma(mu_all(c[0]), t, mu_all(c[1]));
+    for (int i = 2; i < 22; ++i) sum = mu_fma(sum, t, mu_all(c[i]));
+    return mu_fma(exponent, mu_all(MU_LN2), sum);
+}
+
+/* ln x of any finite x > 0. */
+static double mu_log1(double x) {
+    const int subnormal = x < 2.2250738585072014e-308;
+    const double log = mu_first(mu_log(mu_all(subnormal ? x * 18014398509481984.0 : x))); /* 2^54 */
+    return subnormal ? log - 54.0 * MU_LN2 : log;
+}
+
+/* sqrt(x^2 + y^2) of what may not be squared, to the last digit: the root's own error is taken out of it. */
+static double mu_hypot(double x, double y) {
+    const double larger = mu_max(fabs(x), fabs(y)), smaller = mu_min(fabs(x), fabs(y));
+    const double scale = larger > 1e150 ? 1e-160 : smaller < 1e-140 ? 1e140 : 1.0;
+    const double a = larger * scale, b = smaller * scale;
+    double h, d, excess;
+    if (larger == HUGE_VAL || smaller <= larger * 1e-17) return larger;
+    h = sqrt(a * a + b * b);
+    if (h <= 2.0 * b) { /* h^2 - a^2 - b^2, without squares that cancel */
+        d = h - b;
+        excess = a * (2.0 * d - a) + (d - 2.0 * (a - b)) * d;
+    } else {
+        d = h - a;
+        excess = 2.0 * d * (a - 2.0 * b) + ((4.0 * d - b) * b + d * d);
+    }
+    return (h - excess / (2.0 * h)) / scale;
+}
+
+/* The cube root of finite x > 0, to about 1e-5 for a start: a third of the exponent, then Halley's method once. */
+static double mu_cube_root_near(double x) {
+    const int subnormal = x < 2.2250738585072014e-308;
+    const double m = subnormal ? x * 18014398509481984.0 : x; /* 2^54 */
+    double root = mu_number(mu_bits(m) / 3 + 0x2a9f7893782da1ce), cube;
+    cube = root * root * root;
+    root *= (cube + 2.0 * m) / (2.0 * cube + m);
+    return subnormal ? root / 262144.0 : root; /* 2^18 */
+}
+
+/* x = m 2^e with 1/2 <= m < 1, of finite x > 0: returns m. */
+static double mu_split(double x, int64_t *exponent) {
+    const int subnormal = x < 2.2250738585072014e-308;
+    const int64_t bits = mu_bits(subnormal ? x * 18014398509481984.0 : x); /* 2^54 */
+    *exponent = (bits >> 52) - 1022 - (subnormal ? 54 : 0);
+    return mu_number((bits & 0x000fffffffffffff) | 0x3fe0000000000000);
+}
+
+/* x 2^e of 2^-60 < x < 2^60, rounded once. */
+static double mu_scale(double x, int64_t e) {
+    if (e > 2200) e = 2200;
+    if (e < -2200) e = -2200;
+    for (; e > 900; e -= 900) x *= mu_number((int64_t)1923 << 52);
+    for (; e < -900; e += 900) x *= mu_number((int64_t)123 << 52);
+    return x * mu_number((e + 1023) << 52);
+}
+
+/* a b / (c d e) of finite positive numbers whose partial products may overflow or underflow. */
+static double mu_quotient(double a, double b, double c, double d, double e) {
+    int64_t i, j, k, l, m;
+    const double above = mu_split(a, &i) * mu_split(b, &j);
+    const double below = mu_split(c, &k) * mu_split(d, &l) * mu_split(e, &m);
+    return mu_scale(above / below, i + j - k - l - m);
+}

@@ -1,0 +1,85 @@
+/* The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the chart of each.  This file is the only list of
+ * blocks, of pieces of the border and of quantities; all programs read it through mumacro_atlas_of.
+ *
+ * A chart maps (v~, y~) to two coordinates (a, b) in which what the block tabulates is a smooth function q(a, b); each
+ * quantity is value = base + factor q.
+ *
+ * Continuous sliding needs no fitted border: its orbit is analytic in (v~^2, y~^2), beyond the border too.  Stick-slip
+ * is between the static limit and the border, both of them square-root edges; with v~ = v~crit sin^2(pi s/2) it is
+ * analytic in s on [0, 1].  Around y~ = 1, v~ = 0 only polar coordinates of the normal form
+ * mu~^3 + 2 (y~ - 1) mu~ = pi v~ are analytic.  In the tails what is left beyond the outer solution
+ * outer = (2/pi) K(i y~/v~), eq. (35), is linear in 1/y~ to 1e-12. */
+
+#define MU_Y_STICK_LO 0.75
+#define MU_Y_CONT 1.5 /* continuous: rational coordinates below, logarithmic above */
+#define MU_Y_STICK_HI MU_Y_CONT
+#define MU_Y_MID 3.0
+#define MU_Y_HIGH 32.0
+#define MU_Y_TAIL 131072.0 /* 2^17 */
+#define MU_S_CUT 0.3
+#define MU_SIGMA_CUT 0.45399049973954675 /* sin(pi/2 MU_S_CUT): MU_S_CUT as sqrt(v~/v~crit) */
+#define MU_R_MAX 1.25     /* covers s <= MU_S_CUT for every y~ in [MU_Y_STICK_LO, MU_Y_STICK_HI] */
+#define MU_RHO_MAX 128.0  /* v~/v~crit from which two terms hold to 1e-14; ln(v~ / sqrt y~) is 3.95 to 4.11 there */
+#define MU_L_MAX 4.0      /* ln(v~ / sqrt y~) from which they do in the tail */
+#define MU_FAST_KAPPA 54.598150033144236  /* exp(MU_L_MAX) */
+#define MU_L_HIGH (-0.7550225842780328)   /* ln 0.47: below the border for y~ >= MU_Y_HIGH, ln 0.4754 */
+#define MU_LN_Y_CONT 0.4054651081081644
+#define MU_LN_Y_MID 1.0986122886681098
+#define MU_LN_Y_HIGH 3.4657359027997265
+#define MU_LN_Y_TAIL 11.783502069519070
+#define MU_LN_RHO_MAX 4.852030263919617
+
+enum { MU_CONTINUOUS, MU_STICK_SLIP, MU_STATIC, MU_REGIMES };
+/* Sources: first the blocks, those of a regime in the order of y~; then what is known in closed form. */
+enum {
+    MU_C_LOW, MU_C_MID_1, MU_C_MID_2, MU_C_HIGH, MU_C_TAIL, MU_S_LOW, MU_S_MID, MU_CORNER, MU_S_MID_1, MU_S_MID_2,
+    MU_S_HIGH, MU_S_TAIL, MU_CHARTS, MU_FAST = MU_CHARTS, MU_NO_OSCILLATION, MU_STATIC_LIMIT, MU_RIGID, MU_SOURCES,
+    MU_OTHER = MU_SOURCES /* not placed yet: zero, extreme or illegal inputs, and y~ > MU_Y_TAIL */
+};
+enum { MU_MU_RATIO, MU_POWER, MU_STICK, MU_QUANTITIES };
+enum { MU_BORDER_LOW, MU_BORDER_MID, MU_BORDER_HIGH, MU_PIECES };
+
+#define MU_HYPOTENUSE "mu_ratio sqrt(1 + y_tilde^2/v_tilde^2)"
+#define MU_SLOPE "mu_ratio y_tilde/v_tilde"
+#define MU_LAYER "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))"
+
+static const mumacro_chart MU_CHART[MU_CHARTS] = {
+    {"continuous_low", MU_CONTINUOUS, {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT}, {"v_squared_share", 0.0, 1.0},
+     "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2", MU_ROUNDING, 0.0},
+    {"continuous_mid_1", MU_CONTINUOUS, {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID}, {"ln_rho", 0.0, MU_LN_RHO_MAX},
+     MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
+    {"continuous_mid_2", MU_CONTINUOUS, {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH}, {"ln_rho", 0.0, MU_LN_RHO_MAX},
+     MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
+    {"continuous_high", MU_CONTINUOUS, {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL}, {"ln_rho", 0.0, MU_LN_RHO_MAX},
+     MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
+    {"continuous_tail", MU_CONTINUOUS, {"inverse_y", 0.0, 1.0 / MU_Y_TAIL}, {"ln_kappa", MU_L_HIGH, MU_L_MAX},
+     MU_LAYER, 0.0, 0.0},
+    {"stick_slip_low", MU_STICK_SLIP, {"y_squared", 0.0, MU_Y_STICK_LO *MU_Y_STICK_LO}, {"s", 0.0, 1.0},
+     "(1 - mu_ratio)/y_tilde^2", MU_ROUNDING, 0.0},
+    {"stick_slip_mid", MU_STICK_SLIP, {"y", MU_Y_STICK_LO, MU_Y_STICK_HI}, {"s", MU_S_CUT, 1.0},
+     "mu_ratio", MU_ROUNDING, 0.0},
+    {"corner", MU_STICK_SLIP, {"radius", 0.0, MU_R_MAX}, {"angle", 0.0, 1.0},
+     "mu_ratio/phi, phi^3 + 2 (y_tilde - 1) phi = pi v_tilde", 0.0, 0.0},
+    {"stick_slip_mid_1", MU_STICK_SLIP, {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID}, {"s", 0.0, 1.0},
+     MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING},
+    {"stick_slip_mid_2", MU_STICK_SLIP, {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH}, {"s", 0.0, 1.0},
+     MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING},
+    {"stick_slip_high", MU_STICK_SLIP, {"ln_y", MU_LN_Y_HIGH, MU_LN_Y_TAIL}, {"s", 0.0, 1.0},
+     MU_SLOPE, MU_DENORMAL, 16.0 * MU_ROUNDING},
+    {"stick_slip_tail", MU_STICK_SLIP, {"inverse_y", 0.0, 1.0 / MU_Y_TAIL}, {"s", 0.0, 1.0},
+     MU_LAYER ", minus (2/pi) ln(v_tilde/sqrt(y_tilde))", 0.0, 0.0},
+};
+
+static const mumacro_piece MU_PIECE[MU_PIECES] = {
+    {"low", {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT}, "2 v_tilde_crit / y_tilde^2"},
+    {"mid", {"ln_y", MU_LN_Y_CONT, MU_LN_Y_TAIL}, "v_tilde_crit / sqrt(y_tilde)"},
+    {"high", {"inverse_y", 0.0, 1.0 / MU_Y_TAIL}, "v_tilde_crit / sqrt(y_tilde)"},
+};
+
+static const char *const MU_SOURCE_NAME[MU_SOURCES] = {
+    "continuous_low", "continuous_mid_1", "continuous_mid_2", "continuous_high", "continuous_tail", "stick_slip_low",
+    "stick_slip_mid", "corner", "stick_slip_mid_1", "stick_slip_mid_2", "stick_slip_high", "stick_slip_tail",
+    "tail_fast", "no_oscillation", "static_limit", "rigid",
+};
+static const char *const MU_REGIME_NAME[MU_REGIMES] = {"continuous", "stick_slip", "static"};
+static const signed char MU_REGIME_OF_SOURCE[MU_SOURCES] = {0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 2, 0};

@@ -1,0 +1,81 @@
+/* The border of continuous sliding, v~crit(y~), in three pieces; this file alone knows how they are scaled.
+ *
+ * low   y~ <= 1.5            coordinate y~^2, nodes hold 2 v~crit / y~^2
+ * mid   1.5 < y~ <= 2^17     coordinate ln y~, nodes hold v~crit / sqrt(y~), cells v~crit itself
+ * high  y~ > 2^17            coordinate 1/y~, nodes hold v~crit / sqrt(y~) */
+
+enum { MU_PIECE_FIRST, MU_PIECE_OFFSET, MU_PIECE_STEP, MU_PIECE_ERROR, MU_PIECE_COLUMNS };
+
+/* What a node's value is multiplied by to give v~crit. */
+static double mu_border_scale(int piece, double y) { return piece == MU_BORDER_LOW ? 0.5 * y * y : sqrt(y); }
+
+typedef struct {
+    mu_whole cell;
+    mu_lanes u, scale, ln_y; /* coordinate in the cell, -1 to 1; factor of the cell's polynomial */
+} mu_border_cells;
+
+/* The cells of both pieces up to MU_Y_TAIL; 0 < y <= MU_Y_TAIL. */
+MU_INLINE mu_border_cells mu_border_cell(const double *pieces, mu_lanes y) {
+    const double *low = pieces, *mid = pieces + MU_PIECE_COLUMNS;
+    const mu_lanes ln_y = mu_log(y), squared = y * y;
+    const mu_mask small = MU_WHERE(y <= MU_Y_CONT);
+    const mu_lanes x = mu_select(small, mu_fma(squared, mu_all(low[MU_PIECE_STEP]), mu_all(low[MU_PIECE_OFFSET])),
+                                 mu_fma(ln_y, mu_all(mid[MU_PIECE_STEP]), mu_all(mid[MU_PIECE_OFFSET])));
+    const mu_lanes first = mu_select(small, mu_all(low[MU_PIECE_FIRST]), mu_all(mid[MU_PIECE_FIRST]));
+    mu_border_cells out;
+    const mu_whole cell = MU_AS(mu_whole, x);
+    out.cell = cell + MU_AS(mu_whole, first);
+    out.u = 2.0 * (x - MU_AS(mu_lanes, cell)) - 1.0;
+    out.scale = mu_select(small, 0.5 * squared, mu_all(1.0));
+    out.ln_y = ln_y;
+    return out;
+}
+
+/* The polynomial of a cell, highest power first. */
+MU_INLINE double mu_border_value(const double *cell, double u) {
+    double sum = cell[0];
+    for (int i = 1; i < 8; ++i) sum = mu_fma1(sum, u, cell[i]);
+    return sum;
+}
+
+/* d ln v~crit / d ln y~ from the same cell: 2 for y~ -> 0, 1/2 for y~ -> infinity. */
+MU_INLINE double mu_border_slope(const double *pieces, const double *cell, double u, double y) {
+    double value = cell[0], slope = 0.0;
+    const int piece = y <= MU_Y_CONT ? MU_BORDER_LOW : y <= MU_Y_TAIL ? MU_BORDER_MID : MU_BORDER_HIGH;
+    const double step = 2.0 * pieces[piece * MU_PIECE_COLUMNS + MU_PIECE_STEP];
+    const double weight = piece == MU_BORDER_LOW ? 2.0 * y * y : piece == MU_BORDER_MID ? 1.0 : -1.0 / y;
+    for (int i = 1; i < 8; ++i) {
+        slope = mu_fma1(slope, u, value);
+        value = mu_fma1(value, u, cell[i]);
+    }
+    return (piece == MU_BORDER_LOW ? 2.0 : piece == MU_BORDER_MID ? 0.0 : 0.5) + weight * step * slope / value;
+}
+
+/* v~crit at 0 < y < infinity, with its slope and ln y~ where they are wanted. */
+static double mu_border(const mumacro_data *data, double y, double *slope, double *ln_y) {
+    const double *cell;
+    double u, scale;
+    if (y > MU_Y_TAIL) {
+        const double *piece = data->pieces + MU_BORDER_HIGH * MU_PIECE_COLUMNS;
+        const double x = mu_fma1(1.0 / y, piece[MU_PIECE_STEP], piece[MU_PIECE_OFFSET]);
+        const int whole = (int)x;
+        cell = data->border + 8 * ((int)piece[MU_PIECE_FIRST] + whole);
+        u = 2.0 * (x - whole) - 1.0;
+        scale = mu_border_scale(MU_BORDER_HIGH, y);
+        if (ln_y) *ln_y = mu_log1(y);
+    } else {
+        const mu_border_cells found = mu_border_cell(data->pieces, mu_all(y));
+        cell = data->border + 8 * mu_first_cell(found.cell);
+        u = mu_first(found.u);
+        scale = mu_first(found.scale);
+        if (ln_y) *ln_y = mu_first(found.ln_y);
+    }
+    if (slope) *slope = mu_border_slope(data->pieces, cell, u, y);
+    return scale * mu_border_value(cell, u);
+}
+
+/* v~crit at any y: 0 at 0, infinite at infinity, NaN for what is no amplitude. */
+static double mu_border_at(const mumacro_data *data, double y) {
+    if (y > 0.0 && y < HUGE_VAL) return mu_border(data, y, NULL, NULL);
+    return y >= 0.0 ? y : NAN;
+}

@@ -1,0 +1,74 @@
+/* The cells: polynomials of degree 7 in both local coordinates, and where a point finds its own. */
+
+/* Polynomial and local coordinates u, w in [-1, 1] of the coordinates (a, b) in a block. */
+typedef struct {
+    int64_t cell;
+    double u, w;
+} mu_spot;
+
+MU_INLINE mu_spot mu_find(const double *block, int64_t cells, double a, double b) {
+    const double x = mu_fma1(a, block[MU_STEP_A], block[MU_OFFSET_A]);
+    const double z = mu_fma1(b, block[MU_STEP_B], block[MU_OFFSET_B]);
+    /* an offset's rounding may leave a coordinate at the near end below zero: truncation keeps it in the first cell */
+    const double i = (double)(int32_t)x, j = (double)(int32_t)z;
+    const int64_t cell = (int32_t)(block[MU_FIRST] + i * block[MU_CELLS_B] + j);
+    mu_spot out;
+    /* no table and no input makes it read elsewhere */
+    out.cell = cell < 0 ? 0 : cell < cells ? cell : cells - 1;
+    out.u = 2.0 * (x - i) - 1.0;
+    out.w = 2.0 * (z - j) - 1.0;
+    return out;
+}
+
+enum { MU_PARTS = 8 / MU_LANES };
+
+/* Rows hold falling powers of w, columns falling powers of u: Horner in w for all columns at once. */
+MU_INLINE void mu_rows(const double *cell, double w, double *row) {
+    mu_lanes sum[MU_PARTS];
+    for (int p = 0; p < MU_PARTS; ++p) sum[p] = mu_load(cell + p * MU_LANES);
+    for (int k = 1; k < 8; ++k)
+        for (int p = 0; p < MU_PARTS; ++p) sum[p] = mu_fma(sum[p], mu_all(w), mu_load(cell + 8 * k + p * MU_LANES));
+    for (int p = 0; p < MU_PARTS; ++p) mu_store(row + p * MU_LANES, sum[p]);
+}
+
+/* The polynomial of a cell at u, w: the sum over powers of u by halves, u^4, u^2, u. */
+MU_INLINE double mu_cell_value(const double *cell, double u, double w) {
+    double c[8], half[4];
+    const double u2 = u * u, u4 = u2 * u2;
+    mu_rows(cell, w, c);
+    for (int i = 0; i < 4; ++i) half[i] = mu_fma1(c[i], u4, c[i + 4]);
+    return mu_fma1(mu_fma1(half[0], u2, half[2]), u, mu_fma1(half[1], u2, half[3]));
+}
+
+typedef struct {
+    double q, q_a, q_b; /* and its derivatives along a and b */
+} mu_slope;
+
+/* The same with its derivatives along u and w. */
+MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
+    mu_lanes value[MU_PARTS], rising[MU_PARTS];
+    double c[8], d[8];
+    mu_slope out;
+    for (int p = 0; p < MU_PARTS; ++p) {
+        value[p] = mu_load(cell + p * MU_LANES);
+        rising[p] = mu_all(0.0);
+    }
+    for (int k = 1; k < 8; ++k)
+        for (int p = 0; p < MU_PARTS; ++p) {
+            rising[p] = mu_fma(rising[p], mu_all(w), value[p]);
+            value[p] = mu_fma(value[p], mu_all(w), mu_load(cell + 8 * k + p * MU_LANES));
+        }
+    for (int p = 0; p < MU_PARTS; ++p) {
+        mu_store(c + p * MU_LANES, value[p]);
+        mu_store(d + p * MU_LANES, rising[p]);
+    }
+    out.q = c[0];
+    out.q_a = 0.0;
+    out.q_b = d[0];
+    for (int i = 1; i < 8; ++i) {
+        out.q_a = mu_fma1(out.q_a, u, out.q);
+        out.q = mu_fma1(out.q, u, c[i]);
+        out.q_b = mu_fma1(out.q_b, u, d[i]);
+    }
+    return out;
+}

@@ -1,0 +1,177 @@
+/* The charts: which block a point belongs to, and its coordinates there. */
+
+enum { MU_FIRST, MU_CELLS_B, MU_OFFSET_A, MU_STEP_A, MU_OFFSET_B, MU_STEP_B, MU_BLOCK_COLUMNS = 8 };
+
+/* A point in its block: coordinates (a, b), v~crit and d ln v~crit / d ln y~; phi in the corner only. */
+typedef struct {
+    int block;
+    double v, y, a, b, phi, crit, tilt;
+} mu_place;
+
+/* --- many points: selections, no branches ----------------------------------------------------------- */
+
+/* The one quotient of all common charts: 1/(1 + v~^2), 1/(v~^2 + y~^2) or, in stick-slip, 1/y~. */
+MU_INLINE mu_lanes mu_share(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask small) {
+    const mu_lanes square = mu_fma(v, v, mu_select(small, mu_all(1.0), y * y));
+    return 1.0 / mu_select(sliding, square, y);
+}
+
+/* base and factor of mu~ in a common chart; in continuous sliding root = v~ sqrt(share).
+ *
+ * continuous, y~ <= 1.5:  mu~ = 1 - q y~^2 / (4 (1 + v~^2)), eq. (31)    continuous above: mu~ = q / sqrt(1 + y~^2/v~^2)
+ * stick-slip, y~ <= 0.75: mu~ = 1 - q y~^2    to 1.5: mu~ = q            stick-slip above: mu~ = q v~/y~ */
+MU_INLINE void mu_ratio_form(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask small, mu_mask lowest, mu_lanes share,
+                             mu_lanes root, mu_lanes *base, mu_lanes *factor) {
+    const mu_mask deficit = lowest | (small & sliding);
+    const mu_lanes of_deficit = y * y * mu_select(sliding, -0.25 * share, mu_all(-1.0));
+    const mu_lanes of_value = mu_select(sliding, root, mu_select(small, mu_all(1.0), v * share));
+    *base = mu_select(deficit, mu_all(1.0), mu_all(0.0));
+    *factor = mu_select(deficit, of_deficit, of_value);
+}
+
+typedef struct {
+    mu_lanes a, b, base, factor; /* mu~ = base + factor q(a, b) */
+    mu_mask block;
+} mu_places;
+
+/* The blocks of points with 0 < y~ <= MU_Y_TAIL, v~ > 0.  MU_CORNER and MU_FAST come without coordinates. */
+MU_INLINE mu_places mu_place_common(mu_lanes v, mu_lanes y, mu_lanes crit, mu_lanes ln_y) {
+    const mu_lanes rho = v / crit, squared = y * y;
+    const mu_mask sliding = MU_WHERE(rho >= 1.0), small = MU_WHERE(y <= MU_Y_CONT), lowest = MU_WHERE(y <= MU_Y_STICK_LO);
+    const mu_mask half = MU_WHERE(rho < 0.5);
+    /* one division and one root do for all blocks */
+    const mu_lanes share = mu_share(v, y, sliding, small);
+    const mu_lanes root = mu_sqrt(mu_select(sliding, v * v * share, mu_select(half, rho, 1.0 - rho)));
+    /* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on; both square-root edges become smooth
+     * for one root, and the knot between the halves is an edge of cells */
+    const mu_lanes sigma = mu_select(half, root, MU_SQRT2 - root);
+    const mu_lanes beyond = mu_select(small, 1.0 - share, mu_log(rho));
+    /* -1 where true: what is counted is subtracted */
+    const mu_mask of_regime = mu_select_whole(sliding, mu_all_whole(0), MU_S_LOW - ~lowest - ~small);
+    const mu_mask block = of_regime - ~small - MU_WHERE(y > MU_Y_MID) - MU_WHERE(y > MU_Y_HIGH);
+    const mu_mask near = small | MU_WHERE(rho <= MU_RHO_MAX);
+    const mu_mask off_corner = ~small | lowest | MU_WHERE(sigma >= MU_SIGMA_CUT) | sliding;
+    mu_places out;
+    mu_ratio_form(v, y, sliding, small, lowest, share, root, &out.base, &out.factor);
+    out.a = mu_select(small & ~lowest & ~sliding, y, mu_select(small, squared, ln_y));
+    out.b = mu_select(sliding, beyond, sigma);
+    out.block = mu_select_whole(near & off_corner, block,
+                                mu_select_whole(small, mu_all_whole(MU_CORNER), mu_all_whole(MU_FAST)));
+    return out;
+}
+
+/* Whether mu_place_common handles the points: legal, above zero, neither extreme nor beyond MU_Y_TAIL. */
+MU_INLINE mu_mask mu_is_common(mu_lanes v, mu_lanes y) {
+    return MU_WHERE(v > 1e-290) & MU_WHERE(v < 1e150) & MU_WHERE(y > 1e-150) & MU_WHERE(y <= MU_Y_TAIL);
+}
+
+/* --- one point -------------------------------------------------------------------------------------- */
+
+/* Positive root phi of phi^3 + 2 eta phi = pi v~, v~ > 0: a guess right in every limit, off by 28 % at most, then Halley's
+ * method; three steps of third order take that to rounding. */
+static double mu_normal_form_root(double v, double eta) {
+    const double c = MU_PI * v, p = 2.0 * eta, root = mu_cube_root_near(c);
+    double phi = eta >= 0.0 ? c / (p + root * root) : sqrt(root * root - p);
+    for (int i = 0; i < 3; ++i) {
+        const double slope = 3.0 * phi * phi + p, newton = (phi * (phi * phi + p) - c) / slope;
+        phi -= newton / (1.0 - 3.0 * phi * newton / slope);
+    }
+    return phi;
+}
+
+/* Corner coordinates (R, tan(psi/2)): R sin psi = sqrt 2 phi, R cos psi = s0/sqrt 2, s0^2 = 2 pi v~/phi.  The tangent of
+ * half the angle is analytic in it, runs from 0 to 1 as well, and costs a division. */
+static void mu_place_corner(mu_place *at) {
+    const double phi = mu_normal_form_root(at->v, at->y - 1.0), squared = 2.0 * MU_PI * at->v / phi;
+    at->phi = phi;
+    at->a = sqrt(0.5 * squared + 2.0 * phi * phi);
+    at->b = 2.0 * phi / (MU_SQRT2 * at->a + sqrt(squared));
+}
+
+/* The place of any point with v~ > 0, y~ > 0, both finite; MU_FAST has no coordinates. */
+static mu_place mu_locate(const mumacro_data *data, double v, double y) {
+    mu_place at = {MU_FAST, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    double ln_y;
+    at.v = v;
+    at.y = y;
+    at.crit = mu_border(data, y, &at.tilt, &ln_y);
+    if (y > MU_Y_TAIL) {
+        const double root = sqrt(y), rho = v / at.crit;
+        if (v > MU_FAST_KAPPA * root) return at;
+        at.a = 1.0 / y;
+        at.block = v >= at.crit ? MU_C_TAIL : MU_S_TAIL;
+        at.b = v >= at.crit ? mu_log1(v / root) : rho < 0.5 ? sqrt(rho) : MU_SQRT2 - sqrt(1.0 - rho);
+    } else {
+        const mu_places found = mu_place_common(mu_all(v), mu_all(y), mu_all(at.crit), mu_all(ln_y));
+        at.block = (int)mu_first_whole(found.block);
+        at.a = mu_first(found.a);
+        at.b = mu_first(found.b);
+        if (at.block == MU_CORNER) mu_place_corner(&at);
+    }
+    return at;
+}
+
+/* Derivatives of a chart's coordinates along ln v~ and ln y~. */
+typedef struct {
+    double a_v, a_y, b_v, b_y;
+    double phi_v, phi_y; /* of ln phi, in the corner */
+} mu_turn;
+
+static mu_turn mu_turn_corner(const mu_place *at) {
+    const double phi = at->phi, v = at->v, y = at->y, s0 = sqrt(2.0 * MU_PI * v / phi);
+    const double stiff = 3.0 * phi * phi + 2.0 * (y - 1.0);
+    const double phi_v = MU_PI * v / stiff, phi_y = -2.0 * phi * y / stiff;
+    const double s_v = 0.5 * s0 * (1.0 - phi_v / phi), s_y = -0.5 * s0 * phi_y / phi;
+    const double turn = 0.5 * (1.0 + at->b * at->b) / (at->a * at->a); /* d tan(psi/2) / d psi, over R^2 */
+    mu_turn out;
+    out.a_v = (0.5 * s0 * s_v + 2.0 * phi * phi_v) / at->a;
+    out.a_y = (0.5 * s0 * s_y + 2.0 * phi * phi_y) / at->a;
+    out.b_v = turn * (s0 * phi_v - phi * s_v);
+    out.b_y = turn * (s0 * phi_y - phi * s_y);
+    out.phi_v = phi_v / phi;
+    out.phi_y = phi_y / phi;
+    return out;
+}
+
+/* v~^2 / (1 + v~^2). */
+MU_INLINE double mu_speed_share(double v) {
+    const double rest = 1.0 / mu_fma1(v, v, 1.0);
+    return v < 1.0 ? v * v * rest : 1.0 - rest;
+}
+
+/* In the last 1e-9 of sigma below the border the derivative of b is that 1e-9 below it. */
+MU_INLINE mu_turn mu_turn_of(const mu_place *at) {
+    mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0};
+    switch (at->block) {
+    case MU_CORNER:
+        return mu_turn_corner(at);
+    case MU_C_LOW: {
+        const double share = mu_speed_share(at->v);
+        out.a_y = 2.0 * at->a;
+        out.b_v = 2.0 * share / mu_fma1(at->v, at->v, 1.0);
+        out.b_y = 0.0;
+        return out;
+    }
+    case MU_C_TAIL:
+        out.a_y = -at->a;
+        out.b_y = -0.5;
+        return out;
+    case MU_S_LOW:
+        out.a_y = 2.0 * at->a;
+        break;
+    case MU_S_MID:
+        out.a_y = at->a;
+        break;
+    case MU_S_TAIL:
+        out.a_y = -at->a;
+        break;
+    default:
+        break;
+    }
+    if (at->block >= MU_S_LOW) {
+        const double root = mu_max(MU_SQRT2 - at->b, 1e-9);
+        out.b_v = at->b < 0.5 * MU_SQRT2 ? 0.5 * at->b : 0.5 * (1.0 - root * root) / root;
+        out.b_y = -at->tilt * out.b_v;
+    }
+    return out;
+}

@@ -1,0 +1,236 @@
+/* Cases in SI units: the groups y~ = y0 k / (mu0 Fz) and v~ = v0 k / (mu0 Fz omega), eqs. (6), (8), unusual inputs, and
+ * the chain rule to the six inputs.  An infinite k is rigid contact, eq. (37). */
+
+typedef struct {
+    double mu0, Fz, k, y0, omega, v0;
+} mu_inputs;
+
+typedef struct {
+    double mu, bound, v, y; /* mu~, its bound, groups */
+    int source;
+} mu_case;
+
+/* 0 for a legal case, else 1 + the place of its first bad input. */
+static int mu_first_bad(const mu_inputs *in) {
+    if (!(in->mu0 > 0.0 && in->mu0 < HUGE_VAL)) return 1;
+    if (!(in->Fz > 0.0 && in->Fz < HUGE_VAL)) return 2;
+    if (!(in->k > 0.0)) return 3;
+    if (!(in->y0 >= 0.0 && in->y0 < HUGE_VAL)) return 4;
+    if (!(in->omega >= 0.0 && in->omega < HUGE_VAL)) return 5;
+    return in->v0 >= 0.0 && in->v0 < HUGE_VAL ? 0 : 6;
+}
+
+/* r = y~/v~ = y0 omega/v0, which needs no stiffness. */
+static double mu_amplitude_ratio(const mu_inputs *in) {
+    const double product = in->y0 * in->omega;
+    return product > 1e-290 && product < 1e290 ? product / in->v0 : mu_quotient(in->y0, in->omega, in->v0, 1.0, 1.0);
+}
+
+/* The groups of any legal case: v~ is infinite where nothing oscillates, both are for rigid contact. */
+static void mu_groups(const mu_inputs *in, double *v, double *y) {
+    const int rigid = in->k == HUGE_VAL;
+    *v = in->v0 > 0.0 ? HUGE_VAL : 0.0;
+    *y = in->y0 == 0.0 ? 0.0 : rigid ? HUGE_VAL : mu_quotient(in->y0, in->k, in->mu0, in->Fz, 1.0);
+    if (in->y0 > 0.0 && in->omega > 0.0 && in->v0 > 0.0 && !rigid)
+        *v = mu_quotient(in->v0, in->k, in->mu0, in->Fz, in->omega);
+}
+
+static mu_case mu_case_of(double mu, double bound, int source, double v, double y) {
+    mu_case out;
+    out.mu = mu;
+    out.bound = bound;
+    out.source = source;
+    out.v = v;
+    out.y = y;
+    return out;
+}
+
+/* Any case: zero inputs, rigid contact, groups beyond double precision. */
+static mu_case mu_unusual_case(const mumacro_data *data, const mu_inputs *in) {
+    double v, y, r, mu;
+    if (mu_first_bad(in)) return mu_case_of(NAN, NAN, -1, NAN, NAN);
+    mu_groups(in, &v, &y);
+    if (in->y0 == 0.0 || in->omega == 0.0) return mu_case_of(1.0, 0.0, MU_NO_OSCILLATION, v, y);
+    if (in->v0 == 0.0 && in->k == HUGE_VAL) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
+    if (y == 0.0 && in->v0 > 0.0) return mu_case_of(1.0, MU_ROUNDING, MU_NO_OSCILLATION, v, y);
+    if (v < HUGE_VAL && y < HUGE_VAL) {
+        double bound;
+        int8_t source;
+        mu_chunk_of_ratios(data, 1, &v, &y, &mu, &bound, &source);
+        /* v~ below 5e-324: the static limit holds to rounding, mu~ itself underflows for y~ > 1 */
+        return mu_case_of(mu, bound + (v == 0.0 && in->v0 > 0.0 ? MU_DENORMAL : 0.0), source, v, y);
+    }
+    if (in->v0 == 0.0) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
+    r = mu_amplitude_ratio(in);
+    if (r == 0.0) return mu_case_of(1.0, MU_ROUNDING, MU_RIGID, v, y);
+    if (r == HUGE_VAL) return mu_case_of(0.0, 3.0 * MU_DENORMAL, MU_RIGID, v, y); /* eq. (35) is 2.5e-306 there */
+    mu = mu_outer_expansion(r).first;
+    /* y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large */
+    return mu_case_of(mu, MU_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
+}
+
+/* d mu_macro / d input and the bounds, 12 numbers stride apart.  One-sided at the edges: d/dy0 = 0 at y0 = 0,
+ * d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, which is infinite on y~ = 1 and for rigid contact.
+ * Relative to k the slope is 0 for rigid contact.  slopes: those of mu~, or NULL where they are not known yet. */
+MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const mu_case *found, const mu_slopes *known,
+                           double *out, int64_t stride) {
+    const double mu0 = in->mu0;
+    double slope[6] = {found->mu, 0.0, 0.0, 0.0, 0.0, 0.0}, error[6] = {found->bound, 0.0, 0.0, 0.0, 0.0, 0.0};
+    if (found->source == -1) {
+        for (int i = 0; i < 6; ++i) slope[i] = error[i] = NAN;
+    } else if (found->source == MU_RIGID) {
+        double along = 0.0;
+        const double rounding = 8.0 * MU_ROUNDING * found->mu, all = rounding + (found->bound > rounding ? found->bound : 0.0);
+        if (found->mu < 1.0 || in->y0 * in->omega > 0.0) along = mu_outer_expansion(mu_amplitude_ratio(in)).first_slope;
+        slope[3] = mu0 * along / in->y0;
+        slope[4] = mu0 * along / in->omega;
+        slope[5] = -mu0 * along / in->v0;
+        error[3] = mu0 * all / in->y0;
+        error[4] = mu0 * all / in->omega;
+        error[5] = mu0 * all / in->v0;
+    } else if (found->source == MU_STATIC_LIMIT && found->y == HUGE_VAL) {
+        slope[5] = error[5] = HUGE_VAL;
+    } else if (found->source != MU_NO_OSCILLATION) {
+        const mu_slopes at = known ? *known : mu_slopes_at(data, MU_MU_RATIO, found->v, found->y);
+        const double both = at.along_v + at.along_y, errors = at.bound_v + at.bound_y;
+        slope[0] = found->mu - both;
+        error[0] = found->bound + errors;
+        slope[1] = -mu0 * both / in->Fz;
+        error[1] = mu0 * errors / in->Fz;
+        slope[2] = mu0 * both / in->k;
+        error[2] = mu0 * errors / in->k;
+        slope[3] = mu0 * at.along_y / in->y0;
+        error[3] = mu0 * at.bound_y / in->y0;
+        slope[4] = -mu0 * at.along_v / in->omega;
+        error[4] = mu0 * at.bound_v / in->omega;
+        if (found->v > 0.0) {
+            slope[5] = mu0 * at.along_v / in->v0;
+            error[5] = mu0 * at.bound_v / in->v0;
+        } else {
+            const double unit = (in->k / in->Fz) / in->omega;
+            slope[5] = mu_speed_slope_at_zero(data, found->y, &error[5]) * unit;
+            error[5] *= unit;
+        }
+    }
+    for (int i = 0; i < 6; ++i) {
+        out[i * stride] = slope[i];
+        out[(6 + i) * stride] = error[i];
+    }
+}
+
+/* --- many cases ------------------------------------------------------------------------------------- */
+
+/* v~ and y~ where inputs are legal and no product is near the ends of the range, else -1: with mu0 and k positive,
+ * positive products leave no negative factor, and NaN fails the comparisons. */
+MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *y) {
+    for (int i = 0; i < n; i += MU_LANES) {
+        const mu_lanes mu0 = mu_load(in[0] + i), k = mu_load(in[2] + i), omega = mu_load(in[4] + i);
+        const mu_lanes force = mu0 * mu_load(in[1] + i), stretch = mu_load(in[3] + i) * k;
+        const mu_lanes speed = mu_load(in[5] + i) * k, rate = force * omega;
+        const mu_lanes slow = speed / rate, small = stretch / force;
+        const mu_mask low = MU_WHERE(force > 1e-290) & MU_WHERE(stretch > 1e-290) & MU_WHERE(speed > 1e-290) &
+                            MU_WHERE(rate > 1e-290);
+        const mu_mask high = MU_WHERE(force < 1e290) & MU_WHERE(stretch < 1e290) & MU_WHERE(speed < 1e290) &
+                             MU_WHERE(rate < 1e290);
+        const mu_mask plain = low & high & MU_WHERE(mu0 > 0.0) & MU_WHERE(k > 0.0) & MU_WHERE(slow > 0.0) &
+                              MU_WHERE(slow < HUGE_VAL) & MU_WHERE(small > 0.0) & MU_WHERE(small < HUGE_VAL);
+        mu_store(v + i, mu_select(plain, slow, mu_all(-1.0)));
+        mu_store(y + i, mu_select(plain, small, mu_all(-1.0)));
+    }
+}
+
+/* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
+static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_CHUNK], const mumacro_columns *out,
+                              int64_t start) {
+    double v[MU_CHUNK], y[MU_CHUNK], *mu = out->mu_ratio + start, *bound = out->bound + start;
+    int8_t *source = out->source + start;
+    const double *errors = data->quantities[MU_MU_RATIO].errors;
+    mu_chunk c;
+    int left;
+    mu_pass_groups(n, in, v, y);
+    mu_pass_borders(data, n, v, y, &c);
+    left = mu_pass_places(n, &c);
+    if (out->slopes) { /* before the values, which turn coordinates into those of cells */
+        for (int i = 0; i < n; ++i) {
+            const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
+            if (!mu_is_left(c.block[i])) {
+                const mu_slopes slopes = mu_slopes_of(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+                const double *error = errors + 2 * c.block[i];
+                const mu_case found = mu_case_of(slopes.value, fabs(c.factor[i]) * error[0] + error[1],
+                                                 (int)c.block[i], v[i], y[i]);
+                mu_gradient(data, &six, &found, &slopes, out->slopes + start + i, out->stride);
+            }
+        }
+    }
+    mu_pass_values(data, n, &c, mu);
+    for (int i = 0; i < n; ++i) {
+        const double *error = errors + 2 * c.block[i];
+        bound[i] = fabs(c.factor[i]) * error[0] + error[1];
+        source[i] = (int8_t)c.block[i];
+    }
+    for (int i = 0; left && i < n; ++i) {
+        const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
+        mu_case found;
+        if (!mu_is_left(c.block[i])) continue;
+        if (v[i] == -1.0) found = mu_unusual_case(data, &six);
+        else {
+            const mu_answer at = mu_answer_left(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+            found = mu_case_of(at.value, at.bound, at.source, v[i], y[i]);
+        }
+        mu[i] = found.mu;
+        bound[i] = found.bound;
+        source[i] = (int8_t)found.source;
+        v[i] = found.v;
+        y[i] = found.y;
+        if (out->slopes) mu_gradient(data, &six, &found, NULL, out->slopes + start + i, out->stride);
+    }
+    for (int i = 0; i < n; ++i) {
+        out->mu_macro[start + i] = mu[i] * in[0][i];
+        bound[i] *= in[0][i];
+    }
+    if (out->v_tilde) memcpy(out->v_tilde + start, v, (size_t)n * sizeof *v);
+    if (out->y_tilde) memcpy(out->y_tilde + start, y, (size_t)n * sizeof *y);
+}
+
+static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
+                     const mumacro_columns *out) {
+    for (int64_t start = 0; start < n; start += MU_CHUNK) {
+        const int few = (int)(n - start < MU_CHUNK ? n - start : MU_CHUNK);
+        const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;
+        double in[6][MU_CHUNK];
+        for (int i = 0; i < 6; ++i) {
+            if (strides[i]) memcpy(in[i], columns[i] + start, (size_t)few * sizeof **in);
+            for (int j = strides[i] ? few : 0; j < whole; ++j) in[i][j] = strides[i] ? 1.0 : columns[i][0];
+        }
+        mu_chunk_of_cases(data, few, in, out, start);
+    }
+}
+
+/* l0 = mu0 Fz / k, eq. (5); 0 for rigid contact. */
+static double mu_length_scale(double mu0, double Fz, double k) {
+    const double quotient = Fz / k, length = mu0 * quotient;
+    int64_t i, j, l;
+    if (k == HUGE_VAL || (mu_min(quotient, length) > 1e-290 && mu_max(quotient, length) < 1e290)) return length;
+    const double mantissa = mu_split(mu0, &i) * (mu_split(Fz, &j) / mu_split(k, &l));
+    return mu_scale(mantissa, i + j - l);
+}
+
+static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
+                   int with_slopes, mumacro_case *out) {
+    double in[6][MU_CHUNK];
+    const double six[6] = {mu0, Fz, k, y0, omega, v0};
+    mumacro_columns columns = {NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1};
+    int8_t source;
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
+    columns.mu_macro = &out->mu_macro;
+    columns.mu_ratio = &out->mu_ratio;
+    columns.bound = &out->bound;
+    columns.v_tilde = &out->v_tilde;
+    columns.y_tilde = &out->y_tilde;
+    columns.source = &source;
+    columns.slopes = with_slopes ? out->slopes : NULL;
+    mu_chunk_of_cases(data, 1, in, &columns, 0);
+    out->source = source;
+    out->length_scale = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
+}

@@ -1,0 +1,56 @@
+/* The shared object's functions for one instruction level; compiled once for each. */
+#include "kernel.c"
+
+static void mu_borders(const mumacro_data *data, int64_t n, const double *y, double *crit) {
+    for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_at(data, y[i]);
+}
+
+static void mu_border_scales(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells) {
+    for (int64_t i = 0; i < n; ++i) {
+        of_nodes[i] = mu_border_scale(piece, y[i]);
+        of_cells[i] = piece == MU_BORDER_MID ? 1.0 : of_nodes[i];
+    }
+}
+
+static void mu_forms(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta,
+                     double *base, double *factor) {
+    const mu_form form = MU_QUANTITY[quantity].forms[block];
+    for (int64_t i = 0; i < n; ++i) {
+        mu_place at = {block, v[i], y[i], 0.0, 0.0, 0.0, 0.0, 0.0};
+        if (block == MU_CORNER) at.phi = mu_normal_form_root(v[i], eta[i]);
+        base[i] = mu_base(form.base, &at);
+        factor[i] = mu_factor(form.factor, &at);
+    }
+}
+
+static void mu_roots(int64_t n, const double *v, const double *eta, double *root) {
+    for (int64_t i = 0; i < n; ++i) root[i] = mu_normal_form_root(v[i], eta[i]);
+}
+
+static void mu_outers(int64_t n, const double *r, double *out) {
+    for (int64_t i = 0; i < n; ++i) {
+        const mu_outer found = mu_outer_expansion(r[i]);
+        memcpy(out + 5 * i, &found, 5 * sizeof *out);
+    }
+}
+
+static const mumacro_quantity *mu_about(int code) {
+    return code >= 0 && code < MU_QUANTITIES ? &MU_QUANTITY[code].about : NULL;
+}
+
+static const mumacro_atlas MU_ATLAS = {
+    MU_Y_STICK_LO, MU_Y_STICK_HI, MU_Y_CONT, MU_Y_MID, MU_Y_HIGH, MU_Y_TAIL, MU_S_CUT, MU_SIGMA_CUT, MU_RHO_MAX,
+    MU_FAST_KAPPA, MU_ROUNDING, MU_OUTER_LOG_MAX, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES, MU_OUTER_CELLS,
+    MU_CHART, MU_PIECE, MU_SOURCE_NAME, MU_REGIME_NAME, MU_REGIME_OF_SOURCE,
+};
+
+#define MU_TEXT(x) #x
+#define MU_NAME(x) MU_TEXT(x)
+#define MU_JOINED(a, b) a##b
+#define MU_SYMBOL(level) MU_JOINED(mumacro_kernel_, level)
+
+extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
+const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
+    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio, mu_one,
+    mu_borders, mu_forms, mu_border_scales, mu_roots, mu_outers,
+};

@@ -1,0 +1,112 @@
+/* What the shared object offers.  mumacro/library.py reads this file too: declarations only, no macros. */
+#ifndef MU_LIBRARY_H
+#define MU_LIBRARY_H
+#include <stdint.h>
+
+/* One coordinate of a chart or of a piece of the border: its name and its range in a table file. */
+typedef struct {
+    const char *name;
+    double low, high;
+} mumacro_axis;
+
+/* One block: what its nodes hold for mu~; what the bound of mu~ allows for rounding, absolute and per factor. */
+typedef struct {
+    const char *name;
+    int regime;
+    mumacro_axis a, b;
+    const char *tabulated;
+    double floor, rounding;
+} mumacro_chart;
+
+/* One piece of v~crit(y~). */
+typedef struct {
+    const char *name;
+    mumacro_axis axis;
+    const char *tabulated;
+} mumacro_piece;
+
+/* One quantity: its name; its variable in a block of a table file; its meaning; whether it is more than zero in
+ * continuous sliding; whether it is smooth in v~ at the border (else it has a square root or a jump there). */
+typedef struct {
+    const char *name, *variable, *meaning;
+    int while_sliding, smooth_at_border;
+} mumacro_quantity;
+
+/* Where blocks meet, and other constants of the atlas (charts.c). */
+typedef struct {
+    double y_stick_lo, y_stick_hi, y_cont, y_mid, y_high, y_tail, s_cut, sigma_cut, rho_max, fast_kappa, rounding,
+        outer_log_max;
+    int charts, sources, pieces, quantities, regimes, outer_cells;
+    const mumacro_chart *chart;
+    const mumacro_piece *piece;
+    const char *const *source_name, *const *regime_name;
+    const signed char *regime_of_source;
+} mumacro_atlas;
+
+/* The cells of one quantity: polynomials (cells, 8, 8), powers of b's coordinate along rows, of a's along columns, both
+ * from 7 down to 0; errors of the tabulated quantity (sources + 1, 2): relative to the factor, absolute; errors of its
+ * slopes along ln v~ and ln y~ (cells, 2), per scale of a slope's bound. */
+typedef struct {
+    int64_t cells;
+    const double *polynomials, *errors, *slope_errors;
+} mumacro_cells;
+
+/* A table as evaluation reads it.  border: polynomials (.., 8) of v~crit; pieces (3, 4): first cell, offset, step,
+ * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused: step *
+ * coordinate + offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the two terms
+ * of large speed, in cells of ln(1 + y~^2/v~^2). */
+typedef struct {
+    const double *border, *pieces, *blocks, *outer;
+    mumacro_cells quantities[4];
+} mumacro_data;
+
+/* Answers to n cases, each array of length n; NULL where a column is not wanted.  slopes: 12 rows, stride apart: d
+ * mu_macro / d input and the bounds. */
+typedef struct {
+    double *mu_macro, *mu_ratio, *bound, *v_tilde, *y_tilde;
+    int8_t *source;
+    double *slopes;
+    int64_t stride;
+} mumacro_columns;
+
+/* The answer to one case; bound: of the error of mu_macro; l0 = mu0 Fz / k; slopes: d mu_macro / d input and bounds. */
+typedef struct {
+    double mu_macro, mu_ratio, bound, v_tilde, y_tilde, length_scale;
+    int source;
+    double slopes[12];
+} mumacro_case;
+
+/* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or written beyond n.  A
+ * single point is an array of one.  Illegal points give NaN and the source -1. */
+typedef struct {
+    const char *level;
+    const mumacro_atlas *atlas;
+    const mumacro_quantity *(*quantity)(int code);
+    /* a quantity: value, bound of its error and source; bound and source may be NULL */
+    void (*values)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *value,
+                   double *bound, int8_t *source);
+    /* value, v~ d/d v~, y~ d/d y~, bounds of both slopes: 5 rows of out, stride apart */
+    void (*slopes)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *out,
+                   int64_t stride);
+    /* dimensional cases: columns mu0, Fz, k, y0, omega, v0, each with a stride of 1, or 0 for one value */
+    void (*cases)(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
+                  const mumacro_columns *out);
+    /* the same alone, in a fraction of the time: mu~; and a case, whose slopes are filled where they are wanted */
+    double (*ratio)(const mumacro_data *data, double v, double y);
+    void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
+                int with_slopes, mumacro_case *out);
+    /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
+    void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
+    /* for the builder: base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
+    void (*forms)(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta, double *base,
+                  double *factor);
+    /* what node values of a piece of the border, and what its cells, are multiplied by to give v~crit */
+    void (*border_scales)(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells);
+    void (*normal_form_root)(int64_t n, const double *v, const double *eta, double *root);
+    /* the two terms of large speed and their slopes, 5 rows of out */
+    void (*outer_expansion)(int64_t n, const double *r, double *out);
+} mumacro_kernel;
+
+/* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */
+const mumacro_kernel *mumacro_kernel_at(int level);
+#endif

@@ -1,0 +1,201 @@
+/* Many points.  The choice of a point's block is a chain of branches that a processor cannot predict.  So MU_CHUNK points
+ * go together through passes that select instead: amplitudes and the border's cell, v~crit, blocks and coordinates, cells,
+ * values.  What the passes do not handle (the corner, closed forms, zero and extreme inputs) is marked and answered one
+ * by one.  A single point is a chunk of one, so it has the same bits as in any array. */
+
+enum { MU_CHUNK = 256 }; /* the scratch of the passes stays in the fastest cache */
+
+typedef struct {
+    double v[MU_CHUNK], y[MU_CHUNK]; /* 1 where a point is not common */
+    double crit[MU_CHUNK], ln_y[MU_CHUNK], a[MU_CHUNK], b[MU_CHUNK], base[MU_CHUNK], factor[MU_CHUNK];
+    double local[MU_CHUNK]; /* coordinate in the border's cell */
+    int64_t block[MU_CHUNK];
+    int32_t border[MU_CHUNK + MU_LANES], cell[MU_CHUNK];
+} mu_chunk;
+
+/* Points into the chunk, the border's cell, v~crit. */
+MU_INLINE void mu_pass_borders(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c) {
+    const int rest = n % MU_LANES;
+    for (int i = 0; i < n; i += MU_LANES) {
+        double few[2][MU_LANES];
+        mu_lanes speed, amplitude;
+        mu_mask common;
+        mu_border_cells found;
+        if (rest && i + MU_LANES > n) {
+            for (int j = 0; j < MU_LANES; ++j) {
+                few[0][j] = j < rest ? v[i + j] : 1.0;
+                few[1][j] = j < rest ? y[i + j] : 1.0;
+            }
+            speed = mu_load(few[0]);
+            amplitude = mu_load(few[1]);
+        } else {
+            speed = mu_load(v + i);
+            amplitude = mu_load(y + i);
+        }
+        common = mu_is_common(speed, amplitude);
+        speed = mu_select(common, speed, mu_all(1.0));
+        amplitude = mu_select(common, amplitude, mu_all(1.0));
+        found = mu_border_cell(data->pieces, amplitude);
+        mu_store(c->v + i, speed);
+        mu_store(c->y + i, amplitude);
+        mu_store(c->ln_y + i, found.ln_y);
+        mu_store(c->crit + i, found.scale);
+        mu_store(c->local + i, found.u);
+        memcpy(c->border + i, &found.cell, sizeof found.cell);
+        mu_store_whole(c->block + i, mu_select_whole(common, mu_all_whole(0), mu_all_whole(MU_OTHER)));
+    }
+    for (int i = 0; i < n; ++i) c->crit[i] *= mu_border_value(data->border + 8 * c->border[i], c->local[i]);
+}
+
+/* Blocks, coordinates and forms of mu~; returns how many points are left to be answered one by one. */
+MU_INLINE int mu_pass_places(int n, mu_chunk *c) {
+    mu_mask left = mu_all_whole(0);
+    int count = 0;
+    for (int i = n; i % MU_LANES; ++i) c->crit[i] = 1.0;
+    for (int i = 0; i < n; i += MU_LANES) {
+        mu_mask known, block;
+        const mu_places found =
+            mu_place_common(mu_load(c->v + i), mu_load(c->y + i), mu_load(c->crit + i), mu_load(c->ln_y + i));
+        memcpy(&known, c->block + i, sizeof known);
+        block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
+        left |= MU_WHERE(block >= MU_FAST) | MU_WHERE(block == MU_CORNER);
+        mu_store(c->a + i, found.a);
+        mu_store(c->b + i, found.b);
+        mu_store(c->base + i, found.base);
+        mu_store(c->factor + i, found.factor);
+        mu_store_whole(c->block + i, block);
+    }
+    for (int i = 0; i < MU_LANES; ++i) {
+        int64_t any[MU_LANES];
+        memcpy(any, &left, sizeof left);
+        count += any[i] != 0;
+    }
+    return count;
+}
+
+/* Cells and values of mu~.  A point without a cell reads one that means nothing. */
+MU_INLINE void mu_pass_values(const mumacro_data *data, int n, mu_chunk *c, double *value) {
+    const mumacro_cells *cells = &data->quantities[MU_MU_RATIO];
+    for (int i = 0; i < n; ++i) {
+        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[i]), cells->cells, c->a[i], c->b[i]);
+        c->cell[i] = (int32_t)spot.cell;
+        c->a[i] = spot.u;
+        c->b[i] = spot.w;
+    }
+    for (int i = 0; i < n; ++i) {
+        const double q = mu_cell_value(cells->polynomials + 64 * (int64_t)c->cell[i], c->a[i], c->b[i]);
+        value[i] = mu_fma1(c->factor[i], q, c->base[i]);
+    }
+    for (int i = 0; i < n; ++i) value[i] = mu_min(mu_max(value[i], 0.0), 1.0);
+}
+
+/* A point of the chunk in its block. */
+MU_INLINE mu_place mu_place_of(const mumacro_data *data, const mu_chunk *c, int i, int slope) {
+    mu_place at = {(int)c->block[i], c->v[i], c->y[i], c->a[i], c->b[i], 0.0, c->crit[i], 0.0};
+    if (at.block == MU_CORNER) mu_place_corner(&at);
+    else if (slope) at.tilt = mu_border_slope(data->pieces, data->border + 8 * c->border[i], c->local[i], c->y[i]);
+    return at;
+}
+
+/* What the passes leave: the corner, closed forms, zero and extreme inputs. */
+MU_INLINE int mu_is_left(int64_t block) { return block >= MU_FAST || block == MU_CORNER; }
+
+static mu_answer mu_answer_left(const mumacro_data *data, int quantity, const mu_chunk *c, int i, double v, double y) {
+    if (c->block[i] == MU_CORNER) {
+        const mu_place at = mu_place_of(data, c, i, 0);
+        return mu_in_block(data, quantity, &at);
+    }
+    return c->block[i] == MU_FAST ? MU_QUANTITY[quantity].fast(data, v, y) : mu_answer_at(data, quantity, v, y);
+}
+
+/* mu~ at up to MU_CHUNK points. */
+static void mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, double *value,
+                               double *bound, int8_t *source) {
+    const double *errors = data->quantities[MU_MU_RATIO].errors;
+    mu_chunk c;
+    int left;
+    mu_pass_borders(data, n, v, y, &c);
+    left = mu_pass_places(n, &c);
+    mu_pass_values(data, n, &c, value);
+    if (bound)
+        for (int i = 0; i < n; ++i) {
+            const double *error = errors + 2 * c.block[i];
+            bound[i] = fabs(c.factor[i]) * error[0] + error[1];
+        }
+    if (source)
+        for (int i = 0; i < n; ++i) source[i] = (int8_t)c.block[i];
+    if (!left) return;
+    for (int i = 0; i < n; ++i) {
+        if (mu_is_left(c.block[i])) {
+            const mu_answer found = mu_answer_left(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+            value[i] = found.value;
+            if (bound) bound[i] = found.bound;
+            if (source) source[i] = (int8_t)found.source;
+        }
+    }
+}
+
+/* Another quantity at up to MU_CHUNK points. */
+static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, const double *v, const double *y,
+                               double *value, double *bound, int8_t *source) {
+    mu_chunk c;
+    mu_pass_borders(data, n, v, y, &c);
+    mu_pass_places(n, &c);
+    for (int i = 0; i < n; ++i) {
+        mu_answer found;
+        if (mu_is_left(c.block[i])) found = mu_answer_left(data, quantity, &c, i, v[i], y[i]);
+        else {
+            const mu_place at = mu_place_of(data, &c, i, 0);
+            found = mu_in_block(data, quantity, &at);
+        }
+        value[i] = found.value;
+        if (bound) bound[i] = found.bound;
+        if (source) source[i] = (int8_t)found.source;
+    }
+}
+
+static void mu_values(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *value,
+                      double *bound, int8_t *source) {
+    for (int64_t i = 0; i < n; i += MU_CHUNK) {
+        const int few = (int)(n - i < MU_CHUNK ? n - i : MU_CHUNK);
+        double *error = bound ? bound + i : NULL;
+        int8_t *from = source ? source + i : NULL;
+        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, value + i, error, from);
+        else mu_chunk_of_others(data, quantity, few, v + i, y + i, value + i, error, from);
+    }
+}
+
+static double mu_ratio(const mumacro_data *data, double v, double y) {
+    double mu;
+    mu_chunk_of_ratios(data, 1, &v, &y, &mu, NULL, NULL);
+    return mu;
+}
+
+/* Slopes at up to MU_CHUNK points that are handed on one by one to what wants them. */
+MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const mu_chunk *c, int i, double v, double y) {
+    const mu_form form = MU_QUANTITY[quantity].forms[c->block[i] < MU_CHARTS ? c->block[i] : 0];
+    if (c->block[i] < MU_CHARTS && form.factor != MU_NOTHING) {
+        const mu_place at = mu_place_of(data, c, i, 1);
+        if (quantity == MU_MU_RATIO && at.block != MU_CORNER) return mu_slopes_in_block(data, quantity, &at, c->base[i], c->factor[i]);
+        return mu_slopes_in_block(data, quantity, &at, mu_base(form.base, &at), mu_factor(form.factor, &at));
+    }
+    return mu_slopes_at(data, quantity, v, y);
+}
+
+static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
+                                double *out, int64_t stride) {
+    for (int64_t i = 0; i < n; i += MU_CHUNK) {
+        const int few = (int)(n - i < MU_CHUNK ? n - i : MU_CHUNK);
+        mu_chunk c;
+        mu_pass_borders(data, few, v + i, y + i, &c);
+        mu_pass_places(few, &c);
+        for (int j = 0; j < few; ++j) {
+            const mu_slopes found = mu_slopes_of(data, quantity, &c, j, v[i + j], y[i + j]);
+            out[i + j] = found.value;
+            out[stride + i + j] = found.along_v;
+            out[2 * stride + i + j] = found.along_y;
+            out[3 * stride + i + j] = found.bound_v;
+            out[4 * stride + i + j] = found.bound_y;
+        }
+    }
+}

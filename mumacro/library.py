@@ -1,0 +1,198 @@
+"""The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
+
+It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/library.h``.  A call runs without the
+interpreter's lock.  There is a kernel for every instruction level of the processor; the best one is used, and those
+with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cffi import FFI
+from numpy.typing import NDArray
+
+__all__ = ["BLOCK_COLUMNS", "PIECE_COLUMNS", "Data", "Kernel", "kernels"]
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+#: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/library.h``
+BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
+
+_HERE = Path(__file__).resolve().parent
+_SHARED = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
+_DECLARED = (_HERE / "kernel" / "library.h").read_text("ascii")
+_FFI = FFI()
+_FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
+_NUMBERS, _CODES = _FFI.typeof("double[]"), _FFI.typeof("int8_t[]")
+_NOTHING: Any = _FFI.NULL
+
+
+def _numbers(array: Array | None) -> Any:
+    return _NOTHING if array is None else _FFI.from_buffer(_NUMBERS, array)
+
+
+class Data:
+    """A table as the kernel reads it.
+
+    Parameters
+    ----------
+    border : ndarray
+        Polynomials of v~crit (cells, 8), highest power first.
+    pieces : ndarray
+        (3, PIECE_COLUMNS): first cell, offset, step, relative error.
+    blocks : ndarray
+        (sources + 1, BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no cells.
+    outer : ndarray
+        The two terms of large speed, (cells, 2, 8).
+    """
+
+    def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
+        self.pointer = _FFI.new("mumacro_data *")
+        self._kept: list[Any] = []
+        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors of slopes (cells, 2) by code of the quantity
+        self.quantities: dict[int, tuple[Array, Array, Array]] = {}
+        self.border, self.pieces, self.blocks, self.outer = (
+            self._keep(self.pointer, name, array)
+            for name, array in (("border", border), ("pieces", pieces), ("blocks", blocks), ("outer", outer))
+        )
+
+    def put(self, quantity: int, polynomials: Array, errors: Array, slope_errors: Array) -> None:
+        """Add the cells of a quantity, see :attr:`quantities`."""
+        place = self.pointer.quantities[quantity]
+        place.cells = polynomials.shape[0]
+        self.quantities[quantity] = (
+            self._keep(place, "polynomials", polynomials),
+            self._keep(place, "errors", errors),
+            self._keep(place, "slope_errors", slope_errors),
+        )
+
+    def _keep(self, place: Any, name: str, array: Array) -> Array:
+        """Point ``place.name`` to the numbers, which live as long as this object."""
+        array = np.require(array, np.float64, ["C", "A"])
+        pointer = _numbers(array)
+        setattr(place, name, pointer)
+        self._kept.append(pointer)
+        return array
+
+
+class Kernel:
+    """The functions of one instruction level; arrays are contiguous float64 (sources: int8), of one length.
+
+    Illegal points and cases give NaN and the source -1.  See ``kernel/library.h``.
+    """
+
+    def __init__(self, found: Any) -> None:
+        self._found = found
+        self.level: str = _FFI.string(found.level).decode()
+        self.atlas = found.atlas
+        self.ratio = found.ratio  # (data.pointer, v~, y~) -> mu~
+        self._values, self._one, self._cases = found.values, found.one, found.cases
+
+    def text(self, pointer: Any) -> str:
+        """A text of the kernel."""
+        return str(_FFI.string(pointer).decode())
+
+    def quantity(self, code: int) -> Any:
+        """The record of a quantity."""
+        return self._found.quantity(code)
+
+    def values(
+        self, data: Data, quantity: int, v: Array, y: Array, value: Array, bound: Array | None, source: Codes | None
+    ) -> None:
+        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where wanted."""
+        codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
+        self._values(data.pointer, quantity, v.size, _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes)
+
+    def slopes(self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0) -> None:
+        """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column ``start`` on."""
+        out = _numbers(rows.reshape(-1)[start:])
+        self._found.slopes(data.pointer, quantity, v.size, _numbers(v), _numbers(y), out, rows.shape[1])
+
+    def cases(
+        self,
+        data: Data,
+        n: int,
+        columns: Sequence[Array],
+        mu_macro: Array,
+        mu_ratio: Array,
+        bound: Array,
+        source: Codes,
+        groups: tuple[Array, Array] | None = None,
+        slopes: Array | None = None,
+        start: int = 0,
+    ) -> None:
+        """Cases ``start`` to ``start`` + n: inputs (n,) or (1,), answers (n,), groups (n,), ``slopes`` (12, N)."""
+        given = [_numbers(column) for column in columns]
+        pointers = _FFI.new("double *[6]", given)
+        strides = _FFI.new("int64_t[6]", [int(column.size != 1) for column in columns])
+        v, y = groups if groups else (None, None)
+        out = _FFI.new("mumacro_columns *")
+        kept = out.mu_macro, out.mu_ratio, out.bound, out.v_tilde, out.y_tilde = tuple(
+            map(_numbers, (mu_macro, mu_ratio, bound, v, y))
+        )
+        out.source = codes = _FFI.from_buffer(_CODES, source)
+        if slopes is not None:
+            out.slopes = rows = _numbers(slopes.reshape(-1)[start:])
+            out.stride, kept = slopes.shape[1], (*kept, rows)
+        self._cases(data.pointer, n, pointers, strides, out)
+        del kept, codes, given  # alive until here
+
+    def one(self, data: Data, six: tuple[float, ...], slopes: bool) -> Any:
+        """The answer to one case in plain floats: mu_macro, mu_ratio, bound, v_tilde, y_tilde, source, slopes[12]."""
+        out = _FFI.new("mumacro_case *")
+        self._one(data.pointer, *six, slopes, out)
+        return out
+
+    def border(self, data: Data, y: Array) -> Array:
+        """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
+        out = np.empty(y.size)
+        self._found.border(data.pointer, y.size, _numbers(y), _numbers(out))
+        return out
+
+    # --- for the builder ------------------------------------------------------------------------------
+
+    def forms(self, quantity: int, block: int, v: Array, y: Array, eta: Array) -> tuple[Array, Array]:
+        """(base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1 counts in the corner."""
+        base, factor = np.empty(v.shape), np.empty(v.shape)
+        v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
+        self._found.forms(quantity, block, v.size, *map(_numbers, (v, y, eta, base, factor)))
+        return base, factor
+
+    def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
+        """What node values of a piece of the border, and what its cells, are multiplied by to give v~crit, (n,)."""
+        of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
+        self._found.border_scales(piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells)))
+        return of_nodes, of_cells
+
+    def normal_form_root(self, v: Array, eta: Array) -> Array:
+        """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
+        out = np.empty(v.size)
+        self._found.normal_form_root(v.size, *map(_numbers, (v, eta, out)))
+        return out
+
+    def outer_expansion(self, r: Array) -> Array:
+        """f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape (n, 5)."""
+        out = np.empty((r.size, 5))
+        self._found.outer_expansion(r.size, _numbers(r), _numbers(out))
+        return out
+
+
+def _open() -> list[Kernel]:
+    try:
+        shared: Any = _FFI.dlopen(str(_SHARED))
+    except OSError as error:
+        raise ImportError(
+            f"mumacro: the compiled kernel {_SHARED.name} is missing or does not fit this machine ({error}): "
+            "install a wheel for this platform, or build one with a C compiler or the package ziglang: pip install ."
+        ) from None
+    found = (shared.mumacro_kernel_at(level) for level in range(3))
+    return [Kernel(one) for one in found if one != _NOTHING]
+
+
+#: the kernels that this processor can run, the best one last
+kernels = _open()

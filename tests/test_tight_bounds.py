@@ -1,0 +1,116 @@
+"""Bounds are tight: at the hardest points the worst error is a good part of its bound, which may not be halved."""
+
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from builder.measure import solver_noise
+from builder.sweep import Sweep
+from builder.verify import CASES, draw, fast_from
+from comparing import close
+from mumacro import Surrogate
+from mumacro.charts import CONTINUOUS, MU, NAMES, POWER, QUANTITIES, REGIME_OF_SOURCE, SOURCES, STICK
+from mumacro.settling import settling
+
+Array = NDArray[np.float64]
+TABLES = Path(__file__).parent.parent / "tables"
+
+
+@pytest.fixture(scope="module")
+def table() -> Surrogate:
+    """A table whose errors are far above the solver's."""
+    return Surrogate.open(TABLES / "mumacro-1e-7.nc")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", [MU, POWER, STICK], ids=QUANTITIES)
+def test_the_worst_error_of_every_block_is_about_half_its_bound(table: Surrogate, sweep: Sweep, which: int) -> None:
+    """The builder doubles the largest error that it finds; a search at other points finds nearly as large ones."""
+    ask = (table.ratio_with_bound, table.power_with_bound, table.stick_fraction_with_bound)[which]
+    worst: dict[str, float] = {}
+    for kind, _, _ in CASES:
+        v, y = draw(kind, 4000, table, seed=77)
+        source = table.ratio_with_bound(v, y)[2]
+        solved = sweep.solve("full", v, y)
+        sliding = REGIME_OF_SOURCE[source] == CONTINUOUS
+        value, bound = ask(v, y)[:2]
+        noise = solver_noise(which, v, y, solved, sliding)
+        error = np.maximum(np.abs(value - solved[QUANTITIES[which]]) - noise, 0.0)
+        assert np.all(error <= bound)
+        share = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)
+        for code in np.unique(source[~sliding] if which == STICK else source):
+            name = SOURCES[code]
+            worst[name] = max(worst.get(name, 0.0), float(share[source == code].max()))
+    blocks = [worst[name] for name in NAMES if name in worst]
+    assert min(blocks) > 0.3
+    assert max(blocks) > 0.5
+    if which == POWER:
+        assert worst["tail_fast"] > 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("low", "high"), [(0.1, 1.88), (1.88, 1e4)])
+def test_what_the_border_does_to_the_stick_fraction_is_bounded_tightly(
+    table: Surrogate, sweep: Sweep, low: float, high: float
+) -> None:
+    """Between the border and the table's, where one says stick-slip and the other continuous sliding."""
+    y = np.geomspace(low, high, 8000)
+    exact, ours = sweep.solve("border", np.ones_like(y), y)["deficit"], table.v_tilde_crit(y)
+    v = np.minimum(exact, ours)
+    found, bound = table.stick_fraction_with_bound(v, y)
+    error = np.abs(found - sweep.solve("full", v, y)["stick_fraction"])
+    assert 0.5 < (error / bound).max() <= 1.0
+
+
+def test_a_regime_is_uncertain_where_the_border_may_lie_within_its_bound(table: Surrogate) -> None:
+    y = np.geomspace(1e-4, 1e6, 200)
+    known_to = table.border.max_rel_error
+    for share, certain in ((0.9, False), (1.1, True)):
+        for side in (-1.0, 1.0):
+            v = table.v_tilde_crit(y) * (1.0 + side * share * known_to)
+            answer = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=1.0, v0=v, groups=True)
+            assert np.all(answer.regime_certain == certain)
+
+
+def slow_manifold(v: float, y: float) -> mpmath.mpf:
+    """mu~ of continuous sliding at large v~ in 24 digits: the angle lags by asin(its rate / speed), iterated.
+
+    At equal times of half a period; the angle is antiperiodic, its rate that of its trigonometric interpolant.
+    """
+    m = 2 * int(21.0 / math.asinh(v / y)) + 8
+    with mpmath.workdps(24):
+        asin, atan, cos, sqrt = (np.frompyfunc(getattr(mpmath, name), 1, 1) for name in ("asin", "atan", "cos", "sqrt"))
+        row = [mpmath.mpf(0), *((-1) ** j * mpmath.csc(mpmath.pi * j / m) for j in range(1, m))]
+        rate_of = np.array([[row[i - j] if i >= j else -row[j - i] for j in range(m)] for i in range(m)])
+        across = mpmath.mpf(y) * cos(mpmath.pi * np.arange(m) / m)
+        speed, direction = sqrt(mpmath.mpf(v) ** 2 + across * across), atan(across / mpmath.mpf(v))
+        angle, change = direction, 1.0
+        while change > 1e-20:
+            before, angle = angle, direction - asin(rate_of.dot(angle) / speed)
+            change = max(abs(angle - before))
+        return sum(cos(angle)) / m
+
+
+@pytest.mark.slow
+def test_the_closed_form_for_large_speed_is_bounded_tightly(table: Surrogate) -> None:
+    """Where it takes over from the blocks: there it leaves out most, up to 6e-16 of mu~, as much as rounding."""
+    y = np.geomspace(2.0, 1.2e4, 90)
+    v = fast_from(table, y) * (1.0 + 1e-9)
+    mu, bound, source = table.ratio_with_bound(v, y)
+    assert {SOURCES[code] for code in source} == {"tail_fast"}
+    with mpmath.workdps(24):
+        truth = [slow_manifold(*point) for point in zip(v.tolist(), y.tolist(), strict=True)]
+        share = [abs(m - t) / b for m, t, b in zip(mu.tolist(), truth, bound.tolist(), strict=True)]
+    assert 0.3 < max(share) <= 1.0
+
+
+@pytest.mark.parametrize(("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)])
+def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(v: float, y: float) -> None:
+    coarse = Surrogate.open(TABLES / "mumacro-1e-4.nc")
+    found = settling(coarse, mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=1.0, v0=v)
+    less = 2.0 * math.pi * (v * coarse.ratio_with_bound(v, y)[1] + coarse.power_with_bound(v, y)[1])
+    assert found.error_bound == close(math.log(100.0) / (found.slip_path - less) - found.periods, rel=1e-9)
