@@ -109,13 +109,15 @@ def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(whee
 def test_a_linux_wheel_asks_for_no_newer_system_than_its_tag_promises(tmp_path, platform):
     for package in ("ziglang", "auditwheel"):
         pytest.importorskip(package, reason=f"the PyPI package {package} is not installed")
-    command = [sys.executable, "-m", "auditwheel", "show", "--json", build(tmp_path, platform)]
+    # its own folder as the path of libraries: what this machine has must not count
+    command = [sys.executable, "-m", "auditwheel", "show", "--json", "--ldpaths", tmp_path, build(tmp_path, platform)]
     verdict = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
-    system, *needs, processor = _parts(verdict["overall_tag"])
+    system, *needs, processor = _parts(verdict["sym_tag"])
     promised_system, *promises, promised_processor = _parts(platform.partition(".")[0])
     assert (system, processor) == (promised_system, promised_processor)
     assert needs <= promises
-    assert set(verdict["external_libs"]) <= {"libc.so", "libc.so.6", "libm.so.6"}
+    # no functions of a mathematical library: they differ between systems in the last digit
+    assert {*verdict["external_libs"], *verdict["versioned_symbols"]} <= {"libc.so", "libc.so.6"}
 
 
 def _parts(tag):
