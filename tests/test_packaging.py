@@ -125,6 +125,7 @@ def test_a_platform_without_a_wheel_is_refused_by_name(repository):
     assert "win_amd64" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
 def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository, tmp_path):
     checkout = tmp_path / "checkout"
@@ -142,6 +143,7 @@ def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository,
     assert {path.name for path in (checkout / "mumacro").iterdir()} == {"kernel", before.name}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("gcc"), reason="needs Linux and gcc")
 def test_the_debug_build_has_both_sanitizers_and_the_other_has_neither(repository, tmp_path):
     for name, variables in (("debug", {"MUMACRO_BUILD_DEBUG": "1"}), ("fast", {})):
