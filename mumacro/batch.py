@@ -12,9 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.charts import MU
 from mumacro.library import Data, kernels
 
-__all__ = ["cases", "share_out", "slopes", "values"]
+__all__ = ["cases", "ratios", "share_out", "slopes", "values"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -39,20 +40,22 @@ def share_out(n: int, threads: int, work: Callable[[slice], None]) -> None:
             pass
 
 
-def values(
-    quantity: int, data: Data, v: Array, y: Array, threads: int, details: bool = True
-) -> tuple[Array, Array | None, Codes | None]:
-    """A quantity at (n,) points, and with ``details`` its bound and source; NaN and -1 where illegal."""
-    n = v.size
-    value = np.empty(n)
-    bound, source = (np.empty(n), np.empty(n, np.int8)) if details else (None, None)
+def values(quantity: int, data: Data, v: Array, y: Array, threads: int) -> tuple[Array, Array, Codes]:
+    """A quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
+    value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
 
     def work(part: slice) -> None:
-        wanted = None if bound is None else bound[part], None if source is None else source[part]
-        _KERNEL.values(data, quantity, v[part], y[part], value[part], *wanted)
+        _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part])
 
-    share_out(n, threads, work)
+    share_out(v.size, threads, work)
     return value, bound, source
+
+
+def ratios(data: Data, v: Array, y: Array, threads: int) -> Array:
+    """mu~ alone at (n,) points; NaN where illegal."""
+    mu = np.empty(v.size)
+    share_out(v.size, threads, lambda part: _KERNEL.values(data, MU, v[part], y[part], mu[part], None, None))
+    return mu
 
 
 def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:

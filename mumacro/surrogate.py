@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, overload
 
@@ -27,9 +28,8 @@ Array = NDArray[np.float64]
 _KERNEL = kernels[-1]
 _CODES = {name: code for code, name in enumerate(charts.QUANTITY_NAMES)}
 #: types of one real number, which take the short way
-_NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
-)
+_NUMBERS = frozenset((float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ")))
+_OTHERS = {*FIELDS} - {"omega"}
 
 
 class Surrogate:
@@ -183,11 +183,12 @@ class Surrogate:
         0.94200429
         """
         if type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
-            mu = _KERNEL.ratio(self._pointer, v_tilde, y_tilde)
-            if mu == mu:
-                return mu
+            with suppress(OverflowError):  # a whole number beyond double range
+                mu: float = _KERNEL.ratio(self._pointer, v_tilde, y_tilde)
+                if mu == mu:
+                    return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        found = batch.values(charts.MU, self._data, v, y, self.threads, details=False)[0]
+        found = batch.ratios(self._data, v, y, self.threads)
         if not shape and math.isnan(found[0]):
             _refuse_illegal(-1, v, y, "finite and >= 0")
         return _shaped(found, shape)
@@ -310,7 +311,7 @@ class Surrogate:
         data = self._with(name)
         v, y, shape = _points(v_tilde, y_tilde)
         value, bound, source = batch.values(_CODES[name], data, v, y, self.threads)
-        if not shape and source is not None:
+        if not shape:
             _refuse_illegal(int(source[0]), v, y, "finite and >= 0" if name == "mu_ratio" else ">= 0")
         return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
@@ -345,7 +346,7 @@ class Surrogate:
         self, cases: Any = ..., /, *, gradient: bool = ..., groups: bool = ..., illegal: str = ..., **inputs: Any
     ) -> Any: ...
 
-    def evaluate(
+    def evaluate(  # type: ignore[misc]  # mypy does not match named inputs with **inputs
         self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan", **inputs: Any
     ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
@@ -400,9 +401,8 @@ class Surrogate:
         """
         if cases is None and len(inputs) == 6 and illegal in ("nan", "raise"):
             six = _plain_numbers(inputs)
-            if six is not None:
-                answer = self._one(six, gradient)
-                if answer.source_code >= 0:
+            with suppress(OverflowError):  # a whole number beyond double range
+                if six is not None and (answer := self._one(six, gradient)).source_code >= 0:
                     return answer
         return self._evaluate(cases, inputs, gradient, groups, illegal)
 
@@ -555,15 +555,25 @@ def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | N
     return surrogate
 
 
-def _plain_numbers(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
+def _plain_numbers(inputs: Mapping[str, Any]) -> tuple[float, ...] | None:
     """The six inputs where all are single real numbers, k None included; None for anything else."""
-    try:
-        k = inputs["k"]
-        omega = inputs["omega"] if "omega" in inputs else float(inputs["f"]) * RAD_PER_CYCLE
-        six = inputs["mu0"], inputs["Fz"], math.inf if k is None else k, inputs["y0"], omega, inputs["v0"]
-    except (KeyError, TypeError, ValueError, OverflowError):
+    if not inputs.keys() >= _OTHERS:
         return None
-    return six if _NUMBERS.issuperset(map(type, six)) else None
+    k, omega, f = inputs["k"], inputs.get("omega"), inputs.get("f")
+    six: Any = (
+        inputs["mu0"],
+        inputs["Fz"],
+        math.inf if k is None else k,
+        inputs["y0"],
+        f if omega is None else omega,
+        inputs["v0"],
+    )
+    if not _NUMBERS.issuperset(map(type, six)):
+        return None
+    try:
+        return six if omega is not None else (*six[:4], float(six[4]) * RAD_PER_CYCLE, six[5])
+    except OverflowError:
+        return None
 
 
 def _picked(cases: Any) -> dict[str, Any]:

@@ -196,15 +196,16 @@ def _fill(root: Any, table: Table) -> None:
         axes = (chart.a.name, chart.b.name)
         _put(group, axes[0], block.a, charts.COORDINATES[axes[0]])
         _put(group, axes[1], block.b, charts.COORDINATES[axes[1]])
-        for quantity in charts.QUANTITIES:
-            if quantity.name in block.nodes:
-                meaning = chart.quantity if quantity.name == "mu_ratio" else f"{quantity.meaning}, scaled for this block"
-                _put(group, quantity.variable, block.nodes[quantity.name], meaning, axes)
-            if quantity.name in block.slope_errors:
-                _put_slope_errors(group, quantity, block.slope_errors[quantity.name])
+        for about in charts.QUANTITIES:
+            if about.name in block.nodes:
+                meaning = chart.quantity if about.name == "mu_ratio" else f"{about.meaning}, scaled for this block"
+                _put(group, about.variable, block.nodes[about.name], meaning, axes)
+            if about.name in block.slope_errors:
+                _put_slope_errors(group, about, block.slope_errors[about.name])
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
         group.setncatts({
-            **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32), "errors": np.concatenate([block.errors[name] for name in table.quantities]),
+            **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32),
+            "errors": np.concatenate([block.errors[name] for name in table.quantities]),
             "verified_max_abs_error": block.max_abs_error, "verified_max_rel_error": block.max_rel_error,
         })  # fmt: skip
 
@@ -363,7 +364,8 @@ def _read(root: hdf5.Group, reader: _Reader) -> Table:
         a, b = reader.nodes(group, chart.a), reader.nodes(group, chart.b)
         shape = (a.size, b.size)
         largest = reader.errors(group, "verified_max_abs_error", "verified_max_rel_error")
-        block = Block(a, b, reader.cells(group, 2), max_abs_error=float(largest[0][0]), max_rel_error=float(largest[1][0]))
+        na, nb = reader.cells(group, 2)
+        block = Block(a, b, (na, nb), max_abs_error=float(largest[0][0]), max_rel_error=float(largest[1][0]))
         (errors,) = reader.errors(group, "errors", count=3 * len(quantities))
         for quantity, error in zip(quantities, errors.reshape(-1, 3), strict=True):
             block.errors[quantity.name] = error
