@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro.dimensional import real
+from mumacro.inputs import real
 from mumacro.errors import InputError
 from mumacro.extras import missing
 
