@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from mumacro.kernel_cache import kernel
 from numpy.typing import NDArray
 
 from mumacro import charts
 from mumacro.border import Border
 from mumacro.cells import LOCAL, WIDTH, chebyshev_coefficients, interpolation_matrix, nodes
 from mumacro.charts import BORDER_PIECES, CONTINUOUS, MU, POWER, STICK, Axis, Chart
-from mumacro.kernel_cache import kernel
 from mumacro.table import Block, BorderPiece
 
 from .sweep import Sweep

@@ -65,22 +65,13 @@ def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array
     return rows
 
 
-def cases(
-    data: Data, columns: Sequence[Array], n: int, threads: int, groups: bool, gradient: bool
-) -> tuple[Array, Array, Array, Codes, tuple[Array, Array] | None, Array | None]:
-    """mu_macro, mu~, the bound of mu_macro, the source; v~ and y~; slopes and their bounds (12, n), where wanted.
-
-    ``columns`` are the six inputs, (n,) or (1,).
-    """
-    macro, mu, bound, source = np.empty(n), np.empty(n), np.empty(n), np.empty(n, np.int8)
-    both = (np.empty(n), np.empty(n)) if groups else None
-    slopes = np.empty((12, n)) if gradient else None
+def cases(data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int) -> tuple[Array, Codes]:
+    """Answers to n cases, see :meth:`mumacro.library.Kernel.cases`: rows (3, 5 or 17, n), and sources (n,)."""
+    out, source = np.empty((rows, n)), np.empty(n, np.int8)
 
     def work(part: slice) -> None:
-        six = [column[part] if column.size == n else column for column in columns]
-        part_groups = (both[0][part], both[1][part]) if both else None
-        answers = macro[part], mu[part], bound[part], source[part]
-        _KERNEL.cases(data, part.stop - part.start, six, *answers, part_groups, slopes, part.start)
+        six = columns if part.stop - part.start == n else [c if isinstance(c, float) else c[part] for c in columns]
+        _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start)
 
     share_out(n, threads, work)
-    return macro, mu, bound, source, both, slopes
+    return out, source
