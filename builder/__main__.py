@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
-from mumacro import MumacroError, Surrogate
+from mumacro import InputError, MumacroError, Surrogate
 from mumacro.extras import missing
 from mumacro.processors import processors
 from mumacro.writing import alone_in
@@ -34,12 +34,6 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_
 def _fail(message: str, code: int = 1) -> typer.Exit:
     print(f"error: {message}", file=sys.stderr)
     return typer.Exit(code)
-
-
-def _number(name: str, value: float, low: float, high: float, bound: str) -> float:
-    if not low < value < high:
-        raise typer.BadParameter(f"must be {bound}, got {value!r}", param_hint=name)
-    return value
 
 
 def _json(value: object) -> str:
@@ -107,13 +101,15 @@ def build(
 
 @app.command()
 def solve(
-    v: Annotated[float, typer.Option("--v", help="Dimensionless speed v~, > 0.")],
-    y: Annotated[float, typer.Option("--y", help="Dimensionless amplitude y~, > 0.")],
+    v: Annotated[float, typer.Option("--v", help="Dimensionless speed v~, from 1e-60 to 1e10.")],
+    y: Annotated[float, typer.Option("--y", help="Dimensionless amplitude y~, from 1e-15 to 1e14.")],
 ) -> None:
     """Solve the full model once and print the steady cycle as JSON."""
-    for name, value in (("--v", v), ("--y", y)):
-        _number(name, value, 0.0, math.inf, "finite and > 0")
-    steady = solve_one(v, y)
+    try:
+        steady = solve_one(v, y)
+    except InputError as error:
+        option = {"v_tilde": "--v", "y_tilde": "--y"}[error.field]
+        raise typer.BadParameter(f"must be {error.bound}, got {error.value!r}", param_hint=option) from None
     print(_json({"v_tilde": v, "y_tilde": y, **asdict(steady)}))
     if not steady.ok:
         raise typer.Exit(1)

@@ -10,7 +10,6 @@ import argparse
 import json
 import math
 import re
-import sys
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path

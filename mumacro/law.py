@@ -82,7 +82,7 @@ class Law:
         The swept input.
     values : ndarray
         Its values [SI], ascending, shape (n,).
-    answer : Answer
+    answer : Answer[Any]
         The surrogate's results, arrays (n,).
     mu_static : ndarray
         Static limit (v0 -> 0) of each case [-], eq. (38), shape (n,).
@@ -92,7 +92,7 @@ class Law:
 
     along: str
     values: Array
-    answer: Answer
+    answer: Answer[Any]
     mu_static: Array
     border: tuple[Crossing, ...]
 

@@ -382,7 +382,8 @@ def _read(root: hdf5.Group, reader: _Reader) -> Table:
         shape = (a.size, b.size)
         largest = reader.errors(group, "verified_max_abs_error", "verified_max_rel_error")
         found = {q.name: reader.array(group, q.variable, shape) for q in quantities if chart.holds(q)}
-        block = Block(a, b, reader.cells(group, 2), found)
+        na, nb = reader.cells(group, 2)
+        block = Block(a, b, (na, nb), found)
         block.max_abs_error, block.max_rel_error = (error.item() for error in largest)
         (errors,) = reader.errors(group, "errors", count=3 * len(quantities))
         block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from builder.steady import border, solve
+from builder import steady
+from builder.steady import NOT_CONVERGED, border, solve
 from builder.sweep import Sweep
 from comparing import close
 from mumacro import InputError, Surrogate
@@ -57,9 +58,10 @@ def test_large_amplitude_end() -> None:
     assert border(1e8)[0] / 1e4 == close(0.476573, abs=1e-6)
 
 
-def test_border_that_cannot_be_found_is_an_error_with_advice() -> None:
-    with pytest.raises(ArithmeticError, match=r"border at y~ = nan: .+"):
-        border(math.nan)
+def test_border_that_cannot_be_found_is_an_error_with_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steady, "border_raw", lambda *_: (math.nan, math.nan, NOT_CONVERGED))
+    with pytest.raises(ArithmeticError, match=r"border at y~ = 0.5: the section's root was not found"):
+        border(0.5)
 
 
 # --- the stored curve ---------------------------------------------------------------------------------

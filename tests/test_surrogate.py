@@ -67,7 +67,7 @@ def hardly_moving(rng: np.random.Generator, _: Surrogate) -> tuple[Array, Array]
 
 
 def hardly_shaken(rng: np.random.Generator, _: Surrogate) -> tuple[Array, Array]:
-    return log_uniform(rng, 1e-20, 1e3, N), log_uniform(rng, 1e-100, 1e-8, N)
+    return log_uniform(rng, 1e-30, 1e3, N), log_uniform(rng, 1e-15, 1e-8, N)
 
 
 def shaken_wildly(rng: np.random.Generator, _: Surrogate) -> tuple[Array, Array]:

@@ -108,6 +108,23 @@ def test_the_closed_form_for_large_speed_is_bounded_tightly(table: Surrogate) ->
     assert 0.3 < max(share) <= 1.0
 
 
+@pytest.mark.parametrize("rigid", [True, False], ids=["rigid", "at rest"])
+def test_closed_forms_of_six_inputs_are_bounded_tightly(table: Surrogate, rigid: bool) -> None:
+    """Exact groups are no doubles: what rounding them costs is covered, and not by much more."""
+    rng = np.random.default_rng(3)
+    worst = 0.0
+    for _ in range(500):
+        mu0, Fz, omega, ratio = rng.uniform(0.1, 1.0), *10.0 ** rng.uniform((-2.0, 0.0, -2.0), (3.0, 5.0, 14.0))
+        k, v0 = (math.inf, 0.01) if rigid else (10.0 ** rng.uniform(3.0, 8.0), 0.0)
+        y0 = ratio * v0 / omega if rigid else mu0 * Fz / k * (1.0 - 0.01 / ratio)
+        found = table.evaluate(mu0=mu0, Fz=Fz, k=k, y0=y0, omega=omega, v0=v0)
+        with mpmath.workdps(40):
+            exact = mpmath.mpf(y0) * (omega / mpmath.mpf(v0) if rigid else k / (mpmath.mpf(mu0) * Fz))
+            truth = 2 / mpmath.pi * mpmath.ellipk(-(exact**2)) if rigid else mpmath.sqrt(1 - exact**2)
+            worst = max(worst, float(abs(found.mu_macro - mu0 * truth) / found.error_bound))
+    assert 0.2 < worst <= 1.0
+
+
 @pytest.mark.parametrize(("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)])
 def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(v: float, y: float) -> None:
     coarse = Surrogate.open(TABLES / "mumacro-1e-4.nc")

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 
-from mumacro.border import border_at
-from mumacro.charts import CORNER, FAST, MU, OTHER, POWER, STICK, Array
 from mumacro.dimensional import evaluate_case, evaluate_unusual, groups, scaled
 from mumacro.evaluate import answer, common_ratio
+
+from mumacro.border import border_at
+from mumacro.charts import CORNER, FAST, MU, OTHER, POWER, STICK, Array
 
 __all__ = ["case", "cycle", "ratio"]
 

@@ -60,22 +60,6 @@ typedef struct {
     mumacro_cells quantities[4];
 } mumacro_data;
 
-/* Answers to n cases, each array of length n; NULL where a column is not wanted.  slopes: 12 rows, stride apart: d
- * mu_macro / d input and the bounds. */
-typedef struct {
-    double *mu_macro, *mu_ratio, *bound, *v_tilde, *y_tilde;
-    int8_t *source;
-    double *slopes;
-    int64_t stride;
-} mumacro_columns;
-
-/* The answer to one case; bound: of the error of mu_macro; l0 = mu0 Fz / k; slopes: d mu_macro / d input and bounds. */
-typedef struct {
-    double mu_macro, mu_ratio, bound, v_tilde, y_tilde, length_scale;
-    int source;
-    double slopes[12];
-} mumacro_case;
-
 /* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or written beyond n.  A
  * single point is an array of one.  Illegal points give NaN and the source -1. */
 typedef struct {
@@ -88,13 +72,15 @@ typedef struct {
     /* value, v~ d/d v~, y~ d/d y~, bounds of both slopes: 5 rows of out, stride apart */
     void (*slopes)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *out,
                    int64_t stride);
-    /* dimensional cases: columns mu0, Fz, k, y0, omega, v0, each with a stride of 1, or 0 for one value */
-    void (*cases)(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
-                  const mumacro_columns *out);
-    /* the same alone, in a fraction of the time: mu~; and a case, whose slopes are filled where they are wanted */
+    /* dimensional cases: columns mu0, Fz, k, y0, omega, v0, each with a stride of 1, or 0 for one value.  Rows of out,
+     * stride apart: mu_macro, mu_ratio, bound of mu_macro; of 5 also v~, y~; of 17 also d mu_macro / d input, bounds */
+    void (*cases)(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
+                  double *out, int64_t stride, int8_t *source);
+    /* the same alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~, y~,
+     * l0 = mu0 Fz / k, source; of 19 also the slopes and their bounds */
     double (*ratio)(const mumacro_data *data, double v, double y);
     void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
-                int with_slopes, mumacro_case *out);
+                int numbers, double *out);
     /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
     /* for the builder: base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
