@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from mumacro.kernel_cache import kernel
 from numpy.typing import NDArray
 
 from mumacro import charts

@@ -36,7 +36,7 @@ def finer(shape: tuple[int, int]) -> tuple[int, int]:
 
 
 class _Along:
-    """The points of all cells along one axis, (cells, POINTS); of a cell that begins below the block, above its low end.
+    """The points of all cells along one axis, (cells, POINTS); none below the low end of the block.
 
     ``wide``: the width that the points of a cell cover; zero where the block never reads it.
     """

@@ -164,7 +164,7 @@ class Kernel:
         return of_nodes, of_cells
 
     def cell_shares(self, w: Array) -> tuple[Array, Array]:
-        """The shares of a cell's largest error that derivatives have at ``w``; in the last cell below the border, (n,)."""
+        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below the border, (n,)."""
         inside, at_border = np.empty(w.size), np.empty(w.size)
         self._found.cell_shares(w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border)))
         return inside, at_border

@@ -57,7 +57,7 @@ typedef struct {
  * of large speed, in cells of ln(1 + y~^2/v~^2). */
 typedef struct {
     const double *border, *pieces, *blocks, *outer;
-    mumacro_cells quantities[4];
+    mumacro_cells quantities[8];
 } mumacro_data;
 
 /* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or written beyond n.  A
