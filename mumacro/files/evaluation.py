@@ -154,7 +154,10 @@ class Evaluation:
 
     def _piece(self, block: Block) -> Piece:
         added, rejects, given = answer_columns(block.batch, self.surrogate, self.columns, self.include, self.decimal)
-        faults = [*block.faults, *(Fault(int(block.rows[r["row"]]), *list(r.values())[1:]) for r in rejects.to_pylist())]
+        faults = [
+            *block.faults,
+            *(Fault(int(block.rows[r["row"]]), *list(r.values())[1:]) for r in rejects.to_pylist()),
+        ]
         path, place = self.files[block.place.file], block.place
         if faults and self.on_error == "stop":
             row, field, value, reason = min(faults, key=lambda fault: fault.row)

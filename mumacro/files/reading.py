@@ -192,11 +192,12 @@ class CsvSource:
                 raise FilesError(f"{where}: cannot be read as CSV in UTF-8 ({one_line(error)})") from None
             if table.num_rows + len(wrong) != len(records.texts):  # no row may get the result of another
                 raise FilesError(f"{path}: rows {records.first} to {records.place.rows}: records end in several ways")
-            yield _block(records, table.combine_chunks().to_batches()[0], records.texts, wrong)
+            batches = table.combine_chunks().to_batches() or [pa.RecordBatch.from_pylist([], table.schema)]
+            yield _block(records, batches[0], records.texts, wrong)
 
 
 def _recognised(header: str, rows: list[str], sep: str, decimal: str) -> tuple[str, str]:
-    """The separator that gives the most names of inputs, and the decimal sign of their numbers; if unsure, as given."""
+    """The separator that gives the most names of inputs, and the decimal sign of most numbers; if unsure, as given."""
 
     def inputs(given: str) -> list[int]:
         names = header.replace('"', "").split(given)
@@ -204,9 +205,12 @@ def _recognised(header: str, rows: list[str], sep: str, decimal: str) -> tuple[s
 
     best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
     places = inputs(best)
-    cells = [cell.strip(' "') for row in rows for i, cell in enumerate(row.split(best)) if i in places]
-    signs = [sign for sign in ".," if any(re.fullmatch(_SIGNED.format(sign), cell) for cell in cells)]
-    return best, signs[0] if len(signs) == 1 else decimal
+    cells = [cell.strip() for row in csv.reader(rows, delimiter=best) for i, cell in enumerate(row) if i in places]
+
+    def cells_with(sign: str) -> int:
+        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
+
+    return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
 
 
 class NdjsonSource:
@@ -238,9 +242,7 @@ class NdjsonSource:
             if not verbatim and (new := {name for found in objects for name in found} - set(schema.names)):
                 where = f"{path}: rows {records.first} to {records.place.rows}"
                 raise FilesError(f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON")
-            arrays = [
-                _column([found.get(name) for found in objects], name in columns.inputs) for name in schema.names
-            ]
+            arrays = [_column([found.get(name) for found in objects], name in columns.inputs) for name in schema.names]
             yield _block(records, pa.RecordBatch.from_arrays(arrays, schema.names), texts, wrong)
 
 

@@ -52,26 +52,27 @@ def records_of(path: Path, place: Place, sep: str | None = None) -> Iterator[Rec
     Raises
     ------
     FilesError
-        A quote that is never closed, or is closed in the middle of a cell; names the line.
+        A quote that is never closed, or is closed in the middle of a cell; names the row.
     """
     with path.open("rb") as raw:
-        size = max(os.fstat(raw.fileno()).st_size, 1)
+        total = max(os.fstat(raw.fileno()).st_size, 1)
         stream = opened(path, raw)
         try:
             stream.seek(place.at)
-            data, more = b"", b"-"
-            while more:
-                more = stream.read(BLOCK - stream.tell() % BLOCK)
-                data += more
-                texts, taken, fault = _cut(data, not more, sep)
+            data, last = b"", False
+            while not last:
+                size = BLOCK - stream.tell() % BLOCK
+                more = stream.read(size)
+                data, last = data + more, len(more) < size
+                texts, taken, fault = _cut(data, last, sep)
                 data = data[taken:]
                 place = Place(place.file, place.at + taken, place.rows + len(texts))
                 if len(data) > LONGEST:
                     fault = f"a record of more than {LONGEST >> 20} MiB begins here"
                 if fault:
-                    raise FilesError(f"{path}: line {_line_at(path, place.at)}: {fault}")
+                    raise FilesError(f"{path}: row {place.rows + 1}: {fault}")
                 if texts:
-                    yield Records(texts, place, raw.tell() / size)
+                    yield Records(texts, place, raw.tell() / total)
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise FilesError(f"{path}: the compressed file is damaged ({error})") from None
 
@@ -91,15 +92,5 @@ def _cut(data: bytes, last: bool, sep: str | None) -> tuple[list[bytes], int, st
             done = reader.line_num
     except csv.Error as error:
         if last or reader.line_num < len(lines):  # else the record may end in what follows
-            fault = f"in this record a quote is not closed, or not at the end of its cell ({error})"
+            fault = f"a quote is not closed, or not at the end of its cell ({error})"
     return [text for text in texts if text.strip()], sum(map(len, lines[:done])), fault
-
-
-def _line_at(path: Path, offset: int) -> int:
-    """The number of the line at a byte, counted only when something is wrong there."""
-    with path.open("rb") as raw:
-        stream, line = opened(path, raw), 1
-        while offset > 0 and (data := stream.read(min(offset, 2**20))):
-            line += data.count(b"\n")
-            offset -= len(data)
-    return line

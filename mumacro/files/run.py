@@ -15,10 +15,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 from mumacro.files.columns import FilesError
-from mumacro.files.evaluation import Evaluation, Piece
+from mumacro.files.evaluation import Evaluation
 from mumacro.files.records import Place
 from mumacro.files.writing import write_parquet
 from mumacro.surrogate import Surrogate
@@ -43,34 +43,18 @@ class Summary:
 
 
 class _Note(NamedTuple):
-    """What is known of a piece: its size in bytes, the lines of its rejects, what follows it."""
+    """What a piece leaves behind: bytes, rows and rejects up to its end, what follows, the lines of its own rejects."""
 
-    size: int
-    rejects: str
-    place: Sequence[int]
-    rows: int
-    rejected: int
+    end: int = 0
+    place: Sequence[int] | None = None
+    rows: int = 0
+    rejected: int = 0
+    rejects: str = ""
 
     def line(self, text: bytes) -> bytes:
         """The note behind the checksum of the piece and of itself."""
         body = json.dumps(self).encode()
         return b"%08x %b\n" % (zlib.crc32(body, zlib.crc32(text)), body)
-
-
-@dataclass
-class _Done:
-    """How far a run has come: bytes of both files, rows, and the place that follows (None: nothing is written)."""
-
-    answers: int = 0
-    notes: int = 0
-    rows: int = 0
-    rejected: int = 0
-    place: Place | None = None
-
-    def add(self, note: _Note, line: bytes) -> None:
-        """Count one more piece."""
-        self.answers, self.notes, self.place = self.answers + note.size, self.notes + len(line), Place(*note.place)
-        self.rows, self.rejected = self.rows + note.rows, self.rejected + note.rejected
 
 
 def evaluate_files(
@@ -143,6 +127,10 @@ def _stamp(path: Path) -> list[int]:
     return [path.stat().st_size, path.stat().st_mtime_ns]
 
 
+def _stamp(path: Path) -> list[int]:
+    return [path.stat().st_size, path.stat().st_mtime_ns]
+
+
 class _Run:
     def __init__(self, work: Evaluation, out: Path) -> None:
         self.work, self.out = work, out
@@ -154,8 +142,7 @@ class _Run:
             out.with_name(out.name + ending) for ending in (".parts", ".rejects.csv", ".run.json")
         )
         self.answers, self.notes, self.made = (self.parts / name for name in ("answers", "notes", "made"))
-        targets = [out, self.rejects, self.record, self.answers, self.notes, self.made]
-        for target in targets:
+        for target in (out, self.rejects, self.record, self.answers, self.notes, self.made):
             if target.exists() and any(target.samefile(path) for path in work.files):
                 raise FilesError(f"{target}: is an input, and would be overwritten; give another -o")
         self.plan: dict[str, Any] = {
@@ -164,7 +151,7 @@ class _Run:
             "inputs": [[path.name, checksum] for path, checksum in zip(work.files, work.checksums, strict=True)],
             "options": [vars(work.output), list(work.include), work.on_error, [*work.columns.places.items()]],
         }
-        self.plan = json.loads(json.dumps(self.plan))
+        self.first = json.dumps(self.plan).encode() + b"\n"
 
     def run(self, force: bool, progress: Progress, say: Callable[[str], None]) -> Summary:
         """Find what is done, do what is left, and put it into place."""
@@ -174,69 +161,73 @@ class _Run:
                 self._clear()
                 say(f"{self.out}: is complete already; nothing is left to do")
                 return complete
-            done = self._begin(force, say)
-            resumed = done.rows
+            note = self._begin(force, say)
+            resumed = note.rows
             try:
-                self._go_on(done, progress)
+                note = self._go_on(note, progress)
             except FilesError:  # an input must be changed before this run can end
                 self._clear()
                 raise
-            return self._finish(done, resumed)
+            self._finish(note)
+            return self._summary(note.rows, note.rejected, resumed)
 
-    # --- what is there already ----------------------------------------------------------------------
+    def _summary(self, rows: int, rejected: int, resumed: int) -> Summary:
+        rejects = self.rejects if rejected else None
+        return Summary(rows, rows - rejected, rejected, self.out, rejects, resumed)
+
+    def _record(self, rows: int, rejected: int) -> bytes:
+        written = [self.out, *([self.rejects] if rejected else [])]
+        record = {"rows": rows, "rejected": rejected, "files": list(map(_stamp, written)), "plan": self.plan}
+        return json.dumps(record, indent=1).encode()
 
     def _complete(self) -> Summary | None:
         """The summary of an earlier run of the same command, if its files are as it left them."""
-        with suppress(FileNotFoundError, ValueError, KeyError):
-            found = json.loads(self.record.read_text("utf-8"))
-            rejects = self.rejects if found["rejected"] else None
-            if found["plan"] == self.plan and found["files"] == [_stamp(path) for path in self._written(rejects)]:
-                rows, rejected = found["rows"], found["rejected"]
-                return Summary(rows, rows - rejected, rejected, self.out, rejects, rows)
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            text = self.record.read_bytes()
+            rows, rejected = (json.loads(text)[name] for name in ("rows", "rejected"))
+            if text == self._record(rows, rejected):
+                return self._summary(rows, rejected, rows)
         return None
 
-    def _written(self, rejects: Path | None) -> list[Path]:
-        return [self.out, *([rejects] if rejects else [])]
-
-    def _begin(self, force: bool, say: Callable[[str], None]) -> _Done:
+    def _begin(self, force: bool, say: Callable[[str], None]) -> _Note:
         """Keep what is sound of an earlier run of the same command, or make a new beginning."""
-        plan = json.dumps(self.plan).encode() + b"\n"
-        first = self.notes.open("rb").readline() if self.notes.exists() else b""
-        if first == plan:
-            return self._kept(plan, say)
-        if first and not force:
-            raise FilesError(f"{self.parts}: has parts of another run ({self._differences(first)}); --force deletes them")
+        found = b""
+        if self.notes.exists():
+            with self.notes.open("rb") as notes:
+                found = notes.readline()
+        if found == self.first:
+            return self._kept(say)
+        if found and not force:
+            differ = "its plan cannot be read"
+            with suppress(ValueError, AttributeError):
+                plan, old = json.loads(self.first), json.loads(found)
+                differ = ", ".join(name for name in plan if old.get(name) != plan[name]) + " differ"
+            raise FilesError(f"{self.parts}: has parts of another run ({differ}); --force deletes them")
         for path in (self.out, self.rejects):
             if path.exists() and not force:
                 raise FilesError(f"{path}: exists already; --force replaces it")
         self._clear()
         self.answers.touch()
-        write_whole(self.notes, plan)
-        return _Done(notes=len(plan))
+        write_whole(self.notes, self.first)
+        return _Note()
 
-    def _differences(self, first: bytes) -> str:
-        with suppress(ValueError, AttributeError):
-            found = json.loads(first)
-            return ", ".join(name for name in self.plan if found.get(name) != self.plan[name]) + " differ"
-        return "its plan cannot be read"
-
-    def _kept(self, plan: bytes, say: Callable[[str], None]) -> _Done:
-        whole = sum(note.size for note, _ in self._noted())
+    def _kept(self, say: Callable[[str], None]) -> _Note:
+        last, whole = _Note(), max((note.end for note, _ in self._noted()), default=0)
         if not self.answers.exists() and self.out.exists() and self.out.stat().st_size == whole:
             os.replace(self.out, self.answers)  # a run that was stopped here had put it into place
         self.answers.touch()
-        done = _Done(notes=len(plan))
+        size = len(self.first)
         with self.answers.open("rb") as answers:
             for note, line in self._noted():
-                if note.line(answers.read(note.size)) != line:
+                if note.line(answers.read(note.end - last.end)) != line:
                     break
-                done.add(note, line)
-        damaged = done.notes < self.notes.stat().st_size
-        for path, size in ((self.answers, done.answers), (self.notes, done.notes)):
-            os.truncate(path, size)
+                last, size = note, size + len(line)
+        damaged = size < self.notes.stat().st_size
+        os.truncate(self.answers, last.end)
+        os.truncate(self.notes, size)
         again = "; what follows them was cut or changed, and is done again" if damaged else ""
-        say(f"{self.parts}: {done.rows:,} rows are done already ({done.rejected:,} rejected){again}")
-        return done
+        say(f"{self.parts}: {last.rows:,} rows are done already ({last.rejected:,} rejected){again}")
+        return last
 
     def _noted(self) -> Iterator[tuple[_Note, bytes]]:
         """The notes and their lines, up to the first that is none."""
@@ -244,32 +235,27 @@ class _Run:
             notes.readline()
             for line in notes:
                 try:
-                    yield _Note(*json.loads(line.partition(b" ")[2])), line
+                    note = _Note(*json.loads(line.partition(b" ")[2]))
                 except (ValueError, TypeError):
                     return
+                yield note, line
 
-    # --- what is left -------------------------------------------------------------------------------
+    def _go_on(self, note: _Note, progress: Progress) -> _Note:
+        # nothing is brought to the disk here: after a loss of power the checksums tell what is there
+        with self.answers.open("ab", 0) as answers, self.notes.open("ab", 0) as notes:
+            for piece in self.work.pieces(Place(*note.place) if note.place else None):
+                _write(answers, piece.text)
+                note = _Note(
+                    note.end + len(piece.text), piece.place, note.rows + piece.rows, note.rejected + piece.rejected,
+                    piece.rejects,
+                )  # fmt: skip
+                _write(notes, note.line(piece.text))
+                progress(piece.share, note.rows, note.rejected)
+        return note
 
-    def _go_on(self, done: _Done, progress: Progress) -> None:
-        with self.answers.open("ab") as answers, self.notes.open("ab") as notes:
-            for piece in self.work.pieces(done.place):
-                self._append(answers, piece.text)
-                note = _Note(len(piece.text), piece.rejects, piece.place, piece.rows, piece.rejected)
-                self._append(notes, line := note.line(piece.text))
-                done.add(note, line)
-                progress(piece.share, done.rows, done.rejected)
-
-    @staticmethod
-    def _append(stream: BinaryIO, text: bytes) -> None:
-        # not brought to the disk: after a loss of power the checksums tell what is there
-        stream.write(text)
-        stream.flush()
-
-    # --- the end --------------------------------------------------------------------------------------
-
-    def _finish(self, done: _Done, resumed: int) -> Summary:
+    def _finish(self, last: _Note) -> None:
         """Put the files into place; a run that is stopped here does this again."""
-        if done.rejected:
+        if last.rejected:
             with self.made.open("w", encoding="utf-8", newline="") as stream:
                 stream.write(self.work.rejects_head)
                 stream.writelines(note.rejects for note, _ in self._noted())
@@ -278,18 +264,20 @@ class _Run:
             self.rejects.unlink(missing_ok=True)
         if self.work.output.kind == "parquet":
             with self.answers.open("rb") as answers:
-                texts = (answers.read(note.size) for note, _ in self._noted())
+                texts = (answers.read(note.end - answers.tell()) for note, _ in self._noted())
                 write_parquet(self.made, self.work.schema, filter(None, texts))
             put(self.made, self.out)
         else:
             put(self.answers, self.out)
-        rejects = self.rejects if done.rejected else None
-        files = [_stamp(path) for path in self._written(rejects)]
-        record = {"plan": self.plan, "rows": done.rows, "rejected": done.rejected, "files": files}
-        write_whole(self.record, json.dumps(record, indent=1).encode())
+        write_whole(self.record, self._record(last.rows, last.rejected))
         self._clear()
-        return Summary(done.rows, done.rows - done.rejected, done.rejected, self.out, rejects, resumed)
 
     def _clear(self) -> None:
         for path in (self.answers, self.made, self.notes):
             path.unlink(missing_ok=True)
+
+
+def _write(stream: Any, text: bytes) -> None:
+    rest = memoryview(text)
+    while rest:
+        rest = rest[stream.write(rest) :]

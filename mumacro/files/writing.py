@@ -84,7 +84,7 @@ class Output:
         if pa.types.is_dictionary(kind):
             return self._json_cell(name, column.dictionary).take(column.indices)
         text = self._text(name, column, '"rigid"')
-        if pa.types.is_primitive(kind) and not pa.types.is_temporal(kind) or pa.types.is_nested(kind):
+        if (pa.types.is_primitive(kind) and not pa.types.is_temporal(kind)) or pa.types.is_nested(kind):
             return text
         return pa.array([None if cell is None else json.dumps(cell) for cell in text.to_pylist()], pa.large_string())
 
