@@ -307,7 +307,7 @@ def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path, capsys):
     for name, out, said in (
         ("none.csv", "o.csv", "no such file"), ("*.none", "o.csv", "there is no file"),
         ("text.parquet", "o.csv", "no Parquet"), ("cut.csv.gz", "o.csv", "is damaged"),
-        ("latin.csv", "o.parquet", "row 1: cannot be read as CSV in UTF-8"), ("flipped.parquet", "o.csv", ""),
+        ("latin.csv", "o.parquet", "row 1: no CSV in UTF-8"), ("flipped.parquet", "o.csv", ""),
         ("good.parquet", "o.xlsx", "must end in"), ("good.parquet", "none/o.csv", "no such folder"),
         ("good.parquet", ".", "must end in"),
     ):  # fmt: skip

@@ -105,7 +105,9 @@ def answer_columns(
             raise FilesError(f"the column {heading!r} {error}") from None
         values[field] = _in_si(given[heading], scale, RAD_PER_CYCLE if name == "f" else 1.0, fault)
         faults[field] = fault
-    macro, ratio, bound, source = surrogate.evaluate_columns(*(values[field] for field in FIELDS), n=n)
+    macro, ratio, bound, source = surrogate.evaluate_columns(
+        values["mu0"], values["Fz"], values["k"], values["y0"], values["omega"], values["v0"], n=n
+    )
     bad = source < 0
     mask = bad if bad.any() else None
     code = np.where(bad, 0, source).astype(np.int8)

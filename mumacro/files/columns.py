@@ -107,7 +107,7 @@ def _advice(name: str, names: Sequence[str]) -> str:
     wanted = ("omega", "f") if name == "omega" else (name,)
     for column in names:
         meant = _meant(column)
-        if meant in wanted:
+        if meant and meant in wanted:
             unit = SI[meant][0]
             remedy = f"rename that column to {meant} [{unit}] (or another unit in brackets)"
             return f"there is no column {name}; {column!r} is similar: {remedy}"

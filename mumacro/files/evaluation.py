@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from mumacro.files.answering import added_fields, answer_columns
 from mumacro.files.columns import FilesError, find_columns
-from mumacro.files.reading import Block, CsvSource, Fault, NdjsonSource, ParquetSource, Source
+from mumacro.files.reading import Block, CsvSource, Fault, NdjsonSource, ParquetSource
 from mumacro.files.records import Place
 from mumacro.files.writing import Output, csv_line
 from mumacro.surrogate import Surrogate
@@ -76,7 +76,7 @@ def find_files(given: Sequence[str | Path]) -> tuple[list[Path], str, Path | Non
     return files, kinds.pop(), folder
 
 
-def _stamp(path: Path) -> list[int]:
+def stamp(path: Path) -> list[int]:
     """What differs after a change of a file: the system itself sets the last of these."""
     found = path.stat()
     return [found.st_size, found.st_mtime_ns, found.st_ctime_ns]
@@ -100,12 +100,12 @@ class Evaluation:
         if sep == decimal:
             raise FilesError(f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'")
         self.files, kind, folder = find_files(given)
-        self._stamps = [_stamp(path) for path in self.files]
+        self._stamps = [stamp(path) for path in self.files]
         self.checksums = [_checksum(path) for path in self.files]
         told = format_of(out) if out else ("csv" if kind == "parquet" else kind, False)
         if told is None:
             raise FilesError(f"{out}: the name must end in {ENDINGS}")
-        self.source: Source
+        self.source: CsvSource | NdjsonSource | ParquetSource
         if kind == "csv":
             self.source = CsvSource(self.files, sep, decimal)
         else:
@@ -148,16 +148,14 @@ class Evaluation:
             start = place if file == place.file else Place(file)
             for block in self.source.blocks(start, self.columns, self.verbatim):
                 yield self._piece(block)
-        for path, stamp, checksum in zip(self.files, self._stamps, self.checksums, strict=True):
-            if not path.exists() or (_stamp(path) != stamp and _checksum(path) != checksum):
+        for path, before, checksum in zip(self.files, self._stamps, self.checksums, strict=True):
+            if not path.exists() or (stamp(path) != before and _checksum(path) != checksum):
                 raise FilesError(f"{path}: changed while it was read; give the command again")
 
     def _piece(self, block: Block) -> Piece:
         added, rejects, given = answer_columns(block.batch, self.surrogate, self.columns, self.include, self.decimal)
-        faults = [
-            *block.faults,
-            *(Fault(int(block.rows[r["row"]]), *list(r.values())[1:]) for r in rejects.to_pylist()),
-        ]
+        faults = [*block.faults]
+        faults += [Fault(int(block.rows[row]), *why) for row, *why in zip(*rejects.to_pydict().values(), strict=True)]
         path, place = self.files[block.place.file], block.place
         if faults and self.on_error == "stop":
             row, field, value, reason = min(faults, key=lambda fault: fault.row)

@@ -6,14 +6,16 @@ Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else sta
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import json
 import math
 import re
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -25,7 +27,7 @@ from mumacro.files.columns import Columns, FilesError
 from mumacro.files.records import Place, Records, opened, records_of
 from mumacro.input_names import split_unit, suggestion
 
-__all__ = ["SEPARATORS", "Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "Source", "one_line"]
+__all__ = ["SEPARATORS", "Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "one_line"]
 
 #: what may stand between the cells of CSV, by the word for it
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
@@ -56,15 +58,6 @@ class Block(NamedTuple):
     share: float
     lines: pa.Array | None = None
     faults: Sequence[Fault] = ()
-
-
-class Source(Protocol):
-    """Files of one format; ``schema`` has the columns and the types that they are written with."""
-
-    schema: pa.Schema
-
-    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
-        """The blocks of the file at ``place`` from there on; ``verbatim``: inputs alone are read, as lines come out."""
 
 
 def one_line(error: Any) -> str:
@@ -109,9 +102,13 @@ class ParquetSource:
             raise FilesError(f"{part.path}: damaged after row {row} ({one_line(error)})") from None
 
 
+def _where(path: Path, records: Records) -> str:
+    return f"{path}: rows {records.numbers[0]} to {records.numbers[-1]}"
+
+
 def _block(records: Records, batch: pa.RecordBatch, texts: list[bytes], wrong: dict[int, str]) -> Block:
     """A block of the records that were read (``batch``) and those that were not (``wrong``, by index)."""
-    rows, faults = np.arange(records.first, records.first + len(texts)), []
+    rows, faults = np.array(records.numbers), []
     for i, reason in sorted(wrong.items()):
         shown = texts[i].decode("utf-8", "replace")
         faults.append(Fault(int(rows[i]), None, shown if len(shown) <= _SHOWN else shown[:_SHOWN] + "…", reason))
@@ -145,18 +142,16 @@ class CsvSource:
 
     def _header(self, path: Path, sep: str, decimal: str) -> bytes:
         """The first line, after a look at the records behind it."""
-        with path.open("rb") as raw:
-            try:
+        try:
+            with path.open("rb") as raw:
                 stream = opened(path, raw)
                 head, sample = stream.readline(2**20), stream.read(2**16)
-            except (EOFError, OSError) as error:
-                raise FilesError(f"{path}: cannot be read ({error})") from None
-        try:
-            if not any(self._cells(head)):
-                raise FilesError(f"{path}: is empty; the first line must name the columns")
-        except (UnicodeDecodeError, csv.Error) as error:
+            named = any(self._cells(head))
+        except (UnicodeDecodeError, csv.Error, EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise FilesError(f"{path}: line 1 is no header of a CSV file in UTF-8 ({error})") from None
-        rows = sample.decode("utf-8", "replace").splitlines()[: 50 if len(sample) < 2**16 else -1]
+        if not named:
+            raise FilesError(f"{path}: is empty; the first line must name the columns")
+        rows = sample.decode("utf-8", "replace").splitlines()[:50]
         found = _recognised(head.decode("utf-8-sig"), rows, sep, decimal)
         if found != (sep, decimal):
             word = next(word for word, known in SEPARATORS.items() if known == found[0])
@@ -188,10 +183,9 @@ class CsvSource:
                     pa.csv.ConvertOptions(include_columns=names, column_types=self.schema, strings_can_be_null=False),
                 )
             except pa.ArrowInvalid as error:
-                where = f"{path}: rows {records.first} to {records.place.rows}"
-                raise FilesError(f"{where}: cannot be read as CSV in UTF-8 ({one_line(error)})") from None
+                raise FilesError(f"{_where(path, records)}: no CSV in UTF-8 ({one_line(error)})") from None
             if table.num_rows + len(wrong) != len(records.texts):  # no row may get the result of another
-                raise FilesError(f"{path}: rows {records.first} to {records.place.rows}: records end in several ways")
+                raise FilesError(f"{_where(path, records)}: records end in several ways")
             batches = table.combine_chunks().to_batches() or [pa.RecordBatch.from_pylist([], table.schema)]
             yield _block(records, batches[0], records.texts, wrong)
 
@@ -240,8 +234,8 @@ class NdjsonSource:
                 else:
                     wrong[i] = fault
             if not verbatim and (new := {name for found in objects for name in found} - set(schema.names)):
-                where = f"{path}: rows {records.first} to {records.place.rows}"
-                raise FilesError(f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON")
+                late = f"{min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
+                raise FilesError(f"{_where(path, records)}: {late}")
             arrays = [_column([found.get(name) for found in objects], name in columns.inputs) for name in schema.names]
             yield _block(records, pa.RecordBatch.from_arrays(arrays, schema.names), texts, wrong)
 

@@ -34,9 +34,9 @@ class Records(NamedTuple):
     share: float
 
     @property
-    def first(self) -> int:
-        """The number of the first record, from 1."""
-        return self.place.rows - len(self.texts) + 1
+    def numbers(self) -> range:
+        """Their numbers, from 1."""
+        return range(self.place.rows - len(self.texts) + 1, self.place.rows + 1)
 
 
 def opened(path: Path, raw: Any) -> Any:

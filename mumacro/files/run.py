@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mumacro.files.columns import FilesError
-from mumacro.files.evaluation import Evaluation
+from mumacro.files.evaluation import Evaluation, stamp
 from mumacro.files.records import Place
 from mumacro.files.writing import write_parquet
 from mumacro.surrogate import Surrogate
@@ -123,14 +123,6 @@ def evaluate_files(
     return _Run(work, Path(out)).run(force, progress, say)
 
 
-def _stamp(path: Path) -> list[int]:
-    return [path.stat().st_size, path.stat().st_mtime_ns]
-
-
-def _stamp(path: Path) -> list[int]:
-    return [path.stat().st_size, path.stat().st_mtime_ns]
-
-
 class _Run:
     def __init__(self, work: Evaluation, out: Path) -> None:
         self.work, self.out = work, out
@@ -177,7 +169,7 @@ class _Run:
 
     def _record(self, rows: int, rejected: int) -> bytes:
         written = [self.out, *([self.rejects] if rejected else [])]
-        record = {"rows": rows, "rejected": rejected, "files": list(map(_stamp, written)), "plan": self.plan}
+        record = {"rows": rows, "rejected": rejected, "files": [stamp(path)[:2] for path in written], "plan": self.plan}
         return json.dumps(record, indent=1).encode()
 
     def _complete(self) -> Summary | None:

@@ -54,24 +54,28 @@ class Output:
             with pa.ipc.new_stream(sink, batch.schema) as writer:
                 writer.write_batch(batch)
             return bytes(sink.getvalue())
-        before: list[Any] = [] if lines is None else [lines]
+        cells: list[Any] = [] if lines is None else [lines]
         if lines is not None and self.kind == "ndjson":  # without the brace that closes it
-            before = [pa.array([line.rstrip()[:-1].rstrip() for line in lines.to_pylist()], pa.large_binary())]
-        cells = before
+            cells = [pa.array([line.rstrip()[:-1].rstrip() for line in lines.to_pylist()], pa.large_binary())]
         for name, column in zip(batch.schema.names, batch.columns, strict=True):
             if self.kind == "csv":
                 cells += [self.sep] if cells else []
-                cells.append(pc.fill_null(self._csv_cell(name, column), ""))
             else:
-                cells.append(f"{', ' if cells else '{'}{json.dumps(name)}: ")
-                cells.append(pc.fill_null(self._json_cell(name, column), "null"))
+                cells += [f"{', ' if cells else '{'}{json.dumps(name)}: "]
+            cells += [pc.fill_null(self._cell(name, column), "" if self.kind == "csv" else "null")]
         return self.pack(_bytes_of(_joined(*cells, "\n" if self.kind == "csv" else "}\n")))
 
-    def _csv_cell(self, name: str, column: pa.Array) -> pa.Array:
+    def _cell(self, name: str, column: pa.Array) -> pa.Array:
+        """A column as cells of text, null where it is."""
         kind = column.type
         if pa.types.is_dictionary(kind):
-            return self._csv_cell(name, column.dictionary).take(column.indices)
-        text = self._text(name, column, "rigid")
+            return self._cell(name, column.dictionary).take(column.indices)
+        text = self._text(name, column)
+        if self.kind == "ndjson":
+            if pa.types.is_nested(kind) or (pa.types.is_primitive(kind) and not pa.types.is_temporal(kind)):
+                return text
+            cells = [None if cell is None else json.dumps(cell) for cell in text.to_pylist()]
+            return pa.array(cells, pa.large_string())
         if pa.types.is_floating(kind) or pa.types.is_decimal(kind):
             return text if self.decimal == "." else pc.replace_substring(text, ".", self.decimal)
         special = pc.match_substring_regex(text, f'[{self.sep}"\r\n]')
@@ -79,17 +83,7 @@ class Output:
             text = pc.if_else(special, _joined('"', pc.replace_substring(text, '"', '""'), '"'), text)
         return text
 
-    def _json_cell(self, name: str, column: pa.Array) -> pa.Array:
-        kind = column.type
-        if pa.types.is_dictionary(kind):
-            return self._json_cell(name, column.dictionary).take(column.indices)
-        text = self._text(name, column, '"rigid"')
-        if (pa.types.is_primitive(kind) and not pa.types.is_temporal(kind)) or pa.types.is_nested(kind):
-            return text
-        return pa.array([None if cell is None else json.dumps(cell) for cell in text.to_pylist()], pa.large_string())
-
-    def _text(self, name: str, column: pa.Array, rigid: str) -> pa.Array:
-        """A column as text, null where it is; lists and structures are JSON."""
+    def _text(self, name: str, column: pa.Array) -> pa.Array:
         kind = column.type
         if pa.types.is_nested(kind):
             texts = [None if value is None else json.dumps(value, default=str) for value in column.to_pylist()]
@@ -99,8 +93,9 @@ class Output:
         except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
             raise FilesError(f"the column {name!r} holds {kind}, which text cannot ({error})") from None
         if pa.types.is_floating(kind):
-            word = rigid if name == self.stiffness else None
-            text = pc.if_else(pc.is_finite(column), text, pc.if_else(pc.is_inf(column), word, None))
+            rigid = '"rigid"' if self.kind == "ndjson" else "rigid"
+            infinite = pc.if_else(pc.is_inf(column), rigid if name == self.stiffness else None, None)
+            text = pc.if_else(pc.is_finite(column), text, infinite)
         return text
 
 
@@ -120,7 +115,7 @@ def _bytes_of(lines: pa.Array) -> bytes:
 
 
 def write_parquet(path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
-    """One Parquet file of the pieces; doubles are plain, which is three times as fast and, mostly different, as small."""
+    """One Parquet file of the pieces; doubles are written plainly, which is three times as fast."""
     coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
     with pa.parquet.ParquetWriter(path, schema, use_dictionary=coded, compression="snappy") as writer:
         held: list[pa.RecordBatch] = []
