@@ -160,33 +160,25 @@ def test_a_german_file_is_recognised_and_read_with_the_options_that_are_named(tm
     assert rejects_of(out) == [(2, "mu0", "must be a number")]  # 0.3 may be meant for 03
 
 
-def test_a_file_with_tabs_and_a_file_with_points_are_recognised_too(tmp_path, capsys):
+def test_a_file_with_tabs_is_recognised_too(tmp_path, capsys):
     (tmp_path / "cases.csv").write_text(f"{HEADER}\n{GOOD}\n".replace(",", "\t"))
-    assert "--sep 'tab' --decimal '.'" in ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv")
-    ran(capsys, 0, tmp_path / "cases.csv", "-o", tmp_path / "out.csv", "--sep", "tab")
-    ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "o.csv", "--sep", "tab", "--decimal", ",")
-    assert "both ','" in ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv", "--decimal", ",")
+    words = [tmp_path / "cases.csv", "-o", tmp_path / "out.csv"]
+    assert "--sep 'tab' --decimal '.'" in ran(capsys, 1, *words)
+    assert "both ','" in ran(capsys, 1, *words, "--decimal", ",")
+    ran(capsys, 0, *words, "--sep", "tab")
 
 
 @pytest.mark.parametrize("kind", ["csv", "ndjson", "csv.gz", "parquet"])
 def test_standard_input_and_output(tmp_path, capfdbinary, monkeypatch, surrogate, kind):
-    source = write(cases(50), tmp_path / f"cases.{kind}")
-    wanted = tmp_path / ("out.ndjson" if kind == "ndjson" else "out.csv")
-    evaluate_files([source], wanted, surrogate)
+    bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
+    source, wanted = write(bad, tmp_path / f"cases.{kind}"), tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv")
+    rejects = evaluate_files([source], wanted, surrogate).rejects
     with source.open("rb") as stream:
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(stream))
         monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), write_through=True))
-        assert main(["eval", "-", "-o", "-"]) == 0
+        assert main(["eval", "-", "-o", "-"]) == 3
         assert sys.stdout.buffer.getvalue() == wanted.read_bytes()
-    assert b"50 of 50 rows" in capfdbinary.readouterr().err
-
-
-def test_rejected_rows_of_standard_output_are_listed_on_standard_error(tmp_path, capfd):
-    (tmp_path / "cases.csv").write_text(f"{HEADER}\n{GOOD}\n-{GOOD}\n")
-    assert main(["eval", str(tmp_path / "cases.csv"), "-o", "-"]) == 3
-    said = capfd.readouterr()
-    assert said.out.splitlines()[1].startswith(GOOD)
-    assert said.err.splitlines()[:2] == ["row,field,value,reason", "2,mu0,-0.3,must be finite and > 0"]
+    assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
 
 
 # --- rejects ------------------------------------------------------------------------------------------
@@ -282,10 +274,8 @@ def test_a_quote_that_is_not_closed_names_its_row(tmp_path, capsys, end, rows, b
 @pytest.mark.parametrize(
     ("content", "parts"),
     [
-        ("", ["is empty"]), ("a;b;c\n1;2;3\n", ["--sep ';' --decimal '.'"]), ("a,b\n1,2\n", ["no column mu0 [-]"]),
-        ("mu0,Fz,y0,omega,v0\n", ["no column k", "'Fz'", "--rigid"]), ("mu0,Fz,K,y0,omega,v0\n", ["'K' is similar"]),
-        ("mu0,Fz,k,y0,omega,v0,v0 [m/s]\n", ["v0 is there twice"]), (f"{HEADER},source\n", ["would be written twice"]),
-        ('"mu0,Fz\n', ["line 1 is no header"]), (f"{HEADER}\r{GOOD}", ["line 1 is no header"]),
+        ("", ["is empty"]), ("a;b;c\n1;2;3\n", ["--sep ';' --decimal '.'"]), ('"mu0,Fz\n', ["line 1 is no header"]),
+        ("mu0,Fz,y0,omega,v0\n", ["no column k", "'Fz'", "--rigid"]), (f"{HEADER}\r{GOOD}", ["line 1 is no header"]),
     ],
 )  # fmt: skip
 def test_a_file_that_holds_no_cases_is_refused_by_name(tmp_path, capsys, content, parts):
@@ -300,7 +290,6 @@ def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path, capsys):
     (tmp_path / "text.parquet").write_text("no parquet")
     (tmp_path / "cut.csv.gz").write_bytes(write(cases(5000), tmp_path / "whole.csv.gz").read_bytes()[:50_000])
     (tmp_path / "latin.csv").write_bytes(f"{HEADER},name\n{GOOD},µ\n".encode("latin-1"))
-    (tmp_path / "later.ndjson").write_text("".join(json.dumps({**CASE, **x}) + "\n" for x in [{}] * 300 + [{"x": 1}]))
     flipped = bytearray(good.read_bytes())
     flipped[2000:60_000:97] = bytes(byte ^ 255 for byte in flipped[2000:60_000:97])
     (tmp_path / "flipped.parquet").write_bytes(flipped)

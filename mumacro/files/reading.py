@@ -280,4 +280,4 @@ def _text(value: Any) -> str | None:
     if value is None or isinstance(value, str):
         return value
     # JSON has no infinity: this is a number of too many digits, which must not pass for a rigid contact
-    return "1e999" if value == math.inf else json.dumps(value)
+    return "1e999" if isinstance(value, float) and math.isinf(value) else json.dumps(value)
