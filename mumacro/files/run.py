@@ -1,8 +1,8 @@
 """A run over files of cases that can be killed at any moment: the same command goes on, and gives the same bytes.
 
 While it runs, ``OUT.parts`` holds ``answers``, to which pieces are appended, and ``notes``: a line for the plan (inputs
-with checksums, options, table), then a line for each piece with its size, its rejects, the place that follows it, and
-the checksum of all of that.  Pieces that fit their notes are kept; from the first that does not, all is done again.
+with checksums, options, table), then a line for each piece with its size and checksum, its rejects and the place that
+follows it, behind a checksum of the line.  Pieces that fit their notes are kept; what follows them is done again.
 ``OUT.run.json`` stays: it tells what the output was made of, so that the same command finds it complete.
 """
 
@@ -43,18 +43,19 @@ class Summary:
 
 
 class _Note(NamedTuple):
-    """What a piece leaves behind: bytes, rows and rejects up to its end, what follows, the lines of its own rejects."""
+    """What a piece leaves behind: its checksum, bytes and rows up to its end, what follows, the lines of its rejects."""
 
+    checksum: int = 0
     end: int = 0
     place: Sequence[int] | None = None
     rows: int = 0
     rejected: int = 0
     rejects: str = ""
 
-    def line(self, text: bytes) -> bytes:
-        """The note behind the checksum of the piece and of itself."""
+    def line(self) -> bytes:
+        """The note behind its own checksum."""
         body = json.dumps(self).encode()
-        return b"%08x %b\n" % (zlib.crc32(body, zlib.crc32(text)), body)
+        return b"%08x %b\n" % (zlib.crc32(body), body)
 
 
 def evaluate_files(
@@ -211,7 +212,7 @@ class _Run:
         size = len(self.first)
         with self.answers.open("rb") as answers:
             for note, line in self._noted():
-                if note.line(answers.read(note.end - last.end)) != line:
+                if zlib.crc32(answers.read(note.end - last.end)) != note.checksum:
                     break
                 last, size = note, size + len(line)
         damaged = size < self.notes.stat().st_size
@@ -222,26 +223,23 @@ class _Run:
         return last
 
     def _noted(self) -> Iterator[tuple[_Note, bytes]]:
-        """The notes and their lines, up to the first that is none."""
+        """The sound notes, and their lines."""
         with self.notes.open("rb") as notes:
             notes.readline()
             for line in notes:
-                try:
-                    note = _Note(*json.loads(line.partition(b" ")[2]))
-                except (ValueError, TypeError):
+                body = line[9:-1]
+                if line != b"%08x %b\n" % (zlib.crc32(body), body):
                     return
-                yield note, line
+                yield _Note(*json.loads(body)), line
 
     def _go_on(self, note: _Note, progress: Progress) -> _Note:
         # nothing is brought to the disk here: after a loss of power the checksums tell what is there
         with self.answers.open("ab", 0) as answers, self.notes.open("ab", 0) as notes:
             for piece in self.work.pieces(Place(*note.place) if note.place else None):
                 _write(answers, piece.text)
-                note = _Note(
-                    note.end + len(piece.text), piece.place, note.rows + piece.rows, note.rejected + piece.rejected,
-                    piece.rejects,
-                )  # fmt: skip
-                _write(notes, note.line(piece.text))
+                end, rows, rejected = note.end + len(piece.text), note.rows + piece.rows, note.rejected + piece.rejected
+                note = _Note(zlib.crc32(piece.text), end, piece.place, rows, rejected, piece.rejects)
+                _write(notes, note.line())
                 progress(piece.share, note.rows, note.rejected)
         return note
 
