@@ -55,7 +55,7 @@ class Data:
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _FFI.new("mumacro_data *")
         self._kept: list[Any] = []
-        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors of slopes (cells, 2) by code of the quantity
+        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
         self.border, self.pieces, self.blocks, self.outer = (
             self._keep(self.pointer, name, array)
@@ -162,6 +162,12 @@ class Kernel:
         of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
         self._found.border_scales(piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells)))
         return of_nodes, of_cells
+
+    def cell_shares(self, w: Array) -> tuple[Array, Array]:
+        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below the border, (n,)."""
+        inside, at_border = np.empty(w.size), np.empty(w.size)
+        self._found.cell_shares(w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border)))
+        return inside, at_border
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
         """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""

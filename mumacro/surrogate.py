@@ -206,7 +206,7 @@ class Surrogate:
         >>> round(mu, 6), bound < 1e-12, int(source)
         (0.942004, True, 5)
         """
-        return self._quantity("mu_ratio", v_tilde, y_tilde)
+        return self.quantity("mu_ratio", v_tilde, y_tilde)
 
     def v_tilde_crit(self, y_tilde: ArrayLike) -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
@@ -256,7 +256,7 @@ class Surrogate:
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
-        return self._quantity("power", v_tilde, y_tilde)[:2]
+        return self.quantity("power", v_tilde, y_tilde)[:2]
 
     def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
@@ -264,7 +264,7 @@ class Surrogate:
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
         """
-        return self._quantity("stick_fraction", v_tilde, y_tilde)[:2]
+        return self.quantity("stick_fraction", v_tilde, y_tilde)[:2]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
@@ -308,8 +308,19 @@ class Surrogate:
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
-    def _quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
-        """Value, bound and source."""
+    def quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+        """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
+
+        ``name`` is one of ``table.quantities``; the other arguments, shapes and errors are those of :meth:`mu_ratio`.
+
+        Examples
+        --------
+        >>> power, bound, source = Surrogate.open().quantity("power", 0.1, 0.5)
+        >>> round(power, 6), bound < 1e-12, int(source)
+        (0.012142, True, 5)
+        """
+        if name not in charts.QUANTITY_NAMES:
+            raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
         data = self._with(name)
         v, y, shape = _points(v_tilde, y_tilde)
         value, bound, source = batch.values(_CODES[name], data, v, y, self.threads)

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import ellipk, mpf, pi, workdps
+from mumacro.dimensional import group_columns
 
 from builder.steady import solve
 from comparing import close
 from mumacro import InputError, Surrogate, dimensional
-from mumacro.dimensional import group_columns
 from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, UNITS, as_columns, check_inputs
 
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-10.nc"

@@ -62,11 +62,11 @@ static mu_case mu_unusual_case(const mumacro_data *data, const mu_inputs *in) {
     }
     if (in->v0 == 0.0) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
     r = mu_amplitude_ratio(in);
-    if (r == 0.0) return mu_case_of(1.0, MU_ROUNDING, MU_RIGID, v, y);
+    if (r == 0.0) return mu_case_of(1.0, MU_RIGID_ROUNDING, MU_RIGID, v, y);
     if (r == HUGE_VAL) return mu_case_of(0.0, 3.0 * MU_DENORMAL, MU_RIGID, v, y); /* eq. (35) is 2.5e-306 there */
     mu = mu_outer_expansion(r).first;
     /* y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large */
-    return mu_case_of(mu, MU_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
+    return mu_case_of(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
 }
 
 /* d mu_macro / d input and the bounds, 12 numbers stride apart.  One-sided at the edges: d/dy0 = 0 at y0 = 0,

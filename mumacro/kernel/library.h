@@ -44,8 +44,8 @@ typedef struct {
 } mumacro_atlas;
 
 /* The cells of one quantity: polynomials (cells, 8, 8), powers of b's coordinate along rows, of a's along columns, both
- * from 7 down to 0; errors of the tabulated quantity (sources + 1, 2): relative to the factor, absolute; errors of its
- * slopes along ln v~ and ln y~ (cells, 2), per scale of a slope's bound. */
+ * from 7 down to 0; errors of the tabulated q (sources + 1, 2): relative to the factor, absolute; errors in every cell
+ * (cells, 3): of q, of its derivatives along a and along b, the largest where these have their share of it. */
 typedef struct {
     int64_t cells;
     const double *polynomials, *errors, *slope_errors;
@@ -57,7 +57,7 @@ typedef struct {
  * of large speed, in cells of ln(1 + y~^2/v~^2). */
 typedef struct {
     const double *border, *pieces, *blocks, *outer;
-    mumacro_cells quantities[4];
+    mumacro_cells quantities[8];
 } mumacro_data;
 
 /* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or written beyond n.  A
@@ -88,6 +88,8 @@ typedef struct {
                   double *factor);
     /* what node values of a piece of the border, and what its cells, are multiplied by to give v~crit */
     void (*border_scales)(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells);
+    /* the shares of a cell's largest error that its derivatives have at w, -1 to 1, and in the last cell below the border */
+    void (*cell_shares)(int64_t n, const double *w, double *inside, double *at_border);
     void (*normal_form_root)(int64_t n, const double *v, const double *eta, double *root);
     /* the two terms of large speed and their slopes, 5 rows of out */
     void (*outer_expansion)(int64_t n, const double *r, double *out);
