@@ -231,6 +231,18 @@ def test_without_packages_one_line_says_what_to_install(repository, module):
     assert re.fullmatch(r".*(\w+) is not installed: pip install 'mumacro.*", done.stderr.strip())
 
 
+@pytest.mark.parametrize("module", ["builder", "mumacro"])
+def test_without_the_compiled_kernel_one_line_says_what_to_do(repository, tmp_path, module):
+    for name in {"mumacro", module}:
+        shutil.copytree(repository / name, tmp_path / name, ignore=shutil.ignore_patterns("_kernel.*", "__pycache__"))
+    done = subprocess.run(
+        [sys.executable, "-m", module], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert re.fullmatch(r".*compiled kernel.* missing .* C compiler .* ziglang.*", done.stderr.strip())
+
+
 def test_a_missing_module_of_the_project_itself_is_not_explained_away():
     with pytest.raises(ModuleNotFoundError):
         missing("builder", ModuleNotFoundError("No module named 'builder.nothing'", name="builder.nothing"))
