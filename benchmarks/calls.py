@@ -6,9 +6,8 @@ import argparse
 import timeit
 from time import process_time
 
-from measuring import machine, markdown, progress, quantity, write_section
-
 import numpy as np
+from measuring import machine, markdown, progress, quantity, write_section
 from scipy.special import ellipk
 
 import mumacro

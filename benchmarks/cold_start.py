@@ -15,13 +15,14 @@ from measuring import ROOT, free_port, machine, markdown, progress, quantity, wr
 
 CASE = "mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5"
 OPEN = "import numpy as np, mumacro; s = mumacro.open(); "
+SOLVE = f"from mumacro.inverse import solve_for; solve_for(s, 'v0', 0.25, dict({CASE}))"
 COMMANDS = {
     "`import numpy`, for comparison": ["-c", "import numpy"],
     "`import mumacro`": ["-c", "import mumacro"],
     "one case, `s.evaluate(...)`": ["-c", OPEN + f"s.evaluate({CASE}, v0=0.01)"],
     "1,000 cases with gradients": ["-c", OPEN + f"s.evaluate({CASE}, v0=np.linspace(0.0, 1.0, 1000), gradient=True)"],
     "one power, `s.power(v, y)`": ["-c", OPEN + "s.power(0.1, 2.0)"],
-    "one root, `solve_for(...)`": ["-c", OPEN + f"from mumacro.inverse import solve_for as f; f(s, 'v0', 0.25, dict({CASE}))"],
+    "one root, `solve_for(...)`": ["-c", OPEN + SOLVE],
     "`mumacro 'mu0=0.3 ...'`, one case": ["-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 omega=1.3e5 v0=0.01"],
     "`python -m builder solve`": ["-m", "builder", "solve", "--v", "0.1", "--y", "2"],
 }  # fmt: skip
