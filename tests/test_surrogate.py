@@ -12,8 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from builder.assemble import ABS_TO_REL
+from builder.measure import SEAMS
+from builder.quantities import SOLVER_NOISE
 from builder.sweep import Sweep
-from builder.verify import SEAMS, SOLVER_NOISE
 from comparing import close
 from mumacro import Answer, InputError, Surrogate
 from mumacro.charts import NAMES, SIGMA_CUT, SOURCES, Y_STICK_HI, Y_STICK_LO

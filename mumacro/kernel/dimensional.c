@@ -94,7 +94,7 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
         const mu_slopes at = known ? *known : mu_slopes_at(data, MU_MU_RATIO, found->v, found->y);
         const double both = at.along_v + at.along_y, errors = at.bound_v + at.bound_y;
         slope[0] = found->mu - both;
-        error[0] = found->bound + errors;
+        error[0] = (found->source < MU_CHARTS ? mu_min(found->bound, at.bound) : found->bound) + errors;
         slope[1] = -mu0 * both / in->Fz;
         error[1] = mu0 * errors / in->Fz;
         slope[2] = mu0 * both / in->k;

@@ -88,8 +88,10 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     /* along y~ what is removed from the last cell also depends on the border's slope */
     ratio = turn.b_v != 0.0 ? reach / fabs(turn.b_v) : 1.0;
     out.bound_y = scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y, share_b * turn.b_y * ratio) + noise;
+    out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (at->block == MU_CORNER) {
         const double digit = 8.0 * MU_ROUNDING / (3.0 * at->phi * at->phi + 2.0 * (at->y - 1.0));
+        out.bound += digit * scale;
         out.bound_v += digit * (fabs(out.along_v) + scale);
         out.bound_y += digit * (fabs(out.along_y) + scale * fabs(form.factor_y));
     }
@@ -98,7 +100,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
 
 /* The slopes where the record knows the value in closed form, at the ends of v~ and y~. */
 static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
-    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     out.value = known.value;
     if (known.source == -1) out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
     else if (quantity == MU_MU_RATIO && known.source == MU_STATIC_LIMIT && y < 1.0) {
@@ -116,7 +118,7 @@ static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
  * infinite slope of a cube root in v~ (and a finite logarithmic one). */
 static mu_slopes mu_slopes_at(const mumacro_data *data, int quantity, double v, double y) {
     const mu_quantity *about = &MU_QUANTITY[quantity];
-    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_form form;
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {

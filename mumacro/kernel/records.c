@@ -70,6 +70,7 @@ static mu_slopes mu_ratio_fast_slopes(const mumacro_data *data, double v, double
     mu_slopes out;
     double bound;
     out.value = mu_fast_ratio(data->outer, v, y, &bound);
+    out.bound = HUGE_VAL;
     out.along_y = outer.first_slope + (outer.second_slope + 0.5 * outer.bend) / speed / speed;
     out.along_v = -(v / speed) * (v / speed) *
                   (out.along_y + (2.0 * outer.second + outer.first_slope) / speed / speed);
@@ -92,6 +93,7 @@ static mu_slopes mu_power_fast_slopes(const mumacro_data *data, double v, double
     mu_slopes out;
     (void)data;
     out.value = power.both;
+    out.bound = HUGE_VAL;
     out.along_v = power.both_v;
     out.along_y = power.both_y;
     out.bound_v = (2.0 * MU_POWER_ROUNDING + 8.0 * MU_NEXT_ORDER * small * small * small * small) * power.both +
@@ -106,7 +108,7 @@ static mu_answer mu_stick_fast(const mumacro_data *data, double v, double y) {
 }
 
 static mu_slopes mu_stick_fast_slopes(const mumacro_data *data, double v, double y) {
-    const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0};
+    const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     (void)data, (void)v, (void)y;
     return none;
 }
