@@ -1,6 +1,11 @@
-/* One instance of the FMU: six inputs and what follows from them.  Value references are written in modelDescription.xml:
- * 1 to 6 are the inputs; then mu_macro, mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source. */
+/* What FMI 2.0 and 3.0 share; MUMACRO_FMI is 2 or 3.  The model has no states, events, clocks or parameters, so most
+ * functions of the standards have nothing to do.
+ * Value references, as in modelDescription.xml: 0 is the time (3.0 only), 1 to 6 are the inputs; then come mu_macro and
+ * mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source. */
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "mumacro.h"
 
@@ -11,111 +16,232 @@
 #else
 #define EXPORT
 #endif
+#if defined __GNUC__
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* what a standard passes and this model has no use for */
+#endif
 
 enum { TIME, INPUTS = 6, MU_MACRO, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE };
+typedef enum { OK, WARNING, DISCARD, ERROR } Status;
+typedef const char *String;
+typedef uint32_t Reference;
+
+#if MUMACRO_FMI == 2
+typedef int Boolean;
+typedef void (*Logger)(void *environment, String instance, Status status, String category, String text, ...);
+#define FMI(name) fmi2##name
+#define STATE(before, after) fmi2##before##FMUstate##after
+#define DESERIALIZE fmi2DeSerializeFMUstate
+#define GET_NUMBERS fmi2GetReal
+#define SET_NUMBERS fmi2SetReal
+#define GET_WHOLES fmi2GetInteger
+#define SIZE(name) /* 3.0 gives the length of arrays of values, too */
+#define SHORTER(name, n) 0
+#else
+typedef bool Boolean;
+typedef void (*Logger)(void *environment, Status status, String category, String text);
+#define FMI(name) fmi3##name
+#define STATE(before, after) fmi3##before##FMUState##after
+#define DESERIALIZE fmi3DeserializeFMUState
+#define GET_NUMBERS fmi3GetFloat64
+#define SET_NUMBERS fmi3SetFloat64
+#define GET_WHOLES fmi3GetInt32
+#define SIZE(name) , size_t name
+#define SHORTER(name, n) (name < n)
+#endif
 
 typedef struct {
-    double time, x[6];
+    double time, x[INPUTS];
     int known; /* whether answer belongs to x */
     mumacro_answer answer;
 } State;
 
 typedef struct {
     State state;
-    void (*log)(void *instance, const char *name, const char *text);
-    void (*logger)(void); /* the simulator's, of the type that its standard has */
+    Logger logger;
     void *environment;
-    char *name;
+    char name[];
 } Instance;
 
-static const double STARTS[6] = MUMACRO_FMU_STARTS;
+#define ME Instance *m
+#define AT const Reference at[], size_t n
+#define NONE (n ? ERROR : OK) /* there are no variables of this kind */
+#define RETURNS(result, name, ...) \
+    EXPORT Status FMI(name)(__VA_ARGS__) { return result; }
 
-static void reset(Instance *m) {
-    memset(&m->state, 0, sizeof m->state);
-    memcpy(m->state.x, STARTS, sizeof STARTS);
+/* --- the model ------------------------------------------------------------------------------------------------ */
+
+static void say(Logger logger, void *environment, String name, Status status, String text) {
+    const String category = status == ERROR ? "logStatusError" : "logStatusDiscard";
+    if (logger == NULL) return;
+#if MUMACRO_FMI == 2
+    logger(environment, name, status, category, "%s", text);
+#else
+    logger(environment, status, category, text);
+#endif
 }
 
-static Instance *make(const char *name) {
-    Instance *m = (Instance *)calloc(1, sizeof *m);
-    if (m == NULL) return NULL;
-    m->name = (char *)calloc(1, strlen(name ? name : "") + 1);
-    if (m->name == NULL) {
-        free(m);
+/* OK when the inputs are legal; else DISCARD, and the log says which is not. */
+static Status answered(ME) {
+    const double *x = m->state.x;
+    if (!m->state.known) {
+        const int error = mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], &m->state.answer);
+        m->state.known = error == 0;
+        if (error) say(m->logger, m->environment, m->name, DISCARD, mumacro_error_text(error));
+    }
+    return m->state.known ? OK : DISCARD;
+}
+
+static Status get_number(ME, Reference variable, double *value) {
+    const mumacro_answer *a = &m->state.answer;
+    if ((MUMACRO_FMI == 2 && variable == TIME) || variable > Y_TILDE) return ERROR;
+    if (variable == TIME) {
+        *value = m->state.time;
+    } else if (variable <= INPUTS) {
+        *value = m->state.x[variable - 1];
+    } else {
+        const Status status = answered(m);
+        const double found[] = {a->mu_macro, a->mu_ratio, a->error_bound, a->v_tilde, a->y_tilde};
+        if (status != OK) return status;
+        *value = found[variable - MU_MACRO];
+    }
+    return OK;
+}
+
+static Status get_whole(ME, Reference variable, int32_t *value) {
+    if (variable != REGIME && variable != SOURCE) return ERROR;
+    if (answered(m) != OK) return DISCARD;
+    *value = variable == REGIME ? m->state.answer.regime : m->state.answer.source;
+    return OK;
+}
+
+static Status set_number(ME, Reference variable, double value) {
+    if (variable <= TIME || variable > INPUTS) return ERROR;
+    m->state.x[variable - 1] = value;
+    m->state.known = 0;
+    return OK;
+}
+
+/* Adds seed times d output / d input. */
+static Status add_slope(ME, Reference output, Reference input, double seed, double *sum) {
+    const mumacro_answer *a = &m->state.answer;
+    double slope;
+    if ((output != MU_MACRO && output != MU_RATIO) || input <= TIME || input > INPUTS) return ERROR;
+    if (answered(m) != OK) return DISCARD;
+    slope = a->gradient[input - 1];
+    if (output == MU_RATIO) slope = (slope - (input == 1 ? a->mu_ratio : 0.0)) / m->state.x[0];
+    if (seed != 0.0) *sum += seed * slope;
+    return OK;
+}
+
+/* --- an instance ---------------------------------------------------------------------------------------------- */
+
+EXPORT Status FMI(Reset)(ME) {
+    static const double STARTS[INPUTS] = MUMACRO_FMU_STARTS;
+    memset(&m->state, 0, sizeof m->state);
+    memcpy(m->state.x, STARTS, sizeof STARTS);
+    return OK;
+}
+
+static Instance *instantiate(String name, String token, Logger logger, void *environment) {
+    Instance *m;
+    if (name == NULL) name = "";
+    if (token == NULL || strcmp(token, MUMACRO_CHECKSUM) != 0) {
+        say(logger, environment, name, ERROR, "this token (2.0: guid) is that of another FMU");
         return NULL;
     }
-    strcpy(m->name, name ? name : "");
-    reset(m);
+    m = (Instance *)calloc(1, sizeof *m + strlen(name) + 1);
+    if (m == NULL) return NULL;
+    strcpy(m->name, name);
+    m->logger = logger;
+    m->environment = environment;
+    FMI(Reset)(m);
     return m;
 }
 
-static void drop(Instance *m) {
-    if (m != NULL) free(m->name);
-    free(m);
+EXPORT void FMI(FreeInstance)(ME) { free(m); }
+
+static Status keep(void **kept, const void *state) {
+    if (*kept == NULL) *kept = malloc(sizeof(State));
+    if (*kept == NULL) return ERROR;
+    memcpy(*kept, state, sizeof(State));
+    return OK;
 }
 
-/* 1 when the inputs are legal; says which is not. */
-static int answered(Instance *m) {
-    const double *x = m->state.x;
-    int error;
-    if (m->state.known) return 1;
-    error = mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], &m->state.answer);
-    m->state.known = error == 0;
-    if (error && m->log) m->log(m, m->name, mumacro_error_text(error));
-    return m->state.known;
+EXPORT Status STATE(Get, )(ME, void **kept) { return keep(kept, &m->state); }
+
+EXPORT Status STATE(Set, )(ME, const void *kept) {
+    memcpy(&m->state, kept, sizeof(State));
+    return OK;
 }
 
-/* 2: no such variable, 1: an input is illegal, 0: done. */
-static int get_number(Instance *m, unsigned variable, double *value) {
-    const mumacro_answer *a = &m->state.answer;
-    if (variable == TIME || variable > Y_TILDE) {
-        *value = m->state.time;
-        return variable == TIME ? 0 : 2;
+EXPORT Status STATE(Free, )(ME, void **kept) {
+    free(*kept);
+    *kept = NULL;
+    return OK;
+}
+
+EXPORT Status STATE(Serialized, Size)(ME, void *kept, size_t *size) {
+    *size = sizeof(State);
+    return OK;
+}
+
+EXPORT Status STATE(Serialize, )(ME, const void *kept, void *bytes, size_t size) {
+    if (size < sizeof(State)) return ERROR;
+    memcpy(bytes, kept, sizeof(State));
+    return OK;
+}
+
+EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **kept) {
+    return size < sizeof(State) ? ERROR : keep(kept, bytes);
+}
+
+/* --- values and time ------------------------------------------------------------------------------------------ */
+
+#define EACH(i, n, call) \
+    for (size_t i = 0; i < n; ++i) { \
+        const Status status = call; \
+        if (status != OK) return status; \
     }
-    if (variable <= INPUTS) {
-        *value = m->state.x[variable - 1];
-        return 0;
+#define FOR_ALL(name, type, call) \
+    EXPORT Status name(ME, AT, type value[] SIZE(values)) { \
+        if (SHORTER(values, n)) return ERROR; \
+        EACH(i, n, call) \
+        return OK; \
     }
-    if (!answered(m)) return 1;
-    *value = variable == MU_MACRO      ? a->mu_macro
-             : variable == MU_RATIO    ? a->mu_ratio
-             : variable == ERROR_BOUND ? a->error_bound
-             : variable == V_TILDE     ? a->v_tilde
-                                       : a->y_tilde;
-    return 0;
+FOR_ALL(GET_NUMBERS, double, get_number(m, at[i], value + i))
+FOR_ALL(SET_NUMBERS, const double, set_number(m, at[i], value[i]))
+FOR_ALL(GET_WHOLES, int32_t, get_whole(m, at[i], value + i))
+
+EXPORT Status FMI(GetDirectionalDerivative)(ME, const Reference unknowns[], size_t n, const Reference knowns[],
+                                            size_t k, const double seeds[] SIZE(seeded), double out[] SIZE(outs)) {
+    if (SHORTER(seeded, k) || SHORTER(outs, n)) return ERROR;
+    memset(out, 0, n * sizeof *out);
+    for (size_t i = 0; i < n; ++i) EACH(j, k, add_slope(m, unknowns[i], knowns[j], seeds[j], out + i))
+    return OK;
 }
 
-static int get_whole(Instance *m, unsigned variable, int *value) {
-    if (variable != REGIME && variable != SOURCE) return 2;
-    if (!answered(m)) return 1;
-    *value = variable == REGIME ? m->state.answer.regime : m->state.answer.source;
-    return 0;
+EXPORT Status FMI(SetTime)(ME, double time) {
+    m->state.time = time;
+    return OK;
 }
 
-static int set_number(Instance *m, unsigned variable, double value) {
-    if (variable < 1 || variable > INPUTS) return 2;
-    m->state.x[variable - 1] = value;
-    m->state.known = 0;
-    return 0;
-}
+/* --- functions that have nothing to do, in both standards ----------------------------------------------------- */
 
-/* d output / d input. */
-static int slope(Instance *m, unsigned output, unsigned input, double *value) {
-    const mumacro_answer *a = &m->state.answer;
-    if ((output != MU_MACRO && output != MU_RATIO) || input < 1 || input > INPUTS) return 2;
-    if (!answered(m)) return 1;
-    *value = a->gradient[input - 1];
-    if (output == MU_RATIO) *value = (*value - (input == 1 ? a->mu_ratio : 0.0)) / m->state.x[0];
-    return 0;
-}
+RETURNS(OK, SetDebugLogging, ME, Boolean on, size_t n, const String names[])
+RETURNS(OK, ExitInitializationMode, ME)
+RETURNS(OK, EnterEventMode, ME)
+RETURNS(OK, EnterContinuousTimeMode, ME)
+RETURNS(OK, Terminate, ME)
+RETURNS(NONE, GetBoolean, ME, AT, Boolean value[] SIZE(values))
+RETURNS(NONE, SetBoolean, ME, AT, const Boolean value[] SIZE(values))
+RETURNS(NONE, GetString, ME, AT, String value[] SIZE(values))
+RETURNS(NONE, SetString, ME, AT, const String value[] SIZE(values))
+RETURNS(NONE, SetContinuousStates, ME, const double x[], size_t n)
+RETURNS(NONE, GetContinuousStates, ME, double x[], size_t n)
+RETURNS(NONE, GetEventIndicators, ME, double x[], size_t n)
+RETURNS(NONE, GetNominalsOfContinuousStates, ME, double x[], size_t n)
 
-/* sum over inputs of d output / d input times their seeds */
-static int along(Instance *m, unsigned output, const unsigned *inputs, size_t n, const double *seeds, double *value) {
-    *value = 0.0;
-    for (size_t i = 0; i < n; ++i) {
-        double one;
-        const int error = slope(m, output, inputs[i], &one);
-        if (error) return error;
-        if (seeds[i] != 0.0) *value += one * seeds[i];
-    }
-    return 0;
+EXPORT Status FMI(CompletedIntegratorStep)(ME, Boolean fixed, Boolean *event, Boolean *terminate) {
+    *event = *terminate = 0;
+    return OK;
 }
