@@ -23,7 +23,7 @@ __all__ = ["WasmError", "compiler", "write_wasm"]
 
 _HERE = Path(__file__).parent
 _OPTIONS = (
-    "-O2", "-std=c99", "-ffreestanding", "-nostdlib", "-fno-math-errno", "-ffp-contract=off", "-mbulk-memory",
+    "-Oz", "-std=c99", "-ffreestanding", "-nostdlib", "-fno-math-errno", "-ffp-contract=off", "-mbulk-memory",
     "-isystem", str(_HERE / "include"), "-Wl,--no-entry", "-Wl,--strip-all", "-Wl,-z,stack-size=262144",
 )  # fmt: skip
 
