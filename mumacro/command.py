@@ -121,10 +121,7 @@ def _check_names(case: dict[str, float], without: str | None) -> None:
 
 
 def open_table(which: str | None) -> Surrogate:
-    """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled one.
-
-    A first use compiles the kernels, which is reported on stderr.
-    """
+    """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled one."""
     try:
         return Surrogate.open(None if which is None else float(which))
     except ValueError:

@@ -43,7 +43,7 @@ class Summary:
 
 
 class _Note(NamedTuple):
-    """What a piece leaves behind: its checksum, bytes and rows up to its end, what follows, the lines of its rejects."""
+    """What a piece leaves: its checksum, bytes and rows up to its end, what follows, the lines of its rejects."""
 
     checksum: int = 0
     end: int = 0

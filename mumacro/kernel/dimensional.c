@@ -200,7 +200,7 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
 static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
                      double *out, int64_t stride, int8_t *source) {
     for (int64_t start = 0; start < n; start += MU_CHUNK) {
-        const int few = (int)(n - start < MU_CHUNK ? n - start : MU_CHUNK);
+        const int few = mu_few(n - start);
         const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;
         double in[6][MU_CHUNK];
         for (int i = 0; i < 6; ++i) {
