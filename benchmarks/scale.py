@@ -185,34 +185,29 @@ def report(
     builds: dict[str, tuple[float, int, str]], tolerance: float,
 ) -> str:  # fmt: skip
     """The section of docs/scale.md."""
-    rows = [
-        [name, f"{n:.0e}", quantity(1e9 * times[n] / n), quantity(memory[name])]
-        for name, times in busy.items()
-        for n in sizes
-    ]
+    n = sizes[-1]
+    rows = [[name, quantity(1e9 * times[n] / n), quantity(memory[name])] for name, times in busy.items()]
     fixed, each = fit(sizes, busy["2 worker processes"])
     core_hours = PLAN * each / 3600.0
     stored = PLAN * 8 / 1e12
     plan = [
         ["work of one core", f"{quantity(core_hours)} core hours"],
         [f"{CORES} workers of one thread, each with a core of its own", f"{quantity(60 * core_hours / CORES)} min"],
-        ["tasks of Dask, about twelve a chunk", quantity(12 * PLAN / 2**20)],
-        ["chunks of 2^20 cases", f"{quantity(PLAN / 2**20)}"],
         ["mu_macro alone, if it were stored as doubles", f"{quantity(stored)} TB"],
         ["the six inputs beside it", f"{quantity(6 * stored)} TB"],
-        ["result of the reductions, 1000 bins", "10 kB"],
     ]
     same = len({digest for _, _, digest in builds.values()}) == 1
     built_rows = [[name, quantity(spent), f"{solves:,}", digest] for name, (spent, solves, digest) in builds.items()]
     return "\n\n".join(
         [
             machine(*PACKAGES),
-            "Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes and a "
-            "histogram in one pass, in chunks of 2^20. Processor time is that of all processes; memory is that of the "
-            "largest process so far.",
-            markdown(["run", "cases", "processor ns a case", "peak MB"], rows, 2),
-            f"Cost model, least squares of two worker processes: {quantity(fixed)} s + {quantity(1e9 * each)} ns a "
-            "case. Between processes only the reduced numbers are sent, 8 kB a chunk for the histogram.",
+            f"{n:.0e} Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes "
+            "and a histogram in one pass, in chunks of 2^20. Processor time is that of all processes; memory is that "
+            "of the largest process so far.",
+            markdown(["run", "processor ns a case", "peak MB"], rows, 1),
+            f"Cost model, least squares of two worker processes from {sizes[0]:.0e} cases on: {quantity(fixed)} s + "
+            f"{quantity(1e9 * each)} ns a case. Between processes only the reduced numbers are sent, 8 kB a chunk for "
+            "the histogram.",
             f"On one thread, making the six inputs is {quantity(parts['make'])} ns a case, answering "
             f"{quantity(parts['answer'])} ns; the rest is the reductions and Dask.",
             f"For {PLAN:.0e} cases the model gives:",
