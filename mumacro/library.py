@@ -149,6 +149,13 @@ class Kernel:
         self._found.border(data.pointer, y.size, _numbers(y), _numbers(out))
         return out
 
+    def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
+        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them."""
+        block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
+        codes = _FFI.from_buffer(_CODES, block)
+        self._found.places(data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b))
+        return block, a, b
+
     # --- for the builder ------------------------------------------------------------------------------
 
     def forms(self, quantity: int, block: int, v: Array, y: Array, eta: Array) -> tuple[Array, Array]:
