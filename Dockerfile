@@ -1,4 +1,5 @@
-# The service and the packages that it needs: no solver, no tests, no compiler, no pip.
+# The service and the packages that it needs: no solver, no tests, no compiler, no pip.  The build stage compiles the
+# kernel with its own compiler, or with zig, which runs on every image.
 #
 #   docker build -t mumacro .
 #   docker run --read-only --cap-drop=all -p 127.0.0.1:8000:8000 mumacro
@@ -13,21 +14,21 @@ FROM ${BUILD_BASE} AS build
 WORKDIR /app
 # A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and because it is
 # copied to the next stage as one folder.
-RUN python3 -m venv venv
-COPY requirements/service.txt requirements/
+RUN python3 -m venv venv && python3 -m venv /build/venv
+COPY requirements/service.txt requirements/build.txt requirements/zig.txt /build/
 # A network with its own certificate authority or package index passes them as the two secrets.  They are
 # optional, and neither is stored in a layer.
 RUN --mount=type=secret,id=pip.conf,target=/etc/pip.conf \
     --mount=type=secret,id=ca.pem,target=/etc/pip-ca.pem \
-    venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes \
-        -r requirements/service.txt
+    venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r /build/service.txt \
+    && /build/venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes \
+        -r /build/build.txt -r /build/zig.txt
 # The tests of other projects are a tenth of the environment.
 RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' -prune -exec rm -rf {} + \
 # Sources and headers for compilers, and stubs for type checkers.
     && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' -o -name '*.p[xy][xdi]' \) -delete \
-# Compilers that nothing here calls: for graphics processors, Fortran and C extensions.
-    && rm -rf venv/lib/python3*/site-packages/numba/cuda venv/lib/python3*/site-packages/numpy/f2py \
-        venv/lib/python3*/site-packages/numpy/distutils \
+# Builders of Fortran and C extensions, which nothing here calls.
+    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/lib/python3*/site-packages/numpy/distutils \
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after linking.
     && if command -v strip >/dev/null; then \
         find venv -name '*.so' -not -path '*.libs/*' -exec strip --strip-unneeded {} +; fi \
@@ -37,17 +38,13 @@ COPY LICENSE ./
 COPY mumacro mumacro
 COPY service service
 COPY tables tables
-# The kernels are compiled here, once.  A file of compiled code is named after the processor, so they are
-# compiled for the baseline of the architecture: the image also runs on other machines than the one that built it.
-# Every user of the container may read all files here, whatever the umask of the checkout; no user may write them.
-# Measured on one core, a million points, against code for the building machine's own processor: 25 % slower for
-# dimensionless points, 3 % for dimensional ones.
-ENV NUMBA_CPU_NAME=generic \
-    NUMBA_CACHE_DIR=/app/cache \
-    PYTHONPATH=/app
-RUN venv/bin/python -m compileall -q mumacro service \
-    && venv/bin/python -m service warm --tables tables \
-    && test -n "$(find cache -name '*.kernel' -print -quit)" \
+COPY hatch_build.py pyproject.toml /build/
+COPY mumacro/kernel /build/mumacro/kernel
+# The kernel holds code for several processors and chooses when it is loaded: the image also runs on other machines than
+# the one that built it.  Every user of the container may read all files, whatever the umask of the checkout; no user
+# may write them.
+RUN /build/venv/bin/python /build/hatch_build.py mumacro \
+    && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 
 FROM ${BASE}
@@ -63,8 +60,6 @@ ENV PATH=/app/venv/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/nonexistent \
-    NUMBA_CPU_NAME=generic \
-    NUMBA_CACHE_DIR=/app/cache \
     MUMACRO_HOST=0.0.0.0
 # A number, not a name: Kubernetes can then check runAsNonRoot, and no entry in /etc/passwd is needed.
 USER 10001:10001

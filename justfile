@@ -27,6 +27,10 @@ fix:
 serve *ARGS:
     {{python}} dev.py serve {{ARGS}}
 
+# What is published: the wheel of every platform and the source distribution, in dist
+wheels:
+    {{python}} dev.py wheels
+
 # The page as a folder for any static host: it computes in the browser
 page:
     {{python}} dev.py page

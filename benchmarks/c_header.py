@@ -25,13 +25,13 @@ from typing import Any
 
 import measuring
 import numpy as np
+from mumacro.evaluate import answer, common_ratio
+from mumacro.kernel_cache import kernel
 from numpy.typing import NDArray
 
 from builder.export import export_table
 from mumacro import Surrogate
 from mumacro.charts import CORNER, FAST, MU, OTHER
-from mumacro.evaluate import answer, common_ratio
-from mumacro.kernel_cache import kernel
 
 Array = NDArray[np.float64]
 DRIVER = measuring.ROOT / "tests" / "c" / "driver.c"

@@ -1,12 +1,36 @@
-"""How the solver's kernels are compiled: without fused multiply-add, and stored beside a digest of these sources."""
+"""How the solver is compiled, and the digest of everything that its results depend on."""
 
 from __future__ import annotations
 
+import hashlib
+import platform
 from pathlib import Path
 
-from mumacro.kernel_cache import kernel
+import llvmlite
+import numba
 
-__all__ = ["SOURCES", "solver_kernel"]
+import mumacro
 
-SOURCES = Path(__file__).resolve().parent
-solver_kernel = kernel(fuse=False, beside=SOURCES)
+__all__ = ["solver_kernel", "source_digest"]
+
+#: Compiles a function at its first call in a process; it runs without the interpreter's lock and without fused
+#: multiply-add.  Nothing is stored: see docs/decisions/0020-compiling-the-solver.md.
+solver_kernel = numba.njit(error_model="numpy", nogil=True)
+
+_LIBRARY = Path(mumacro.__file__).resolve().parent
+SOURCES = (
+    (Path(__file__).resolve().parent, "*.py"),
+    (_LIBRARY, "*.py"),
+    (_LIBRARY / "kernel", "*.[ch]"),
+)
+
+
+def source_digest() -> str:
+    """Digest of the sources of builder and evaluation and of the compiler: where it differs, numbers may differ."""
+    compiler = (numba.__version__, llvmlite.__version__, platform.python_version(), platform.machine())
+    h = hashlib.sha256(repr(compiler).encode())
+    for folder, pattern in SOURCES:
+        for source in sorted(folder.glob(pattern)):
+            h.update(source.name.encode())
+            h.update(source.read_bytes())
+    return h.hexdigest()[:16]

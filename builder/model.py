@@ -14,7 +14,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from . import series
 from .compiled import solver_kernel
@@ -50,7 +49,7 @@ def rechart(x: float, chart: int, target: int) -> float:
     return x + (chart - target) * (0.5 * math.pi)
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _standstill(w: np.ndarray, h: float, out: np.ndarray) -> float:
     """Time [rad] within the step ``h`` at which lam falls below zero, -1 if it does not; follows the smallest lam.
 
@@ -80,7 +79,7 @@ def _standstill(w: np.ndarray, h: float, out: np.ndarray) -> float:
     return stop
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _add_integrals(y: float, chart: int, h: float, excess: bool, w: np.ndarray, out: np.ndarray) -> None:
     """Integrals over a Taylor step of length ``h`` [rad] into ``out``; EXCESS only if ``excess``."""
     if chart == 0:
@@ -98,7 +97,7 @@ def _add_integrals(y: float, chart: int, h: float, excess: bool, w: np.ndarray, 
     out[PATH] += series.integral(w[series.SPEED], h)
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _stiff_length(sigma: float, ratio: float, left: float) -> float:
     """Length of a collocation step [rad] from ``sigma``: the turn's layer is ``ratio`` = v~/y~ [rad] wide."""
     gap = math.hypot(sigma, ratio) if ratio < 1.0 else 1.0

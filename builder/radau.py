@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
@@ -74,7 +73,7 @@ def _solve_in_place(a: np.ndarray, b: np.ndarray) -> None:
         b[k] /= a[k, k]
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _direction(x: float, chart: int) -> tuple[float, float, float]:
     """u_x, u_y and 1 - u_x [-] of the local angle ``x`` [rad] in ``chart``."""
     s, c = math.sin(x), math.cos(x)

@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from . import model
 from .compiled import solver_kernel
@@ -38,7 +37,7 @@ def border_guess(y: float) -> float:
     return 1.0 / (2.0 / (y * y) + 1.0 / (BORDER_SLOPE * math.sqrt(y)))
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _angle_section(
     v: float, y: float, eta: float, x0: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> tuple[float, int]:
@@ -79,7 +78,7 @@ def _angle_section(
     return (x_end + x0 if chart == 1 else x_end - x0), status
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _time_section(
     v: float, y: float, eta: float, s1: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> tuple[float, int]:
@@ -132,7 +131,7 @@ def _time_section(
     return 2.0 * b - out[model.TURNED], status
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def section(
     kind: int, v: float, y: float, eta: float, z: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> tuple[float, int]:
@@ -145,7 +144,7 @@ def section(
     return -r, status
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, float]:
     """Section, chart and first guess of its unknown z [rad] from the limits; ``hint`` = th0 if known, else NaN."""
     ratio = v / border_guess(y)
@@ -167,7 +166,7 @@ def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, floa
     return ANGLE_SECTION, chart, min(math.atan(v / y) + (phi if eta < 0.5 else v / y), 0.7)
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _edge(v: float, y: float) -> float:
     """Angle th0 [rad] below which no stick starts: lam = 0 = lam' there, (v / sin th)^2 = y sin th cos sigma0."""
     a, b = math.atan(v / y), 0.5 * math.pi

@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from .compiled import solver_kernel
 
 SCAN = 24  # samples of half a period
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _sinc(a: float) -> float:
     """sin a / a."""
     return 1.0 - a * a / 6.0 if abs(a) < 1e-4 else math.sin(a) / a
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _third(d: float) -> float:
     """(d - sin d) / d^2."""
     if d < 0.3:
@@ -85,7 +83,7 @@ def _chandrupatla(
     return x1
 
 
-@njit(inline="always", error_model="numpy")
+@solver_kernel
 def _reached(v: float, y: float, eta: float, x0: float, chart: int, s0: float) -> tuple[float, float]:
     """Two times since the onset of stick [rad], |u| < 1 at the first, > 1 at the second; (0, -1) if it stays below."""
     lo, best, best_d = 0.0, -math.inf, 0.0

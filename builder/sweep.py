@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.errors import MumacroError
-from mumacro.kernel_cache import source_digest
 from mumacro.writing import write_whole
 
 from . import steady
-from .compiled import SOURCES, solver_kernel
+from .compiled import solver_kernel, source_digest
+from .limits import check_range
 from .model import OK
 
 __all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep", "solve_chunk"]
@@ -123,11 +123,14 @@ class Sweep:
 
         Raises
         ------
+        InputError
+            A point outside the solver's range, :mod:`.limits`.
         SolveError
             When any point fails: a table must have no missing node.
         """
         v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
-        eta = y - 1.0 if eta is None else np.broadcast_to(eta, y.shape)
+        eta = y - 1.0 if eta is None else np.broadcast_to(np.asarray(eta, dtype=np.float64), y.shape)
+        check_range(v, y, eta)
         points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
         out = self._load(kind, points)
         if out is None:
@@ -154,7 +157,7 @@ class Sweep:
             return None
         # the digest of the sources: results of another version of the solver are not reused
         digest = hashlib.sha256(
-            (source_digest(SOURCES) + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
+            (source_digest() + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
         ).hexdigest()
         return self.checkpoint / f"{kind}-{digest[:32]}.npy"
 

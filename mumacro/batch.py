@@ -12,9 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.charts import MU
 from mumacro.library import Data, kernels
 
-__all__ = ["cases", "share_out", "slopes", "values"]
+__all__ = ["cases", "ratios", "share_out", "slopes", "values"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -39,20 +40,22 @@ def share_out(n: int, threads: int, work: Callable[[slice], None]) -> None:
             pass
 
 
-def values(
-    quantity: int, data: Data, v: Array, y: Array, threads: int, details: bool = True
-) -> tuple[Array, Array | None, Codes | None]:
-    """A quantity at (n,) points, and with ``details`` its bound and source; NaN and -1 where illegal."""
-    n = v.size
-    value = np.empty(n)
-    bound, source = (np.empty(n), np.empty(n, np.int8)) if details else (None, None)
+def values(quantity: int, data: Data, v: Array, y: Array, threads: int) -> tuple[Array, Array, Codes]:
+    """A quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
+    value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
 
     def work(part: slice) -> None:
-        wanted = None if bound is None else bound[part], None if source is None else source[part]
-        _KERNEL.values(data, quantity, v[part], y[part], value[part], *wanted)
+        _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part])
 
-    share_out(n, threads, work)
+    share_out(v.size, threads, work)
     return value, bound, source
+
+
+def ratios(data: Data, v: Array, y: Array, threads: int) -> Array:
+    """mu~ alone at (n,) points; NaN where illegal."""
+    mu = np.empty(v.size)
+    share_out(v.size, threads, lambda part: _KERNEL.values(data, MU, v[part], y[part], mu[part], None, None))
+    return mu
 
 
 def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
@@ -62,22 +65,13 @@ def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array
     return rows
 
 
-def cases(
-    data: Data, columns: Sequence[Array], n: int, threads: int, groups: bool, gradient: bool
-) -> tuple[Array, Array, Array, Codes, tuple[Array, Array] | None, Array | None]:
-    """mu_macro, mu~, the bound of mu_macro, the source; v~ and y~; slopes and their bounds (12, n), where wanted.
-
-    ``columns`` are the six inputs, (n,) or (1,).
-    """
-    macro, mu, bound, source = np.empty(n), np.empty(n), np.empty(n), np.empty(n, np.int8)
-    both = (np.empty(n), np.empty(n)) if groups else None
-    slopes = np.empty((12, n)) if gradient else None
+def cases(data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int) -> tuple[Array, Codes]:
+    """Answers to n cases, see :meth:`mumacro.library.Kernel.cases`: rows (3, 5 or 17, n), and sources (n,)."""
+    out, source = np.empty((rows, n)), np.empty(n, np.int8)
 
     def work(part: slice) -> None:
-        six = [column[part] if column.size == n else column for column in columns]
-        part_groups = (both[0][part], both[1][part]) if both else None
-        answers = macro[part], mu[part], bound[part], source[part]
-        _KERNEL.cases(data, part.stop - part.start, six, *answers, part_groups, slopes, part.start)
+        six = columns if part.stop - part.start == n else [c if isinstance(c, float) else c[part] for c in columns]
+        _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start)
 
     share_out(n, threads, work)
-    return macro, mu, bound, source, both, slopes
+    return out, source

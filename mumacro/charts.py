@@ -132,6 +132,10 @@ class Chart:
             v = border_of(y) * np.sin(0.5 * math.pi * b) ** 2
         return v, y, y - 1.0
 
+    def holds(self, quantity: Quantity) -> bool:
+        """Whether the block tabulates a quantity; elsewhere it is zero."""
+        return self.regime != CONTINUOUS or quantity.while_sliding
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -152,8 +156,8 @@ def _axis(found: Any) -> Axis:
 
 
 def _quantity(found: Any) -> Quantity:
-    texts = (_text(text) for text in (found.name, found.variable, found.meaning))
-    return Quantity(*texts, bool(found.while_sliding), bool(found.smooth_at_border))
+    name, variable, meaning = map(_text, (found.name, found.variable, found.meaning))
+    return Quantity(name, variable, meaning, bool(found.while_sliding), bool(found.smooth_at_border))
 
 
 #: a block's place in this list is the source code of its values
@@ -168,7 +172,7 @@ BORDER_PIECES = tuple(
 )
 QUANTITIES = tuple(_quantity(kernels[-1].quantity(i)) for i in range(_ATLAS.quantities))
 QUANTITY_NAMES = tuple(quantity.name for quantity in QUANTITIES)
-MU = 0
+MU, POWER, STICK = map(QUANTITY_NAMES.index, ("mu_ratio", "power", "stick_fraction"))
 #: where an answer comes from: a block, or a limit in closed form
 SOURCES = tuple(_text(_ATLAS.source_name[i]) for i in range(_ATLAS.sources))
 #: regime code of every source code

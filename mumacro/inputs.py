@@ -270,9 +270,10 @@ def _rigid_as_infinity(value: Any) -> Any:
     """A stiffness, or an array of them, with infinity for the word ``rigid``."""
     if isinstance(value, str):
         return math.inf if is_rigid(value) else value
-    if isinstance(value, dict) or not np.iterable(value):
+    if not isinstance(value, (list, tuple)) and getattr(getattr(value, "dtype", None), "kind", "") not in ("O", "U"):
         return value
-    return [math.inf if isinstance(x, str) and is_rigid(x) else x for x in value]
+    texts = np.asarray(value, dtype=object)
+    return np.array([math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]).reshape(texts.shape)
 
 
 def real(name: str, value: Any) -> Array:

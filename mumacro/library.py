@@ -28,7 +28,8 @@ _SHARED = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
 _DECLARED = "".join((_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h"))
 _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
-_NUMBERS, _CODES = _FFI.typeof("double[]"), _FFI.typeof("int8_t[]")
+_NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"))
+_SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
 _NOTHING: Any = _FFI.NULL
 
 
@@ -54,7 +55,7 @@ class Data:
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _FFI.new("mumacro_data *")
         self._kept: list[Any] = []
-        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors of slopes (cells, 2) by code of the quantity
+        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
         self.border, self.pieces, self.blocks, self.outer = (
             self._keep(self.pointer, name, array)
@@ -115,39 +116,32 @@ class Kernel:
         self._found.slopes(data.pointer, quantity, v.size, _numbers(v), _numbers(y), out, rows.shape[1])
 
     def cases(
-        self,
-        data: Data,
-        n: int,
-        columns: Sequence[Array],
-        mu_macro: Array,
-        mu_ratio: Array,
-        bound: Array,
-        source: Codes,
-        groups: tuple[Array, Array] | None = None,
-        slopes: Array | None = None,
-        start: int = 0,
+        self, data: Data, n: int, columns: Sequence[Array | float], rows: Array, source: Codes, start: int = 0
     ) -> None:
-        """Cases ``start`` to ``start`` + n: inputs (n,) or (1,), answers (n,), groups (n,), ``slopes`` (12, N)."""
-        given = [_numbers(column) for column in columns]
-        pointers = _FFI.new("double *[6]", given)
-        strides = _FFI.new("int64_t[6]", [int(column.size != 1) for column in columns])
-        v, y = groups if groups else (None, None)
-        out = _FFI.new("mumacro_columns *")
-        kept = out.mu_macro, out.mu_ratio, out.bound, out.v_tilde, out.y_tilde = tuple(
-            map(_numbers, (mu_macro, mu_ratio, bound, v, y))
-        )
-        out.source = codes = _FFI.from_buffer(_CODES, source)
-        if slopes is not None:
-            out.slopes = rows = _numbers(slopes.reshape(-1)[start:])
-            out.stride, kept = slopes.shape[1], (*kept, rows)
-        self._cases(data.pointer, n, pointers, strides, out)
-        del kept, codes, given  # alive until here
+        """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
 
-    def one(self, data: Data, six: tuple[float, ...], slopes: bool) -> Any:
-        """The answer to one case in plain floats: mu_macro, mu_ratio, bound, v_tilde, y_tilde, source, slopes[12]."""
-        out = _FFI.new("mumacro_case *")
-        self._one(data.pointer, *six, slopes, out)
-        return out
+        ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~, y~; slopes by input
+        and their bounds.
+        """
+        constants, strides, pointers = _FFI.new(_SIX), _FFI.new(_STRIDES), _FFI.new(_COLUMNS)
+        kept = []
+        for i, column in enumerate(columns):
+            if isinstance(column, float):
+                constants[i] = column
+                pointers[i] = constants + i
+            else:
+                pointers[i], strides[i] = pointer, _ = _numbers(column), 1
+                kept.append(pointer)
+        out = _numbers(rows.reshape(-1)[start:] if start else rows)
+        codes = _FFI.from_buffer(_CODES, source)
+        self._cases(data.pointer, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
+
+    def one(self, data: Data, six: tuple[float, ...], numbers: int) -> list[float]:
+        """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
+        out = _FFI.new(_CASE)
+        self._one(data.pointer, *six, numbers, out)
+        found: list[float] = _FFI.unpack(out, numbers)
+        return found
 
     def border(self, data: Data, y: Array) -> Array:
         """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
@@ -169,6 +163,12 @@ class Kernel:
         of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
         self._found.border_scales(piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells)))
         return of_nodes, of_cells
+
+    def cell_shares(self, w: Array) -> tuple[Array, Array]:
+        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below the border, (n,)."""
+        inside, at_border = np.empty(w.size), np.empty(w.size)
+        self._found.cell_shares(w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border)))
+        return inside, at_border
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
         """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""

@@ -109,8 +109,8 @@ def settling(
     """
     if not 0.0 < remaining < 1.0:
         raise InputError("remaining", remaining, "> 0 and < 1")
-    given = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
-    answer = surrogate.evaluate(**given, groups=True)  # type: ignore[arg-type]
+    given: dict[str, Any] = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
+    answer = surrogate.evaluate(**given, groups=True)
     shape = np.shape(answer.mu_ratio)
     friction, frequency, speed, amplitude = (
         np.broadcast_to(np.asarray(x, dtype=np.float64), shape) for x in (mu0, omega, v0, y0)

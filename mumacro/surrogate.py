@@ -25,11 +25,11 @@ __all__ = ["Surrogate"]
 
 Array = NDArray[np.float64]
 _KERNEL = kernels[-1]
+_RATIO = _KERNEL.ratio
 _CODES = {name: code for code, name in enumerate(charts.QUANTITY_NAMES)}
 #: types of one real number, which take the short way
-_NUMBERS = frozenset(
-    (float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ"))
-)
+_NUMBERS = frozenset((float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ")))
+_NUMBERS_OR_ARRAY, _FLOAT = _NUMBERS | {np.ndarray}, np.dtype(np.float64)
 
 
 class Surrogate:
@@ -183,11 +183,14 @@ class Surrogate:
         0.94200429
         """
         if type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
-            mu = _KERNEL.ratio(self._pointer, v_tilde, y_tilde)
+            try:
+                mu: float = _RATIO(self._pointer, v_tilde, y_tilde)
+            except OverflowError:  # a whole number beyond double range
+                mu = math.nan
             if mu == mu:
                 return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        found = batch.values(charts.MU, self._data, v, y, self.threads, details=False)[0]
+        found = batch.ratios(self._data, v, y, self.threads)
         if not shape and math.isnan(found[0]):
             _refuse_illegal(-1, v, y, "finite and >= 0")
         return _shaped(found, shape)
@@ -203,7 +206,7 @@ class Surrogate:
         >>> round(mu, 6), bound < 1e-12, int(source)
         (0.942004, True, 5)
         """
-        return self._quantity("mu_ratio", v_tilde, y_tilde)
+        return self.quantity("mu_ratio", v_tilde, y_tilde)
 
     def v_tilde_crit(self, y_tilde: ArrayLike) -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
@@ -253,7 +256,7 @@ class Surrogate:
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
-        return self._quantity("power", v_tilde, y_tilde)[:2]
+        return self.quantity("power", v_tilde, y_tilde)[:2]
 
     def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
@@ -261,7 +264,7 @@ class Surrogate:
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
         """
-        return self._quantity("stick_fraction", v_tilde, y_tilde)[:2]
+        return self.quantity("stick_fraction", v_tilde, y_tilde)[:2]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
@@ -305,12 +308,23 @@ class Surrogate:
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
-    def _quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
-        """Value, bound and source."""
+    def quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+        """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
+
+        ``name`` is one of ``table.quantities``; the other arguments, shapes and errors are those of :meth:`mu_ratio`.
+
+        Examples
+        --------
+        >>> power, bound, source = Surrogate.open().quantity("power", 0.1, 0.5)
+        >>> round(power, 6), bound < 1e-12, int(source)
+        (0.012142, True, 5)
+        """
+        if name not in charts.QUANTITY_NAMES:
+            raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
         data = self._with(name)
         v, y, shape = _points(v_tilde, y_tilde)
         value, bound, source = batch.values(_CODES[name], data, v, y, self.threads)
-        if not shape and source is not None:
+        if not shape:
             _refuse_illegal(int(source[0]), v, y, "finite and >= 0" if name == "mu_ratio" else ">= 0")
         return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
@@ -345,7 +359,7 @@ class Surrogate:
         self, cases: Any = ..., /, *, gradient: bool = ..., groups: bool = ..., illegal: str = ..., **inputs: Any
     ) -> Any: ...
 
-    def evaluate(
+    def evaluate(  # type: ignore[misc]  # mypy does not match named inputs with **inputs
         self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan", **inputs: Any
     ) -> Any:
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
@@ -398,12 +412,17 @@ class Surrogate:
         >>> a.source_code.tolist()
         [13, 5, -1]
         """
-        if cases is None and len(inputs) == 6 and illegal in ("nan", "raise"):
-            six = _plain_numbers(inputs)
-            if six is not None:
-                answer = self._one(six, gradient)
-                if answer.source_code >= 0:
+        six = _six(inputs) if cases is None and len(inputs) == 6 else None
+        if six is not None and illegal in ("nan", "raise"):
+            kinds = set(map(type, six))
+            if kinds <= _NUMBERS:
+                answer: Any = self._one(six, gradient)
+                if answer is not None:
                     return answer
+            elif illegal == "nan" and kinds <= _NUMBERS_OR_ARRAY:
+                arrays = [x for x in six if type(x) is np.ndarray]
+                if len({x.shape for x in arrays}) == 1 and arrays[0].ndim and {x.dtype for x in arrays} == {_FLOAT}:
+                    return self._arrays(six, arrays[0].shape, gradient, gradient or groups)
         return self._evaluate(cases, inputs, gradient, groups, illegal)
 
     def evaluate_case(
@@ -413,8 +432,8 @@ class Surrogate:
 
         An illegal case gives NaN and -1.
         """
-        found = _KERNEL.one(self._data, (mu0, Fz, k, y0, omega, v0), False)
-        return found.mu_macro, found.mu_ratio, found.bound, found.source
+        mu_macro, mu_ratio, bound, _, _, _, source = _KERNEL.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
+        return mu_macro, mu_ratio, bound, int(source)
 
     def evaluate_columns(
         self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None
@@ -429,19 +448,22 @@ class Surrogate:
             n = max(c.size for c in columns) if all(c.size for c in columns) else 0
         if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
             raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
-        return batch.cases(self._data, columns, n, 1, groups=False, gradient=False)[:4]
+        rows, source = batch.cases(self._data, [c if c.size == n else float(c[0]) for c in columns], n, 1, 3)
+        return rows[0], rows[1], rows[2], source
 
-    def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float]:
-        """The answer to one case; the source -1 where it is illegal."""
-        found = _KERNEL.one(self._data, six, gradient)
-        answer = (AnswerWithGradient if gradient else Answer)(
-            found.mu_macro, found.mu_ratio, found.bound, found.source,
-            (found.v_tilde, found.y_tilde, found.length_scale), self._certain,
-        )  # fmt: skip
+    def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
+        """The answer to one case; None where it is illegal."""
+        try:
+            found = _KERNEL.one(self._data, six, 19 if gradient else 7)
+        except OverflowError:  # a whole number beyond double range
+            return None
+        if found[6] < 0.0:
+            return None
+        kind: type[Answer[float]] = AnswerWithGradient if gradient else Answer
+        answer = kind(found[0], found[1], found[2], int(found[6]), (found[3], found[4], found[5]), self._certain)
         if gradient:
-            slopes = list(found.slopes)
-            answer.gradient = dict(zip(FIELDS, slopes[:6], strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, slopes[6:], strict=True))
+            answer.gradient = dict(zip(FIELDS, found[7:13], strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
         return answer
 
     def _evaluate(self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str) -> Any:
@@ -461,7 +483,7 @@ class Surrogate:
             return evaluate_labelled(self, cases, inputs, gradient=gradient, groups=groups, illegal=illegal)
         columns = as_columns(inputs)
         try:
-            shape = np.broadcast_shapes(*(c.shape for c in columns.values()))
+            shape = _common_shape([*columns.values()])
         except ValueError as error:
             shapes = {name: column.shape for name, column in columns.items()}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
@@ -471,21 +493,23 @@ class Surrogate:
             return self._one(tuple(float(column) for column in columns.values()), gradient)
         return self._arrays(list(columns.values()), shape, gradient, gradient or groups)
 
-    def _arrays(self, columns: list[Array], shape: tuple[int, ...], gradient: bool, groups: bool) -> Answer[Array]:
+    def _arrays(self, columns: Sequence[Any], shape: tuple[int, ...], gradient: bool, groups: bool) -> Answer[Array]:
         # a value that holds for all cases stays one value
-        flat = [_flat(c, shape) if c.size != 1 else _contiguous(c.reshape(1)) for c in columns]
-        macro, mu, bound, source, both, slopes = batch.cases(
-            self._data, flat, math.prod(shape), self.threads, groups, gradient
+        flat = [
+            float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape) for c in columns
+        ]
+        found, source = batch.cases(
+            self._data, flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3
         )
+        rows = found.reshape(len(found), *shape)
         kind: type[Answer[Array]] = AnswerWithGradient if gradient else Answer
-        answer = kind(macro.reshape(shape), mu.reshape(shape), bound.reshape(shape), source.reshape(shape))
-        if both is not None:
+        answer = kind(rows[0], rows[1], rows[2], source.reshape(shape))
+        if groups:
             length = np.where(answer.source_code == -1, np.nan, length_scale(*columns[:3]))
-            answer._groups, answer._certain = (both[0].reshape(shape), both[1].reshape(shape), length), self._certain
-        if slopes is not None:
-            rows = slopes.reshape(12, *shape)
-            answer.gradient = dict(zip(FIELDS, rows[:6], strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, rows[6:], strict=True))
+            answer._groups, answer._certain = (rows[3], rows[4], length), self._certain
+        if gradient:
+            answer.gradient = dict(zip(FIELDS, rows[5:11], strict=True))
+            answer.gradient_bound = dict(zip(FIELDS, rows[11:], strict=True))
         return answer
 
     def _certain(self, v_tilde: Any, y_tilde: Any) -> Any:
@@ -555,15 +579,16 @@ def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | N
     return surrogate
 
 
-def _plain_numbers(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
-    """The six inputs where all are single real numbers, k None included; None for anything else."""
+def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
+    """The six inputs by name, omega from f, an infinite k for None; None where one of them is missing."""
     try:
         k = inputs["k"]
-        omega = inputs["omega"] if "omega" in inputs else float(inputs["f"]) * RAD_PER_CYCLE
-        six = inputs["mu0"], inputs["Fz"], math.inf if k is None else k, inputs["y0"], omega, inputs["v0"]
-    except (KeyError, TypeError, ValueError, OverflowError):
+        return (
+            inputs["mu0"], inputs["Fz"], math.inf if k is None else k, inputs["y0"],
+            inputs["omega"] if "omega" in inputs else inputs["f"] * RAD_PER_CYCLE, inputs["v0"],
+        )  # fmt: skip
+    except (KeyError, TypeError, OverflowError):
         return None
-    return six if _NUMBERS.issuperset(map(type, six)) else None
 
 
 def _picked(cases: Any) -> dict[str, Any]:
@@ -579,9 +604,13 @@ def _picked(cases: Any) -> dict[str, Any]:
     return picked
 
 
+_PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
+
+
 def _labelled(inputs: Mapping[str, Any], cases: Any) -> bool:
     """Whether labels or chunks are to be kept."""
-    return any(type(x).__module__.partition(".")[0] in ("pandas", "xarray", "dask") for x in (cases, *inputs.values()))
+    kinds = {*map(type, inputs.values()), type(cases)} - _PLAIN
+    return any(kind.__module__.partition(".")[0] in ("pandas", "xarray", "dask") for kind in kinds)
 
 
 def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:
@@ -599,15 +628,23 @@ def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Both broadcast together, flat and contiguous, and their shape."""
     v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
     try:
-        shape = np.broadcast_shapes(v.shape, y.shape)
+        shape = _common_shape((v, y))
     except ValueError as error:
         raise InputError("y_tilde", y.shape, f"of a shape that broadcasts with that of v_tilde, {v.shape}") from error
     return _flat(v, shape), _flat(y, shape), shape
 
 
+def _common_shape(arrays: Sequence[Array]) -> tuple[int, ...]:
+    """The shape to which arrays broadcast; ValueError where they do not."""
+    shapes = {array.shape for array in arrays} - {()}
+    if len(shapes) > 1:
+        return np.broadcast_shapes(*shapes)
+    return shapes.pop() if shapes else ()
+
+
 def _contiguous(a: Array) -> Array:
     """``a`` as the kernel wants it: contiguous, aligned float64."""
-    return np.require(a, np.float64, ["C", "A"])
+    return a if a.flags.carray and a.dtype == np.float64 else np.require(a, np.float64, ["C", "A"])
 
 
 def _flat(a: Array, shape: tuple[int, ...]) -> Array:

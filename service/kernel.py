@@ -99,4 +99,4 @@ class Kernel:
     @property
     def border_error(self) -> float:
         """Largest relative error of v~crit(y~) in this table [-]."""
-        return self.surrogate.border.max_rel_error + ROUNDING
+        return float(self.surrogate.border.max_rel_error + ROUNDING)

@@ -2,7 +2,7 @@
 
 import csv
 import http.client
-import importlib.util
+import importlib
 import os
 import re
 import signal
@@ -32,16 +32,6 @@ if TYPE_CHECKING:  # tests of the library need neither the service nor its depen
 
 START_S = 180  # a first start compiles the kernels
 REPOSITORY = Path(__file__).resolve().parent.parent
-
-
-def load(name: str) -> ModuleType:
-    """A module of helpers beside this file; by its path, because tests/ is not a package."""
-    spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="session")
@@ -250,7 +240,7 @@ def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
 @pytest.fixture(scope="session")
 def open_page(live_server: LiveServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
     """Opens the page in a headless Chromium (tests/browser.py), if installed."""
-    module = load("browser")
+    module = importlib.import_module("browser")
     try:
         browser = module.start(tmp_path_factory.mktemp("browser"))
     except LookupError as error:
@@ -302,13 +292,13 @@ def sweep() -> Iterator[Sweep]:
 @pytest.fixture(scope="session")
 def naive() -> ModuleType:
     """The naive solver."""
-    return load("naive")
+    return importlib.import_module("naive")
 
 
 @pytest.fixture(scope="session")
 def compilers() -> ModuleType:
     """The compilers that are installed."""
-    return load("compilers")
+    return importlib.import_module("compilers")
 
 
 @pytest.fixture(scope="session")

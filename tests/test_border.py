@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from builder.steady import border, solve
+from builder import steady
+from builder.steady import NOT_CONVERGED, border, solve
 from builder.sweep import Sweep
 from comparing import close
 from mumacro import InputError, Surrogate
-from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL, amplitude
+from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL
 
 Array = NDArray[np.float64]
 
@@ -57,9 +58,10 @@ def test_large_amplitude_end() -> None:
     assert border(1e8)[0] / 1e4 == close(0.476573, abs=1e-6)
 
 
-def test_border_that_cannot_be_found_is_an_error_with_advice() -> None:
-    with pytest.raises(ArithmeticError, match=r"border at y~ = nan: .+"):
-        border(math.nan)
+def test_border_that_cannot_be_found_is_an_error_with_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steady, "border_raw", lambda *_: (math.nan, math.nan, NOT_CONVERGED))
+    with pytest.raises(ArithmeticError, match=r"border at y~ = 0.5: the section's root was not found"):
+        border(0.5)
 
 
 # --- the stored curve ---------------------------------------------------------------------------------
@@ -130,4 +132,4 @@ def test_pieces_cover_every_amplitude() -> None:
     assert (high.low, high.high) == (0.0, 1.0 / Y_TAIL)
     for axis, y in ((low, [0.0, Y_CONT]), (mid, [Y_CONT, Y_TAIL]), (high, [math.inf, Y_TAIL])):
         with np.errstate(divide="ignore"):
-            assert amplitude(axis, np.array([axis.low, axis.high])) == close(y, rel=1e-14)
+            assert axis.amplitude(np.array([axis.low, axis.high])) == close(y, rel=1e-14)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate
-from mumacro.charts import QUANTITIES
+from mumacro.charts import QUANTITY_NAMES
 
 #: methods of (v~, y~)
 PLANE = {
@@ -22,7 +22,7 @@ PLANE = {
     "stick_fraction": lambda s, v, y: s.stick_fraction(v, y),
     "power_with_bound": lambda s, v, y: s.power_with_bound(v, y),
     "stick_fraction_with_bound": lambda s, v, y: s.stick_fraction_with_bound(v, y),
-    **{f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITIES},
+    **{f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITY_NAMES},
 }
 NO_NUMBERS = {
     "text": "0.1", "bytes": b"0.1", "complex": 1j, "None": None, "object": object(), "a set": {1.0},
@@ -179,7 +179,7 @@ SCRIPT = """
 import itertools, json, math, sys
 import numpy as np
 from mumacro import InputError, Surrogate
-from mumacro.charts import QUANTITIES
+from mumacro.charts import QUANTITY_NAMES
 s = Surrogate.open(1e-4)
 extremes = [0.0, -0.0, 5e-324, 2.2e-308, 1e-300, 1e-160, 1e-150, 1e-15, 0.75, 1.0, 1.5, 3.0, 32.0, 2.0**17, 1e15, 1e150,
             1e160, 1e300, 1.7976931348623157e308, math.inf, -math.inf, math.nan, -1.0, -1e300, -5e-324]
@@ -189,7 +189,7 @@ pairs = np.array(list(itertools.product(extremes, extremes)))
 v = np.concatenate([pairs[:, 0], bits[:100_000]])
 y = np.concatenate([pairs[:, 1], bits[100_000:]])
 asks = [s.mu_ratio, s.ratio_with_bound, s.power_with_bound, s.stick_fraction_with_bound]
-asks += [lambda v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITIES]
+asks += [lambda v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITY_NAMES]
 legal = (v >= 0.0) & (y >= 0.0)
 for ask in asks:
     found = ask(v, y)

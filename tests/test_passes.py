@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mumacro.arithmetic import log, square_plus
+from mumacro.outer import QUICK_MAX, outer_expansion, outer_quick
 from numpy.typing import NDArray
 
 from comparing import close
 from mumacro import Surrogate, batch, charts, evaluate
-from mumacro.arithmetic import log, square_plus
 from mumacro.charts import CHARTS, RHO_MAX, SIGMA_CUT, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
-from mumacro.outer import QUICK_MAX, outer_expansion, outer_quick
 
 Array = NDArray[np.float64]
 CHUNK = evaluate.CHUNK

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from builder import assemble, rounding, sections, steady, verify
+from builder import assemble, rounding, verify
+from builder.limits import V_RANGE, Y_RANGE
 from builder.radau import RADAU_NODES
 from builder.steady import border, solve
 from builder.sweep import Sweep
@@ -215,8 +216,7 @@ STATED: list[tuple[str, str, Callable[..., tuple[float, ...]]]] = [
     (MODEL, "It is stored in # pieces", lambda _: (float(len(FINE.table.border)),)),
     # --- hard-cases.md
     (HARD, "(Radau IIA, # stages)", lambda _: (float(RADAU_NODES.size),)),
-    (HARD, "Below y~ = # the result depends on v~/y~^2 alone", lambda _: (steady.SMALLEST_Y,)),
-    (HARD, "Status # is \"not converged\"", lambda _: (float(sections.NOT_CONVERGED),)),
+    (HARD, "The solver's range is v~ from # to # and y~ from # to #", lambda *_: (*V_RANGE, *Y_RANGE)),
     (HARD, "twice the nodes reduce the error by a factor below #", lambda x: (x if gain() < x else gain(),)),
     (HARD, "is -pi plus a small number, and is rounded to #", lambda _: (float(np.spacing(math.pi)),)),
     (HARD, "the true value is # v~, between", lambda _: (solve(1e-13, 2.0).mu_ratio / 1e-13,)),

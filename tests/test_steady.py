@@ -10,10 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from builder import model, sections, steady
+from builder.limits import V_RANGE, Y_RANGE
 from builder.model import ANGLE, CHART, MIN_SPEED, NO_SLIP, OK, PATH, SIGMA, SUM_UX, WORK, slip
-from builder.steady import ADVICE, BAD_INPUT, solve, solve_raw, workspace
+from builder.steady import ADVICE, border, solve, solve_raw, workspace
 from builder.sweep import Sweep
 from comparing import close
+from mumacro import InputError
 from mumacro.closed_forms import outer, second_order
 
 Array = NDArray[np.float64]
@@ -160,7 +162,7 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     [
         ((1e-3, 1e3), (1e-3, 1e3)),
         ((1e-12, 1e8), (1e-8, 1e8)),
-        ((1e-200, 1e8), (1e-300, 1e8)),
+        (V_RANGE, Y_RANGE),
         ((1e-60, 1e-3), (1e-9, 10.0)),
     ],
 )
@@ -183,9 +185,9 @@ def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float]
 
 
 @pytest.mark.parametrize(
-    ("v", "y"), [(1.0, 1e-10), (1e3, 1e-200), (1e-21, 1e-10), (2e-21, 1e-10), (1e-15, 1e-267), (3e-20, 1e-12)]
+    ("v", "y"), [(1.0, 1e-10), (1e3, 1e-15), (1e-21, 1e-10), (2e-21, 1e-10), (1e-15, 1e-14), (3e-20, 1e-12)]
 )
-def test_amplitudes_below_the_scaled_one_report_unscaled_speeds(v: float, y: float) -> None:
+def test_tiny_amplitudes_slip_as_fast_as_the_drive(v: float, y: float) -> None:
     found = solve(v, y)
     assert found.slip_speed == close(v, rel=1e-9)
     if found.regime == "continuous":
@@ -194,8 +196,8 @@ def test_amplitudes_below_the_scaled_one_report_unscaled_speeds(v: float, y: flo
 
 
 def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
-    # slip lasts sqrt(v~); at 1e-96 a bisection of 100 steps does not find its end
-    for exponent in range(-200, -4, 4):
+    # slip lasts sqrt(v~)
+    for exponent in range(-60, -4, 4):
         v = 2.77 * 10.0**exponent
         found = solve(v, 0.8917)
         assert found.mu_ratio == close(math.sqrt((1.0 - 0.8917) * (1.0 + 0.8917)), abs=8.0 * v**1.0 + 1e-15)
@@ -383,18 +385,42 @@ def test_mu_minus_its_smooth_continuation_starts_quadratically_below_the_border(
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, -0.0, math.nan, math.inf, -math.inf])
-def test_illegal_inputs_are_a_status_with_advice(bad: float) -> None:
-    for found in (solve(bad, 0.5), solve(0.5, bad), solve(bad, bad)):
-        assert found.status == BAD_INPUT
-        assert not found.ok
-        assert found.regime == "unknown"
-        assert math.isnan(found.mu_ratio)
-        assert "finite and > 0" in found.advice
+@pytest.mark.parametrize(("field", "bounds"), [("v_tilde", V_RANGE), ("y_tilde", Y_RANGE)])
+def test_inputs_out_of_range_are_refused_with_the_range_and_a_remedy(
+    field: str, bounds: tuple[float, float], bad: float, sweep: Sweep
+) -> None:
+    low, high = bounds
+    for value in (bad, np.nextafter(low, 0.0), np.nextafter(high, math.inf)):
+        point = (value, 0.5) if field == "v_tilde" else (0.5, value)
+        for ask in (lambda at=point: solve(*at), lambda at=point: sweep.solve("full", *at)):
+            with pytest.raises(InputError) as caught:
+                ask()
+            assert caught.value.field == field
+            assert np.array_equal(caught.value.value, value, equal_nan=True)
+            assert f"from {low:g} to {high:g}" in caught.value.bound
+            assert "a table answers" in caught.value.bound
+        if field == "y_tilde":
+            with pytest.raises(InputError, match="y_tilde must be from"):
+                border(value)
+
+
+@pytest.mark.parametrize("v", V_RANGE)
+@pytest.mark.parametrize("y", Y_RANGE)
+def test_the_ends_of_the_range_belong_to_it(v: float, y: float) -> None:
+    assert solve(v, y).ok
+    assert border(y)[0] > 0.0
+
+
+@pytest.mark.parametrize("eta", [math.nan, 0.1, -0.5 + 1e-15])
+def test_an_excess_that_is_not_that_of_the_amplitude_is_refused(eta: float, sweep: Sweep) -> None:
+    for ask in (lambda: solve(0.1, 0.5, eta), lambda: sweep.solve("full", [0.1], [0.5], np.array([eta]))):
+        with pytest.raises(InputError, match=r"eta.* must be y_tilde - 1 to rounding"):
+            ask()
 
 
 def test_every_status_has_advice() -> None:
-    codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED}
-    assert codes | {steady.NOT_CONVERGED, steady.BAD_INPUT} == set(ADVICE)
+    codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED, steady.NOT_CONVERGED}
+    assert codes == set(ADVICE)
     assert all(ADVICE.values())
 
 

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from builder import compiled
 from builder import sweep as module
-from builder.steady import border, solve
+from builder.model import NO_STICK
+from builder.steady import ADVICE, border, solve
 from builder.sweep import CHUNK, COLUMNS, SolveError, Sweep, solve_chunk
+from mumacro import InputError
 
 
 def points(n: int) -> tuple[Any, Any]:
@@ -62,12 +65,23 @@ def test_amplitude_excess_is_passed_on() -> None:
     assert exact[0] < 0.8 * rounded[0]
 
 
-def test_a_point_that_fails_is_named_with_advice() -> None:
-    with Sweep(1) as sweep, pytest.raises(SolveError) as caught:
+def test_a_point_out_of_range_is_named() -> None:
+    with Sweep(1) as sweep, pytest.raises(InputError) as caught:
         sweep.solve("full", np.array([0.1, -1.0, math.nan]), np.array([0.5, 0.5, 0.5]))
-    assert str(caught.value) == (
-        "2 of 3 points failed, first v~=-1.0, y~=0.5: v~ must be finite and > 0, y~ must be finite and > 0"
-    )
+    assert (caught.value.field, caught.value.value, caught.value.index) == ("v_tilde", -1.0, 1)
+    assert sweep.n_solves == 0
+
+
+def test_a_point_that_fails_is_named_with_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(kind: str, points: Any) -> Any:
+        out = solve_chunk(kind, points)
+        out[1:, -1] = NO_STICK
+        return out
+
+    monkeypatch.setattr(module, "solve_chunk", fails)
+    with Sweep(1) as sweep, pytest.raises(SolveError) as caught:
+        sweep.solve("full", np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.5, 0.5]))
+    assert str(caught.value) == f"2 of 3 points failed, first v~=0.2, y~=0.5: {ADVICE[NO_STICK]}"
 
 
 def test_unknown_kind_is_refused() -> None:
@@ -114,3 +128,34 @@ def test_a_damaged_checkpoint_is_solved_again(tmp_path: Path, damage: bytes | No
         assert np.array_equal(sweep.solve("full", v, y)["mu_ratio"], expected)
     assert file.read_bytes() == whole
     assert list(folder.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(("place", "pattern"), compiled.SOURCES)
+def test_every_source_of_a_result_is_part_of_its_digest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: Path, pattern: str
+) -> None:
+    before = compiled.source_digest()
+    names = [source.name for source in place.glob(pattern)]
+    assert names or place.name == "kernel"
+    copies = tmp_path / "sources"
+    copies.mkdir()
+    for source in place.glob(pattern):
+        (copies / source.name).write_bytes(source.read_bytes())
+    monkeypatch.setattr(
+        compiled,
+        "SOURCES",
+        [(copies if entry == (place, pattern) else entry[0], entry[1]) for entry in compiled.SOURCES],
+    )
+    assert compiled.source_digest() == before  # wherever the sources stand
+    added = copies / pattern.replace("*", "zz").replace("[ch]", "h")
+    added.write_text("")
+    digests = {before, compiled.source_digest()}
+    added.write_text("x = 1")
+    digests.add(compiled.source_digest())
+    assert len(digests) == 3
+
+
+def test_another_compiler_is_another_digest(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = compiled.source_digest()
+    monkeypatch.setattr(compiled.numba, "__version__", "0.0.0")
+    assert compiled.source_digest() != before

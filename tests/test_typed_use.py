@@ -12,7 +12,7 @@ import pytest
 
 import mumacro
 
-LEFT_OUT = {"mumacro.__main__"}
+LEFT_OUT = {"mumacro.__main__", "mumacro._kernel"}  # the second is no module of Python
 for package in ("jax", "torch"):  # hundreds of megabytes, needed only by their own tests
     if importlib.util.find_spec(package) is None:
         LEFT_OUT |= {f"mumacro.{package}", f"mumacro.interop.{package}"}

@@ -55,7 +55,7 @@ SCRIPTS = (
     (model_facts.CASES, model_facts.PAGE),
     (hard_cases.CASES, hard_cases.PAGE),
 )
-SLOW = {"blocks", "stale_cache", "layer", "settle"}  # a minute together
+SLOW = {"blocks", "layer", "settle"}  # a minute together
 MEASURED = [
     pytest.param(script, name, page, id=f"{page.stem}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
     for script, page in SCRIPTS

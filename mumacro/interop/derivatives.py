@@ -72,8 +72,11 @@ class DifferentiableFriction:
 def quantities(surrogate: Surrogate) -> Mapping[str, Quantity]:
     """The differentiable quantities of a table by name."""
 
-    def cases(six: tuple[Array, ...], gradient: bool = False) -> Answer:
-        return surrogate.evaluate(dict(zip(FIELDS, map(np.atleast_1d, six), strict=True)), gradient=gradient)
+    def cases(six: tuple[Array, ...], gradient: bool = False) -> Answer[Any]:
+        answer: Answer[Any] = surrogate.evaluate(
+            dict(zip(FIELDS, map(np.atleast_1d, six), strict=True)), gradient=gradient
+        )
+        return answer
 
     def mu_macro(*six: Array) -> Array:
         found: Array = cases(six).mu_macro

@@ -63,7 +63,7 @@ def evaluate_labelled(
     return xr.Dataset(columns)
 
 
-def _pandas(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str, Any]) -> Answer:
+def _pandas(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str, Any]) -> Answer[Any]:
     import pandas as pd
 
     index: Any = None
@@ -93,7 +93,9 @@ def _pandas(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str
     return _answer([getattr(found, name) for name in _VALUES], found, series, categories)
 
 
-def _answer(values: list[Any], found: Answer, wrap: Callable[[Any], Any], look_up: Callable[[Any, Any], Any]) -> Answer:
+def _answer(
+    values: list[Any], found: Answer[Any], wrap: Callable[[Any], Any], look_up: Callable[[Any, Any], Any]
+) -> Answer[Any]:
     mu_macro, mu_ratio, bound, source = map(wrap, values)
     answer = Answer(mu_macro, mu_ratio, bound, source, look_up=look_up)
     if found._groups is not None:
@@ -105,7 +107,7 @@ def _answer(values: list[Any], found: Answer, wrap: Callable[[Any], Any], look_u
     return answer
 
 
-def _lazy(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str, Any], xarray: bool) -> Answer:
+def _lazy(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str, Any], xarray: bool) -> Answer[Any]:
     """One pass over every chunk, on one thread: Dask has its own."""
     names = list(given)
     counts = {"groups": 3 if options["groups"] else 0, "gradient": 12 if options["gradient"] else 0}

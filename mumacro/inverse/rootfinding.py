@@ -35,9 +35,10 @@ class Sweep:
         self.unknown = unknown
         self.case: dict[str, Any] = {"k": None, **case}
 
-    def answer(self, x: Array) -> Answer:
+    def answer(self, x: Array) -> Answer[Any]:
         """The surrogate's results at the values ``x`` (n,) of the input [SI]."""
-        return self.surrogate.evaluate(**{**self.case, self.unknown: x})
+        answer: Answer[Any] = self.surrogate.evaluate(**{**self.case, self.unknown: x})
+        return answer
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""
@@ -48,12 +49,11 @@ class Sweep:
         """mu_macro [-] at one value."""
         return float(self.mu(np.array([x]))[0])
 
-    def with_slope(self, x: Array) -> tuple[Answer, Array]:
+    def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
         """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
         answer = self.surrogate.evaluate(**{**self.case, self.unknown: x}, gradient=True)
-        gradient = answer.gradient or {}
         with np.errstate(over="ignore", invalid="ignore"):
-            return answer, x * gradient[self.unknown]
+            return answer, x * answer.gradient[self.unknown]
 
 
 class Curve:

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -160,7 +161,7 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
 
 
 def _enclosures(
-    sweep: Sweep, curve: Curve, wanted: Array, value: Array, answer: Answer, slope: Array
+    sweep: Sweep, curve: Curve, wanted: Array, value: Array, answer: Answer[Any], slope: Array
 ) -> tuple[Array, Array]:
     """Between which values mu_macro is within its error bound of the target: ``low`` and ``high`` of a root, (n,).
 

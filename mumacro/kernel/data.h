@@ -5,8 +5,8 @@
 
 /* The cells of one quantity, from cell `first` of the blocks' count on: what comes before is zero and not stored.
  * polynomials (cells, 8, 8): powers of b's coordinate along rows, of a's along columns, both from 7 down to 0;
- * errors of the tabulated quantity (sources + 1, 2): relative to the factor, absolute; errors of its slopes along ln v~
- * and ln y~ (cells, 2), per scale of a slope's bound. */
+ * errors of the tabulated quantity (sources + 1, 2): relative to the factor, absolute; errors in every cell (cells, 3):
+ * of q, of its derivatives along a and along b, the largest where these have their share of it. */
 typedef struct {
     int64_t first, cells;
     const double *polynomials, *errors, *slope_errors;
@@ -20,7 +20,7 @@ typedef struct {
 typedef struct {
     int64_t border_cells;
     const double *border, *pieces, *blocks, *outer;
-    mumacro_cells quantities[4];
+    mumacro_cells quantities[8];
 } mumacro_data;
 
 /* A table as the export writes it: mumacro_table. */

@@ -62,11 +62,11 @@ static mu_case mu_unusual_case(const mumacro_data *data, const mu_inputs *in) {
     }
     if (in->v0 == 0.0) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
     r = mu_amplitude_ratio(in);
-    if (r == 0.0) return mu_case_of(1.0, MU_ROUNDING, MU_RIGID, v, y);
+    if (r == 0.0) return mu_case_of(1.0, MU_RIGID_ROUNDING, MU_RIGID, v, y);
     if (r == HUGE_VAL) return mu_case_of(0.0, 3.0 * MU_DENORMAL, MU_RIGID, v, y); /* eq. (35) is 2.5e-306 there */
     mu = mu_outer_expansion(r).first;
     /* y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large */
-    return mu_case_of(mu, MU_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
+    return mu_case_of(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
 }
 
 /* d mu_macro / d input and the bounds, 12 numbers stride apart.  One-sided at the edges: d/dy0 = 0 at y0 = 0,
@@ -94,7 +94,7 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
         const mu_slopes at = known ? *known : mu_slopes_at(data, MU_MU_RATIO, found->v, found->y);
         const double both = at.along_v + at.along_y, errors = at.bound_v + at.bound_y;
         slope[0] = found->mu - both;
-        error[0] = found->bound + errors;
+        error[0] = (found->source < MU_CHARTS ? mu_min(found->bound, at.bound) : found->bound) + errors;
         slope[1] = -mu0 * both / in->Fz;
         error[1] = mu0 * errors / in->Fz;
         slope[2] = mu0 * both / in->k;
@@ -139,26 +139,29 @@ MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *
     }
 }
 
+/* Rows of answers to cases, see library.h. */
+enum { MU_ROW_MACRO, MU_ROW_RATIO, MU_ROW_BOUND, MU_ROW_V, MU_ROW_Y, MU_ROW_SLOPES, MU_ROWS = MU_ROW_SLOPES + 12 };
+
 /* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
-static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_CHUNK], const mumacro_columns *out,
-                              int64_t start) {
-    double v[MU_CHUNK], y[MU_CHUNK], *mu = out->mu_ratio + start, *bound = out->bound + start;
-    int8_t *source = out->source + start;
+static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_CHUNK], int rows, double *out,
+                              int64_t stride, int8_t *source) {
+    double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_RATIO * stride, *bound = out + MU_ROW_BOUND * stride;
+    double *slopes = rows == MU_ROWS ? out + MU_ROW_SLOPES * stride : NULL;
     const double *errors = data->quantities[MU_MU_RATIO].errors;
     mu_chunk c;
     int left;
     mu_pass_groups(n, in, v, y);
     mu_pass_borders(data, n, v, y, &c);
     left = mu_pass_places(n, &c);
-    if (out->slopes) { /* before the values, which turn coordinates into those of cells */
+    if (slopes) { /* before the values, which turn coordinates into those of cells */
         for (int i = 0; i < n; ++i) {
             const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
             if (!mu_is_left(c.block[i])) {
-                const mu_slopes slopes = mu_slopes_of(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+                const mu_slopes at = mu_slopes_of(data, MU_MU_RATIO, &c, i, v[i], y[i]);
                 const double *error = errors + 2 * c.block[i];
-                const mu_case found = mu_case_of(slopes.value, fabs(c.factor[i]) * error[0] + error[1],
+                const mu_case found = mu_case_of(at.value, fabs(c.factor[i]) * error[0] + error[1],
                                                  (int)c.block[i], v[i], y[i]);
-                mu_gradient(data, &six, &found, &slopes, out->slopes + start + i, out->stride);
+                mu_gradient(data, &six, &found, &at, slopes + i, stride);
             }
         }
     }
@@ -182,18 +185,20 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
         source[i] = (int8_t)found.source;
         v[i] = found.v;
         y[i] = found.y;
-        if (out->slopes) mu_gradient(data, &six, &found, NULL, out->slopes + start + i, out->stride);
+        if (slopes) mu_gradient(data, &six, &found, NULL, slopes + i, stride);
     }
     for (int i = 0; i < n; ++i) {
-        out->mu_macro[start + i] = mu[i] * in[0][i];
+        out[i] = mu[i] * in[0][i];
         bound[i] *= in[0][i];
     }
-    if (out->v_tilde) memcpy(out->v_tilde + start, v, (size_t)n * sizeof *v);
-    if (out->y_tilde) memcpy(out->y_tilde + start, y, (size_t)n * sizeof *y);
+    if (rows > MU_ROW_V) {
+        memcpy(out + MU_ROW_V * stride, v, (size_t)n * sizeof *v);
+        memcpy(out + MU_ROW_Y * stride, y, (size_t)n * sizeof *y);
+    }
 }
 
-static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
-                     const mumacro_columns *out) {
+static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
+                     double *out, int64_t stride, int8_t *source) {
     for (int64_t start = 0; start < n; start += MU_CHUNK) {
         const int few = mu_few(n - start);
         const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;
@@ -202,7 +207,7 @@ static void mu_cases(const mumacro_data *data, int64_t n, const double *const *c
             if (strides[i]) memcpy(in[i], columns[i] + start, (size_t)few * sizeof **in);
             for (int j = strides[i] ? few : 0; j < whole; ++j) in[i][j] = strides[i] ? 1.0 : columns[i][0];
         }
-        mu_chunk_of_cases(data, few, in, out, start);
+        mu_chunk_of_cases(data, few, in, rows, out + start, stride, source + start);
     }
 }
 
@@ -216,21 +221,15 @@ static double mu_length_scale(double mu0, double Fz, double k) {
 }
 
 static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
-                   int with_slopes, mumacro_case *out) {
-    double in[6][MU_CHUNK];
+                   int numbers, double *out) {
+    double in[6][MU_CHUNK], rows[MU_ROWS];
     const double six[6] = {mu0, Fz, k, y0, omega, v0};
-    mumacro_columns columns = {NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1};
     int8_t source;
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
-    columns.mu_macro = &out->mu_macro;
-    columns.mu_ratio = &out->mu_ratio;
-    columns.bound = &out->bound;
-    columns.v_tilde = &out->v_tilde;
-    columns.y_tilde = &out->y_tilde;
-    columns.source = &source;
-    columns.slopes = with_slopes ? out->slopes : NULL;
-    mu_chunk_of_cases(data, 1, in, &columns, 0);
-    out->source = source;
-    out->length_scale = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
+    mu_chunk_of_cases(data, 1, in, numbers > 7 ? MU_ROWS : MU_ROW_SLOPES, rows, 1, &source);
+    memcpy(out, rows, 5 * sizeof *out);
+    out[5] = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
+    out[6] = source;
+    if (numbers > 7) memcpy(out + 7, rows + MU_ROW_SLOPES, 12 * sizeof *out);
 }

@@ -24,6 +24,13 @@ static void mu_forms(int quantity, int block, int64_t n, const double *v, const 
     }
 }
 
+static void mu_cell_shares(int64_t n, const double *w, double *inside, double *at_border) {
+    for (int64_t i = 0; i < n; ++i) {
+        inside[i] = mu_edge_share(w[i]);
+        at_border[i] = mu_border_share(w[i]);
+    }
+}
+
 static void mu_roots(int64_t n, const double *v, const double *eta, double *root) {
     for (int64_t i = 0; i < n; ++i) root[i] = mu_normal_form_root(v[i], eta[i]);
 }
@@ -53,5 +60,5 @@ static const mumacro_atlas MU_ATLAS = {
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio_alone, mu_one,
-    mu_borders, mu_forms, mu_border_scales, mu_roots, mu_outers,
+    mu_borders, mu_forms, mu_border_scales, mu_cell_shares, mu_roots, mu_outers,
 };

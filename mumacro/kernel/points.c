@@ -39,9 +39,16 @@ static mu_answer mu_answer_at(const mumacro_data *data, int quantity, double v, 
     return out;
 }
 
-/* How much an error of q and of its derivatives moves a logarithmic slope, per |factor|. */
-MU_INLINE double mu_slope_weight(double of_a, double of_b, double of_factor) {
-    return fabs(of_a) + fabs(of_b) + fabs(of_factor);
+/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what interpolation leaves out,
+ * is 64 at both edges and up to 8 between them. */
+MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
+
+/* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from 1344 to 64. */
+MU_INLINE double mu_border_share(double w) { return 1.0 / (1.0 + 10.0 * (1.0 - w)); }
+
+/* What errors of q and of its derivatives along a and b move a logarithmic slope by, per |factor|. */
+MU_INLINE double mu_slope_error(const double *errors, double of_factor, double of_a, double of_b) {
+    return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
 }
 
 /* The slopes in a block, from the place and from base and factor there. */
@@ -53,10 +60,11 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     const mu_turn turn = mu_turn_of(at);
     const mu_form_slopes form = mu_slopes_of_form(about->forms[at->block], at, &turn);
     const mu_spot spot = mu_find(block, cells->first, cells->cells, at->a, at->b);
-    const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 2 * spot.cell;
+    const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
     const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
     double q_b = slope.q_b * 2.0 * block[MU_STEP_B], reach = fabs(turn.b_v), ratio, noise;
+    double share_a = mu_edge_share(spot.u), share_b = mu_edge_share(spot.w);
     mu_slopes out;
     if (about->about.smooth_at_border && at->block >= MU_S_LOW && at->block != MU_CORNER) {
         /* At the border the quantity is smooth in v~, so q has no linear term in sqrt(1 - v~/v~crit); the interpolant has
@@ -68,6 +76,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
             const double w = mu_min(spot.w, 1.0 - 2.0e-9 * block[MU_STEP_B]);
             const double here = mu_cell_slopes(cell, spot.u, w).q_b, edge = mu_cell_slopes(cell, spot.u, 1.0).q_b;
             q_b = (here - edge) * 2.0 * block[MU_STEP_B];
+            share_b = mu_border_share(w);
         }
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
@@ -75,12 +84,14 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     out.along_y = form.base_y + factor * (form.factor_y * slope.q + turn.a_y * q_a + turn.b_y * q_b);
     noise = 8.0 * MU_ROUNDING * (scale * (1.0 + fabs(form.factor_v) + fabs(form.factor_y) + reach) +
                                  fabs(form.base_v) + fabs(form.base_y)) + MU_DENORMAL;
-    out.bound_v = scale * errors[0] * mu_slope_weight(turn.a_v, reach, form.factor_v) + noise;
+    out.bound_v = scale * mu_slope_error(errors, form.factor_v, share_a * turn.a_v, share_b * reach) + noise;
     /* along y~ what is removed from the last cell also depends on the border's slope */
     ratio = turn.b_v != 0.0 ? reach / fabs(turn.b_v) : 1.0;
-    out.bound_y = scale * errors[1] * mu_slope_weight(turn.a_y, turn.b_y * ratio, form.factor_y) + noise;
+    out.bound_y = scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y, share_b * turn.b_y * ratio) + noise;
+    out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
     if (at->block == MU_CORNER) {
         const double digit = 8.0 * MU_ROUNDING / (3.0 * at->phi * at->phi + 2.0 * (at->y - 1.0));
+        out.bound += digit * scale;
         out.bound_v += digit * (fabs(out.along_v) + scale);
         out.bound_y += digit * (fabs(out.along_y) + scale * fabs(form.factor_y));
     }
@@ -89,7 +100,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
 
 /* The slopes where the record knows the value in closed form, at the ends of v~ and y~. */
 static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
-    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     out.value = known.value;
     if (known.source == -1) out.along_v = out.along_y = out.bound_v = out.bound_y = NAN;
     else if (quantity == MU_MU_RATIO && known.source == MU_STATIC_LIMIT && y < 1.0) {
@@ -107,7 +118,7 @@ static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
  * infinite slope of a cube root in v~ (and a finite logarithmic one). */
 static mu_slopes mu_slopes_at(const mumacro_data *data, int quantity, double v, double y) {
     const mu_quantity *about = &MU_QUANTITY[quantity];
-    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_form form;
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {
