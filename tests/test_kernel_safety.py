@@ -16,7 +16,10 @@ CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-rec
 NATIVE = {"base": 2, "avx2": 4, "avx512": 8}
 
 
-@pytest.mark.parametrize("options", [(), ("-march=native",), ("-DMUMACRO_ONE_LANE",)], ids=["base", "best", "one"])
+SLOW = [pytest.param((), id="base", marks=pytest.mark.slow), pytest.param(("-DMUMACRO_ONE_LANE",), id="one", marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("options", [pytest.param(("-march=native",), id="best"), *SLOW])
 def test_sanitizers_are_silent(compilers, tables_dir, tmp_path, options):
     """300,000 random and 172,800 nasty cases, and 1000 tables of nonsense, through every entry."""
     (tmp_path / "table.c").write_text(files(read_table(tables_dir / "mumacro-1e-4.nc"))["mumacro_table.c"], "ascii")
