@@ -1,8 +1,8 @@
 """The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
 
-It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``, ``records.h`` and ``library.h``.  A call runs without the
-interpreter's lock.  There is a kernel for every instruction level of the processor; the best one is used, and those
-with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
+It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``, ``records.h`` and
+``library.h``.  A call runs without the interpreter's lock.  There is a kernel for every instruction level of the
+processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
 """
 
 from __future__ import annotations
