@@ -1,8 +1,8 @@
 """The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
 
-It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``, ``records.h`` and ``library.h``.  A call runs without the
-interpreter's lock.  There is a kernel for every instruction level of the processor; the best one is used, and those
-with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
+It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``, ``records.h`` and
+``library.h``.  A call runs without the interpreter's lock.  There is a kernel for every instruction level of the
+processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
 """
 
 from __future__ import annotations
@@ -148,6 +148,13 @@ class Kernel:
         out = np.empty(y.size)
         self._found.border(data.pointer, y.size, _numbers(y), _numbers(out))
         return out
+
+    def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
+        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them."""
+        block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
+        codes = _FFI.from_buffer(_CODES, block)
+        self._found.places(data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b))
+        return block, a, b
 
     # --- for the builder ------------------------------------------------------------------------------
 

@@ -173,7 +173,7 @@ def _put_cell_errors(group: Any, table: Table) -> None:
     """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and a dimension too."""
 
     def rows(block: Block, name: str) -> Array:
-        return block.cell_errors.get(name, np.zeros((block.cells[0] * block.cells[1], 3)))
+        return block.cell_errors[name] if name in block.nodes else np.zeros((block.cells[0] * block.cells[1], 3))
 
     errors = np.stack([np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities])
     for axis, size in zip(CELL_AXES, errors.shape, strict=True):

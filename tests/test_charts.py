@@ -1,6 +1,5 @@
 """The atlas: point to place and place to point are inverse, in every block, on nodes, edges and seams."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +9,8 @@ from numpy.typing import NDArray
 from comparing import close
 from mumacro import Surrogate, charts
 from mumacro.cells import nodes
-from mumacro.charts import CHARTS, MU, NAMES, REGIME_OF_SOURCE, Axis
-from mumacro.library import kernels
-from places import Places
+from mumacro.charts import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES, Axis
+from mumacro.library import Kernel, kernels
 
 Array = NDArray[np.float64]
 C_LOW, S_MID, CORNER = (NAMES.index(name) for name in ("continuous_low", "stick_slip_mid", "corner"))
@@ -51,17 +49,15 @@ def points(table: Surrogate, index: int) -> tuple[Array, Array, Array, Array]:
 def test_place_and_point_undo_each_other(table: Surrogate, index: int) -> None:
     chart = CHARTS[index]
     a, b, v, y = points(table, index)
-    places = Places((1, 1), table.border)
-    block = places.source(v, y)
+    block, found_a, found_b = kernels[-1].places(table._data, v, y)
     # a point on an edge belongs to any block with this edge
     inside = (a > chart.a.low) & (a < chart.a.high) & (b > chart.b.low + 1e-9) & (b < chart.b.high * (1 - 1e-9))
     away = np.minimum(a - chart.a.low, chart.a.high - a) > 1e-11 * max(abs(chart.a.low), abs(chart.a.high))
     assert np.all((block == index)[inside & away])
     assert np.count_nonzero(block == index) > 100
     mine = block == index
-    found_a, found_b = places.coordinates(index, v[mine], y[mine])
     for axis, given, found in ((chart.a, a, found_a), (chart.b, b, found_b)):
-        back = axis.to_file(found)
+        back = axis.to_file(found[mine])
         scale = max(abs(axis.low), abs(axis.high))
         # rounding of y~ moves the corner's coordinates by its size over R^2, that of v~crit those of s at the border
         slack = 4e-15 * scale + (2e-15 / a[mine] ** 2 if index == CORNER else 0.0)
@@ -78,12 +74,11 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
     v, y = 10.0 ** rng.uniform(-8.0, 6.0, 60_000), 10.0 ** rng.uniform(-3.0, 8.0, 60_000)
     near = rng.random(v.size) < 0.5
     y[near] = rng.uniform(0.7, 3.5, np.count_nonzero(near))
-    places = Places((1, 1), table.border)
-    mine = places.source(v, y) == index
+    block, a, b = kernels[-1].places(table._data, v, y)
+    mine = block == index
     assert np.count_nonzero(mine) > 100
     chart = CHARTS[index]
-    a, b = places.coordinates(index, v[mine], y[mine])
-    again_v, again_y, eta = chart.point(chart.a.to_file(a), chart.b.to_file(b), table.border)
+    again_v, again_y, eta = chart.point(chart.a.to_file(a[mine]), chart.b.to_file(b[mine]), table.border)
     # d ln v~ / d b is unbounded where b ends: in continuous_low at v~ -> 0 and at v~ -> infinity, along s at v~ -> 0
     share = 1.0 + (v[mine] ** 2 + v[mine] ** -2 if index == C_LOW else 0.0)
     crit = table.v_tilde_crit(y[mine])
@@ -96,8 +91,9 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
 def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surrogate) -> None:
     values = np.concatenate([10.0 ** np.arange(-320.0, 308.0, 4.0), [5e-324, 1.7e308]])
     v, y = (x.ravel() for x in np.meshgrid(values, values))
-    block, (a, b, _) = _locate(v, y, *table.border.arrays)
-    assert np.all((block >= 0) & (block <= FAST))
+    block, a, b = kernels[-1].places(table._data, v, y)
+    np.testing.assert_array_equal(block, table.ratio_with_bound(v, y)[2])
+    assert np.all((block >= 0) & (block <= SOURCES.index("tail_fast")))
     for index, chart in enumerate(CHARTS):
         mine = block == index
         for axis, found in ((chart.a, a[mine]), (chart.b, b[mine])):
@@ -108,15 +104,41 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
     np.testing.assert_array_equal(sliding, v >= table.v_tilde_crit(y))
 
 
-def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate) -> None:
-    """mu~ = base + factor q with q from the file: exact at nodes, to the table's error."""
+@pytest.mark.parametrize("quantity", charts.QUANTITIES, ids=charts.QUANTITY_NAMES)
+def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate, quantity: charts.Quantity) -> None:
+    """value = base + factor q with q from the file: exact at nodes, to the table's error."""
     for index, (chart, part) in enumerate(zip(CHARTS, table.table.blocks, strict=True)):
+        assert (quantity.name in part.nodes) == chart.holds(quantity)
         a, b = np.meshgrid(part.a, part.b, indexing="ij")
         v, y, eta = chart.point(a, b, table.border)
         keep = (table.ratio_with_bound(v, y)[2] == index) & (v > 1e-200)
-        phi = np.array([charts.normal_form_root(*p) for p in zip(v[keep], eta[keep], strict=True)])
-        base, factor = _form(np.full(phi.size, index), v[keep], y[keep], phi)
-        expected = base + factor * part.values[keep]
-        mu, bound, _ = table.ratio_with_bound(v[keep], y[keep])
-        assert np.all(np.abs(mu - expected) <= 1.01 * bound + 4e-16), chart.name
-        assert MU == 0
+        base, factor = kernels[-1].forms(charts.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep])
+        value, bound, _ = table.quantity(quantity.name, v[keep], y[keep])
+        assert np.all((factor != 0.0) == chart.holds(quantity))
+        expected = base + factor * part.nodes[quantity.name][keep] if chart.holds(quantity) else 0.0 * base
+        assert np.all(np.abs(value - expected) <= 1.01 * bound + 4e-16), chart.name
+
+
+def test_levels_of_the_processor_place_and_scale_alike(table: Surrogate) -> None:
+    """Places and forms at every instruction level: equal bits with fused multiply-add, else to the last digits."""
+    rng = np.random.default_rng(3)
+    y = 10.0 ** rng.uniform(-8.0, 8.0, 4000)
+    v = table.v_tilde_crit(y) * 10.0 ** rng.uniform(-3.0, 1.0, y.size)
+
+    def found(kernel: Kernel) -> list[Array]:
+        block, a, b = kernel.places(table._data, v, y)
+        parts = [block.astype(float), a, b, kernel.border(table._data, y), kernel.normal_form_root(v, y - 1.0)]
+        for quantity, about in enumerate(charts.QUANTITIES):
+            for index, chart in enumerate(CHARTS):
+                mine = block == index
+                if chart.holds(about):
+                    parts += kernel.forms(quantity, index, v[mine], y[mine], y[mine] - 1.0)
+        return parts
+
+    best = found(kernels[-1])
+    for kernel in kernels[:-1]:
+        for ours, theirs in zip(found(kernel), best, strict=True):
+            if kernel.level == "base":
+                assert ours == close(theirs, rel=1e-13, abs=4e-16)
+            else:
+                np.testing.assert_array_equal(ours, theirs)

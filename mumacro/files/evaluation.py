@@ -28,7 +28,7 @@ ON_ERROR = ("list", "stop")
 class Piece(NamedTuple):
     """Evaluated records as they stand in the output, the lines for the rejected ones, and the place after them."""
 
-    text: bytes
+    text: bytes | memoryview
     rejects: str
     place: Place
     rows: int

@@ -43,7 +43,7 @@ class Summary:
 
 
 class _Note(NamedTuple):
-    """What a piece leaves: its checksum, bytes and rows up to its end, what follows, the lines of its rejects."""
+    """What a piece leaves behind: its checksum, bytes and rows up to its end, what follows, its rejects as lines."""
 
     checksum: int = 0
     end: int = 0
@@ -267,7 +267,7 @@ class _Run:
             path.unlink(missing_ok=True)
 
 
-def _write(stream: Any, text: bytes) -> None:
+def _write(stream: Any, text: bytes | memoryview) -> None:
     rest = memoryview(text)
     while rest:
         rest = rest[stream.write(rest) :]

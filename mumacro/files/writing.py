@@ -47,13 +47,13 @@ class Output:
         # without name and time, so that the same text gives the same bytes
         return gzip.compress(text, 6, mtime=0) if self.packed else text
 
-    def piece(self, batch: pa.RecordBatch, lines: pa.Array | None = None) -> bytes:
+    def piece(self, batch: pa.RecordBatch, lines: pa.Array | None = None) -> bytes | memoryview:
         """Rows; where ``lines`` holds the records as they came in, the columns are put behind them."""
         if self.kind == "parquet":
             sink = pa.BufferOutputStream()
             with pa.ipc.new_stream(sink, batch.schema) as writer:
                 writer.write_batch(batch)
-            return bytes(sink.getvalue())
+            return memoryview(sink.getvalue())
         cells: list[Any] = [] if lines is None else [lines]
         if lines is not None and self.kind == "ndjson":  # without the brace that closes it
             cells = [pa.array([line.rstrip()[:-1].rstrip() for line in lines.to_pylist()], pa.large_binary())]

@@ -41,6 +41,9 @@ typedef struct {
                 int numbers, double *out);
     /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
+    /* blocks of points with 0 < v~, y~ < infinity, and their coordinates, as evaluation counts them; tail_fast has none */
+    void (*places)(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block, double *a,
+                   double *b);
     /* for the builder: base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
     void (*forms)(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta, double *base,
                   double *factor);
