@@ -3,6 +3,7 @@
 import ctypes
 import importlib.util
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from builder.c import wasm
 from builder.c.source import OutputError, files, header_text, write_c
+from builder.export import export_table
 from mumacro import Surrogate, charts
 from mumacro.inputs import BOUNDS, FIELDS
 from mumacro.library import kernels
@@ -37,6 +40,20 @@ int main(void) {
            elsewhere(0.1, 0.5) - mumacro_mu_ratio(0.1, 0.5));
     return mu_values() != 3.0;
 }
+"""
+NODE = """
+const fs = require("fs");
+WebAssembly.instantiate(fs.readFileSync("mumacro.wasm")).then(({ instance: { exports: table } }) => {
+  const held = fs.readFileSync("cases");
+  const given = new Float64Array(held.buffer.slice(held.byteOffset, held.byteOffset + held.length));
+  const n = given.length / 6, found = new Float64Array(17 * n);
+  for (let i = 0; i < n; i += 1) {
+    const at = table.evaluate(...[0, 1, 2, 3, 4, 5].map((j) => given[j * n + i]));
+    found.set(new Float64Array(table.memory.buffer, at, 17), 17 * i);
+  }
+  fs.writeFileSync("answers", found);
+  console.log(table.tolerance());
+});
 """
 OTHER = '#include "mumacro.h"\ndouble elsewhere(double v, double y) { return mumacro_mu_ratio(v, y); }\n'
 OTHER_DECLARED = OTHER.replace("double else", "double elsewhere(double v, double y);\ndouble else", 1)
@@ -203,7 +220,7 @@ def test_numbers_are_exact_through_text(table):
         assert not cells[:left].any()
         assert same(read[f"{name}_cells"], cells[left:])
         assert same(read[f"{name}_errors"], errors)
-        assert same(read[f"{name}_slope_errors"], slope_errors[left // 32 :])
+        assert same(read[f"{name}_slope_errors"], slope_errors[3 * (left // 64) :])
 
 
 def test_names_of_the_declarations_are_the_kernels():
@@ -235,8 +252,12 @@ def test_where_nothing_can_be_written_is_said(table, tmp_path):
 
 
 def test_the_command_needs_no_extra(repository, tmp_path):
-    hidden = "import sys\nfor name in ('typer', 'rich', 'scipy', 'netCDF4', 'xarray', 'numba'): sys.modules[name] = None\n"
-    program = hidden + "from mumacro.__main__ import main\nsys.exit(main(['export', '--format', 'c', '--out', sys.argv[1]]))"
+    hidden = (
+        "import sys\nfor name in ('typer', 'rich', 'scipy', 'netCDF4', 'xarray', 'numba'): sys.modules[name] = None\n"
+    )
+    program = (
+        hidden + "from mumacro.__main__ import main\nsys.exit(main(['export', '--format', 'c', '--out', sys.argv[1]]))"
+    )
     for out in ("mumacro.h", "friction"):
         command = [sys.executable, "-c", program, str(tmp_path / out)]
         done = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False)
@@ -375,3 +396,20 @@ def test_only_the_documented_functions_of_the_library_are_called(compilers, fold
     compilers.run(*words, cwd=folder / "three")
     symbols = compilers.run(*compilers.compiler("nm"), "--undefined-only", tmp_path / "mumacro.o").split()[1::2]
     assert set(symbols) - {"_GLOBAL_OFFSET_TABLE_"} <= {"sqrt", "fabs", "memcpy", "mumacro_table", "memset"}
+
+
+def test_webassembly_has_the_bits_of_the_lowest_level(table, tmp_path):
+    node = shutil.which("node")
+    if node is None or wasm.compiler() is None:
+        pytest.skip("node, or a compiler for WebAssembly, is not installed")
+    export_table(table.path, "wasm", tmp_path / "mumacro.wasm")
+    x = cases(2000)
+    (tmp_path / "cases").write_bytes(x.tobytes())
+    done = subprocess.run([node, "-e", NODE], cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = np.frombuffer((tmp_path / "answers").read_bytes()).reshape(-1, 17).T
+    assert [float(word) for word in done.stdout.split()] == [table.tolerance]
+    rows, source = np.empty((17, x.shape[1])), np.empty(x.shape[1], dtype=np.int8)
+    kernels[0].cases(table._data, x.shape[1], list(x), rows, source)
+    assert same(found[1:6], rows[:5])
+    assert same(found[6], source)
+    assert same(found[11:], rows[5:11])

@@ -16,7 +16,10 @@ CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-rec
 NATIVE = {"base": 2, "avx2": 4, "avx512": 8}
 
 
-SLOW = [pytest.param((), id="base", marks=pytest.mark.slow), pytest.param(("-DMUMACRO_ONE_LANE",), id="one", marks=pytest.mark.slow)]
+SLOW = [
+    pytest.param((), id="base", marks=pytest.mark.slow),
+    pytest.param(("-DMUMACRO_ONE_LANE",), id="one", marks=pytest.mark.slow),
+]
 
 
 @pytest.mark.parametrize("options", [pytest.param(("-march=native",), id="best"), *SLOW])

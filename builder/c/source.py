@@ -126,7 +126,9 @@ def table_text(table: Table, linkage: str) -> str:
     rows.append("{" + ",\n      ".join(quantities) + "}")
     about = table.attributes
     text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
-    whole = f"{linkage}const mumacro_export mumacro_table = {{\n    {{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"
+    whole = (
+        f"{linkage}const mumacro_export mumacro_table = {{\n    {{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"
+    )
     return "".join(_array(f"mumacro_table_{name}", array) for name, array in arrays.items()) + whole
 
 

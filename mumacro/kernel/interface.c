@@ -18,18 +18,18 @@ static double mu_held_value(int quantity, double v, double y, double *bound) {
 MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
                                  mumacro_answer *out) {
     const mu_inputs in = {mu0, Fz, k, y0, omega, v0};
-    mumacro_case found;
+    double found[MU_ONE_WITH_SLOPES];
     if (out == NULL) return MUMACRO_NO_OUTPUT;
-    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, 1, &found);
-    out->mu_macro = found.mu_macro;
-    out->mu_ratio = found.mu_ratio;
-    out->error_bound = found.bound;
-    out->v_tilde = found.v_tilde;
-    out->y_tilde = found.y_tilde;
-    out->source = found.source;
-    out->regime = found.source < 0 ? -1 : MU_REGIME_OF_SOURCE[found.source];
-    memcpy(out->gradient, found.slopes, sizeof out->gradient);
-    memcpy(out->gradient_bound, found.slopes + 6, sizeof out->gradient_bound);
+    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, MU_ONE_WITH_SLOPES, found);
+    out->mu_macro = found[MU_ROW_MACRO];
+    out->mu_ratio = found[MU_ROW_RATIO];
+    out->error_bound = found[MU_ROW_BOUND];
+    out->v_tilde = found[MU_ROW_V];
+    out->y_tilde = found[MU_ROW_Y];
+    out->source = (int)found[MU_ONE_SOURCE];
+    out->regime = out->source < 0 ? -1 : MU_REGIME_OF_SOURCE[out->source];
+    memcpy(out->gradient, found + MU_ONE_SLOPES, sizeof out->gradient);
+    memcpy(out->gradient_bound, found + MU_ONE_SLOPES + 6, sizeof out->gradient_bound);
     return mu_first_bad(&in);
 }
 
@@ -68,9 +68,9 @@ MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y
 }
 
 MUMACRO_API double mumacro_mu_macro(double mu0, double Fz, double k, double y0, double omega, double v0) {
-    mumacro_case found;
-    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, 0, &found);
-    return found.mu_macro;
+    double found[MU_ONE_SLOPES];
+    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, MU_ONE_SLOPES, found);
+    return found[MU_ROW_MACRO];
 }
 
 MUMACRO_API void mumacro_mu_macros(int64_t n, const double *mu0, const double *Fz, const double *k, const double *y0,
@@ -78,10 +78,12 @@ MUMACRO_API void mumacro_mu_macros(int64_t n, const double *mu0, const double *F
     static const int64_t strides[6] = {1, 1, 1, 1, 1, 1};
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const double *const columns[6] = {mu0 + i, Fz + i, k + i, y0 + i, omega + i, v0 + i};
-        double ratio[MU_CHUNK], error[MU_CHUNK];
+        const int few = mu_few(n - i);
+        double rows[MU_ROW_V * MU_CHUNK];
         int8_t source[MU_CHUNK];
-        const mumacro_columns out = {mu_macro + i, ratio, bound ? bound + i : error, NULL, NULL, source, NULL, 0};
-        mu_cases(MU_TABLE, mu_few(n - i), columns, strides, &out);
+        mu_cases(MU_TABLE, few, columns, strides, MU_ROW_V, rows, MU_CHUNK, source);
+        memcpy(mu_macro + i, rows + MU_ROW_MACRO * MU_CHUNK, (size_t)few * sizeof *rows);
+        if (bound) memcpy(bound + i, rows + MU_ROW_BOUND * MU_CHUNK, (size_t)few * sizeof *rows);
     }
 }
 

@@ -6,7 +6,7 @@
  *     if (error) puts(mumacro_error_text(error)); else printf("%.6f +- %.1e\n", a.mu_macro, a.error_bound);
  *
  * C99 and C++17; of the mathematical library only sqrt and fabs.  No memory is taken, nothing is stored between calls,
- * any thread may call; a call needs up to 64 kB of stack.  Infinities and NaN are needed: no -ffast-math.
+ * any thread may call; a call needs up to 100 kB of stack.  Infinities and NaN are needed: no -ffast-math.
  * SPDX-License-Identifier: Apache-2.0 */
 #ifndef MUMACRO_H
 #define MUMACRO_H

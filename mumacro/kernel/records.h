@@ -1,4 +1,4 @@
-/* What the atlas and the quantities are described by, and what is filled with answers. */
+/* What the atlas and the quantities are described by. */
 #ifndef MU_RECORDS_H
 #define MU_RECORDS_H
 #include <stdint.h>
@@ -31,20 +31,4 @@ typedef struct {
     const char *name, *variable, *meaning;
     int while_sliding, smooth_at_border;
 } mumacro_quantity;
-
-/* Answers to n cases, each array of length n.  v_tilde, y_tilde and slopes may be NULL.  slopes: 12 rows, stride apart: d
- * mu_macro / d input and the bounds. */
-typedef struct {
-    double *mu_macro, *mu_ratio, *bound, *v_tilde, *y_tilde;
-    int8_t *source;
-    double *slopes;
-    int64_t stride;
-} mumacro_columns;
-
-/* The answer to one case; bound: of the error of mu_macro; l0 = mu0 Fz / k; slopes: d mu_macro / d input and bounds. */
-typedef struct {
-    double mu_macro, mu_ratio, bound, v_tilde, y_tilde, length_scale;
-    int source;
-    double slopes[12];
-} mumacro_case;
 #endif

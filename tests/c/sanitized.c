@@ -79,24 +79,22 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
 static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double *const *columns,
                       int single) {
     const size_t size = (size_t)n;
-    double *macro = numbers(size), *ratio = numbers(size), *bound = numbers(size), *v = numbers(size);
-    double *y = numbers(size), *slopes = numbers(12 * size);
+    double *rows[3] = {numbers(3 * size), numbers(5 * size), numbers(17 * size)};
     int8_t *source = (int8_t *)malloc(size);
     int64_t strides[6];
     for (int i = 0; i < 6; ++i) strides[i] = i == single ? 0 : 1;
-    for (int way = 0; way < 4; ++way) {
-        const mumacro_columns out = {macro, ratio, bound, way & 1 ? v : NULL, way & 1 ? y : NULL, source,
-                                     way & 2 ? slopes : NULL, n};
-        kernel->cases(data, n, (const double *const *)columns, strides, &out);
-    }
+    kernel->cases(data, n, (const double *const *)columns, strides, 3, rows[0], n, source);
+    kernel->cases(data, n, (const double *const *)columns, strides, 5, rows[1], n, source);
+    kernel->cases(data, n, (const double *const *)columns, strides, 17, rows[2], n, source);
     for (int64_t i = 0; i < n; ++i) {
-        double x[6];
-        mumacro_case found;
+        double x[6], *found = numbers(i % 2 ? 19 : 7);
         for (int j = 0; j < 6; ++j) x[j] = columns[j][i * strides[j]];
-        kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2, &found);
-        if (memcmp(&found.mu_macro, macro + i, sizeof *macro)) wrong("a case alone");
+        kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2 ? 19 : 7, found);
+        for (int way = 0; way < 3; ++way)
+            if (memcmp(found, rows[way] + i, sizeof *found)) wrong("a case alone");
+        free(found);
     }
-    free(macro), free(ratio), free(bound), free(v), free(y), free(slopes), free(source);
+    free(rows[0]), free(rows[1]), free(rows[2]), free(source);
 }
 
 /* What the builder calls. */
@@ -107,6 +105,7 @@ static void ask_builder(const mumacro_kernel *kernel, int64_t n, const double *v
     for (int piece = 0; piece < MU_PIECES; ++piece) kernel->border_scales(piece, n, y, one, two);
     kernel->normal_form_root(n, v, y, one);
     kernel->outer_expansion(n, v, rows);
+    kernel->cell_shares(n, v, one, two);
     free(one), free(two), free(rows);
 }
 
@@ -154,7 +153,7 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
         cells->cells = 1 + (int)(drawn() * 20.0);
         cells->polynomials = held[n++] = nonsense(64 * (size_t)cells->cells);
         cells->errors = held[n++] = nonsense((MU_SOURCES + 1) * 2);
-        cells->slope_errors = held[n++] = nonsense(2 * (size_t)cells->cells);
+        cells->slope_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
     }
     ask_all(kernel, &data, 61, ordinary, -1);
     ask_all(kernel, &data, 19, any, -1);
