@@ -114,7 +114,7 @@ def solve_for(
         curves = [Curve(sweep, np.zeros(1), curves[0].mu[:1]), *_curves(sweep, [TINY, high], x, mu)]
     ends = np.concatenate([curve.mu[[0, -1]] for curve in curves])
     reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
-    constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in MONOTONE else noise.max())
+    constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in MONOTONE else float(noise.max()))
     if within is None and unknown in MONOTONE and not constant:
         reach = _without_limit(sweep, reach)
     levels = tuple(wanted.tolist())
