@@ -256,8 +256,8 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
     """Tangential displacement over force [m/N] of a half-space under q ~ (1 - x^2/narrow^2 - y^2/wide^2)^(-1/2).
 
     At the middle it is (1/(8 pi G narrow wide)) times the integral over all directions of R ((1 - nu) + nu c^2), R the
-    half chord, c the cosine with the force: K ((1 - nu) + nu s) / (2 pi G wide) with K the complete elliptic integral of
-    modulus sqrt(1 - (narrow/wide)^2) and s = (K - E)/(k^2 K) along the wide axis, the rest of 1 along the narrow one.
+    half chord, c the cosine with the force.  With the complete elliptic integrals of modulus m = sqrt(1 -
+    (narrow/wide)^2) this is K ((1 - nu) + nu s) / (2 pi G wide), s = (K - E)/(m^2 K) along the wide axis, else 1 - s.
     """
     a, g = 1.0, narrow / wide  # K = pi / (2 agm(1, narrow/wide)), and s is a sum of the same means
     share = term = 0.5
