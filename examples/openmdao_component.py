@@ -1,0 +1,63 @@
+"""Friction as a component of an OpenMDAO model, with exact partial derivatives; least_power.py uses it.
+
+A value out of bounds raises AnalysisError, so that a line search steps back.
+"""
+
+import numpy as np
+import openmdao.api as om
+
+from mumacro import InputError, Surrogate
+from mumacro.inputs import FIELDS, UNITS
+from mumacro.interop.derivatives import quantities
+
+
+class Friction(om.ExplicitComponent):
+    """Six inputs in SI -> mu_macro [-], with the option ``power`` also oscillation_power [W], that of the shaker."""
+
+    def initialize(self):
+        self.options.declare("surrogate", default=None, types=Surrogate, allow_none=True, recordable=False)
+        self.options.declare("vec_size", default=1, types=int, lower=1)
+        self.options.declare("power", default=False, types=bool)
+
+    def setup(self):
+        size, self.table = self.options["vec_size"], self.options["surrogate"] or Surrogate.open()
+        for name in FIELDS:
+            self.add_input(name, np.ones(size), units=None if UNITS[name] == "-" else UNITS[name])
+        self.add_output("mu_macro", np.ones(size))
+        if self.options["power"]:
+            self.add_output("oscillation_power", np.ones(size), units="W")
+        self.declare_partials("*", "*", rows=np.arange(size), cols=np.arange(size))
+
+    def answer(self, inputs, gradient=False):
+        case = {name: np.asarray(inputs[name]) for name in FIELDS}
+        try:
+            found = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
+        except InputError as error:
+            raise om.AnalysisError(str(error)) from error
+        if self.options["power"] and np.isinf(case["k"]).any():
+            raise om.AnalysisError("the power of a rigid contact is not defined: give a finite k, or power=False")
+        return found, case["mu0"] * case["Fz"], case["omega"]
+
+    def compute(self, inputs, outputs):
+        found, force, omega = self.answer(inputs)
+        outputs["mu_macro"] = found.mu_macro
+        if self.options["power"]:
+            p = self.table.power(found.v_tilde, found.y_tilde)
+            outputs["oscillation_power"] = force * found.length_scale * omega * p
+
+    def compute_partials(self, inputs, partials):
+        found, force, omega = self.answer(inputs, gradient=True)
+        for name, slope in found.gradient.items():
+            partials["mu_macro", name] = slope
+        if self.options["power"]:
+            # force l0 omega p(v~, y~), v~ = v0 / (l0 omega), y~ = y0 / l0, l0 = force / k
+            p, along_v, along_y = self.table.slopes(found.v_tilde, found.y_tilde, "power")
+            by_speed, by_amplitude = quantities(self.table)["power"].slopes(found.v_tilde, found.y_tilde)
+            unit, by_force = force * found.length_scale, 2.0 * p - along_v - along_y
+            slopes = {
+                "mu0": omega * unit * by_force / inputs["mu0"], "Fz": omega * unit * by_force / inputs["Fz"],
+                "k": omega * unit * (along_v + along_y - p) / inputs["k"], "omega": unit * (p - along_v),
+                "y0": force * omega * by_amplitude, "v0": force * by_speed,
+            }  # fmt: skip
+            for name, slope in slopes.items():
+                partials["oscillation_power", name] = slope
