@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from mumacro import InputError, Surrogate
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run

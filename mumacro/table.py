@@ -197,10 +197,10 @@ def _fill(root: Any, table: Table) -> None:
         extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
         _put(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
-    for (name, axis, quantity), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
+    for (name, axis, tabulated), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
         group = border.createGroup(name)
         _put(group, axis.name, piece.nodes, charts.COORDINATES[axis.name])
-        _put(group, "value", piece.values, quantity, (axis.name,))
+        _put(group, "value", piece.values, tabulated, (axis.name,))
         group.setncatts({"cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error,
                          "range": np.array([axis.low, axis.high])})  # fmt: skip
     # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
