@@ -146,14 +146,15 @@ def export(
     table: Annotated[Path, typer.Argument(help="A table file.")],
     kind: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")],
     out: Annotated[
-        Path | None, typer.Option(help="The file to write; left out: the table's name with another suffix, here.")
+        Path | None,
+        typer.Option(help="The file to write, for c also a folder; left out: the table's name with another suffix."),
     ] = None,
 ) -> None:
-    """Write the table's plain grid for other tools; print what was written as JSON."""
+    """Write the table for other tools; print what was written as JSON."""
     if kind not in FORMATS:
         raise typer.BadParameter(f"must be one of {', '.join(FORMATS)}, got {kind!r}", param_hint="--format")
     target = Path(FORMATS[kind][0].format(table.stem)) if out is None else out
-    if target.is_dir():
+    if target.is_dir() and kind != "c":
         raise typer.BadParameter(f"{str(target)!r} is a folder", param_hint="--out")
     try:
         found = export_table(table, kind, target)

@@ -7,6 +7,7 @@ arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupte
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -70,29 +71,18 @@ def _law(words: Sequence[str]) -> int:
     parser = OneLineParser(
         prog="mumacro law",
         description="mu_macro over a range of one input, with the static value and the border of continuous sliding.",
-        epilog=f"{INPUTS}\nexamples:\n"
-        "  mumacro law 'mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690' --along v0 --from 1e-4 --to 1\n"
-        "  mumacro law 'mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690' --modelica 1e-3",
+        epilog=f"{INPUTS}\nexample:\n  mumacro law 'mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690' --along v0 --from 1e-4 --to 1",
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="the other five inputs")
     parser.add_argument("--along", choices=NAMES, default="v0", help="the swept input; default: v0")
-    parser.add_argument("--from", dest="start", type=float, help="first value, in its SI unit")
-    parser.add_argument("--to", dest="stop", type=float, help="last value, in its SI unit")
+    parser.add_argument("--from", dest="start", type=float, required=True, help="first value, in its SI unit")
+    parser.add_argument("--to", dest="stop", type=float, required=True, help="last value, in its SI unit")
     parser.add_argument("--points", type=int, default=25, help="number of values; default: 25")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
     parser.add_argument("--approximations", action="store_true", help="also print the approximations of the article")
-    parser.add_argument(
-        "--modelica", type=float, metavar="TOLERANCE",
-        help="instead print the table f_pos of Modelica's SupportFriction, within that share of mu0 Fz",
-    )  # fmt: skip
-    parser.add_argument("--radius", type=float, help="with --modelica: tau_pos of a BearingFriction of that radius [m]")
     _add_table(parser)
     chosen = parser.parse_intermixed_args(words)
-    if chosen.modelica is None and (chosen.start is None or chosen.stop is None):
-        parser.error("the following arguments are required: --from, --to")
-    if chosen.modelica is None and chosen.radius is not None:
-        parser.error("--radius requires --modelica")
-    print(command.law(chosen) if chosen.modelica is None else command.modelica_law(chosen))
+    print(command.law(chosen))
     return 0
 
 
@@ -136,32 +126,49 @@ def _eval(words: Sequence[str]) -> int:
     return evaluate(words)
 
 
-def _part(name: str) -> Any:
-    """The command of ``builder`` or ``service``: inside the package when installed, beside it in a checkout."""
+def _part(name: str, module: str = "__main__") -> Any:
+    """A module of ``builder`` or ``service``: inside the package when installed, beside it in a checkout."""
     package = Path(__file__).resolve().parent
     if (package / name).is_dir():
-        return importlib.import_module(f"mumacro.{name}.__main__")
-    if not (package.parent / name / "__main__.py").is_file():
+        return importlib.import_module(f"mumacro.{name}.{module}")
+    if not (package.parent / name).is_dir():
         raise ImpossibleError(f"this installation has no {name}: pip install 'mumacro[{name}]'")
     if str(package.parent) not in sys.path:
         sys.path.insert(0, str(package.parent))
-    return importlib.import_module(f"{name}.__main__")
+    return importlib.import_module(f"{name}.{module}")
 
 
 def _export(words: Sequence[str]) -> int:
     parser = OneLineParser(
         prog="mumacro export",
         description="Write the table in use for other tools.",
-        epilog="example:\n  mumacro export --format csv --out grid.csv",
+        epilog="examples:\n  mumacro export --format csv --out grid.csv\n"
+        "  mumacro export --format c --out mumacro.h       all in one header\n"
+        "  mumacro export --format c --out friction        mumacro.h, mumacro.c and mumacro_table.c in a folder",
     )
-    parser.add_argument("--format", required=True, help="csv, mat, modelica, parquet, ...")
-    parser.add_argument("--out", help="the file to write; default: the table's name with another suffix, here")
-    parser.add_argument("--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table")
+    parser.add_argument("--format", required=True, help="c, csv, fmu, fmu3, mat, modelica, parquet, wasm")
+    parser.add_argument(
+        "--out", help="the file to write, for c also a folder; default: the table's name with another suffix, here"
+    )
+    parser.add_argument(
+        "--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table; for c that of 1e-7"
+    )
     chosen = parser.parse_args(words)
+    if chosen.format == "c":
+        return _export_c(chosen.table, Path(chosen.out or "mumacro.h"))
     builder = _part("builder")
     path = command.open_table(chosen.table).path
     out = [] if chosen.out is None else ["--out", chosen.out]
     builder.app(["export", str(path), "--format", chosen.format, *out], prog_name="mumacro")
+    return 0
+
+
+def _export_c(which: str | None, out: Path) -> int:
+    """C sources need no extra: nothing but the library's own packages is loaded."""
+    source = _part("builder", "c.source")
+    surrogate = command.open_table(which or repr(source.DEFAULT_TOLERANCE))
+    written = source.write_c(surrogate.table, out)
+    print(json.dumps({"table": str(surrogate.path), "format": "c", "out": [str(path) for path in written]}, indent=2))
     return 0
 
 

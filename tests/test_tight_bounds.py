@@ -145,7 +145,7 @@ def test_the_closed_form_for_large_speed_is_bounded_tightly(table: Surrogate) ->
     with mpmath.workdps(24):
         truth = [slow_manifold(*point) for point in zip(v.tolist(), y.tolist(), strict=True)]
         share = [abs(m - t) / b for m, t, b in zip(mu.tolist(), truth, bound.tolist(), strict=True)]
-    assert 0.3 < max(share) <= 1.0
+    assert 0.5 < max(share) <= 1.0
 
 
 @pytest.mark.parametrize("rigid", [True, False], ids=["rigid", "at rest"])
@@ -162,7 +162,7 @@ def test_closed_forms_of_six_inputs_are_bounded_tightly(table: Surrogate, rigid:
             exact = mpmath.mpf(y0) * (omega / mpmath.mpf(v0) if rigid else k / (mpmath.mpf(mu0) * Fz))
             truth = 2 / mpmath.pi * mpmath.ellipk(-(exact**2)) if rigid else mpmath.sqrt(1 - exact**2)
             worst = max(worst, float(abs(found.mu_macro - mu0 * truth) / found.error_bound))
-    assert 0.2 < worst <= 1.0
+    assert 0.5 < worst <= 1.0
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)])

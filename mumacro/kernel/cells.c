@@ -6,15 +6,15 @@ typedef struct {
     double u, w;
 } mu_spot;
 
-MU_INLINE mu_spot mu_find(const double *block, int64_t cells, double a, double b) {
+MU_INLINE mu_spot mu_find(const double *block, int64_t first, int64_t cells, double a, double b) {
     const double x = mu_fma1(a, block[MU_STEP_A], block[MU_OFFSET_A]);
     const double z = mu_fma1(b, block[MU_STEP_B], block[MU_OFFSET_B]);
     /* an offset's rounding may leave a coordinate at the near end below zero: truncation keeps it in the first cell */
-    const double i = (double)(int32_t)x, j = (double)(int32_t)z;
-    const int64_t cell = (int32_t)(block[MU_FIRST] + i * block[MU_CELLS_B] + j);
+    const double i = (double)mu_whole_of(x), j = (double)mu_whole_of(z);
+    const double cell = block[MU_FIRST] + i * block[MU_CELLS_B] + j - (double)first, last = (double)(cells - 1);
     mu_spot out;
     /* no table and no input makes it read elsewhere */
-    out.cell = cell < 0 ? 0 : cell < cells ? cell : cells - 1;
+    out.cell = (int32_t)mu_min(mu_max(0.0, cell), last);
     out.u = 2.0 * (x - i) - 1.0;
     out.w = 2.0 * (z - j) - 1.0;
     return out;

@@ -15,7 +15,7 @@ static mu_answer mu_in_block(const mumacro_data *data, int quantity, const mu_pl
     const double *errors = cells->errors + 2 * at->block;
     mu_answer out = {0.0, 0.0, at->block};
     if (form.factor != MU_NOTHING) {
-        const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->cells, at->a, at->b);
+        const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
         out.value = mu_fma1(factor, mu_cell_value(cells->polynomials + 64 * spot.cell, spot.u, spot.w), base);
         out.value = mu_min(mu_max(out.value, 0.0), about->most);
     }
@@ -59,7 +59,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     const double *block = mu_block_of(data, at->block);
     const mu_turn turn = mu_turn_of(at);
     const mu_form_slopes form = mu_slopes_of_form(about->forms[at->block], at, &turn);
-    const mu_spot spot = mu_find(block, cells->cells, at->a, at->b);
+    const mu_spot spot = mu_find(block, cells->first, cells->cells, at->a, at->b);
     const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
     const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
@@ -75,7 +75,7 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
         /* At the border the quantity is smooth in v~, so q has no linear term in root = sqrt(1 - v~/v~crit); the
          * interpolant has one of the size of its error, which the chain rule would divide by root.  Taken out of the
          * last cell, where 1 - w = 2 step root, it leaves the slope bounded. */
-        const double step = block[MU_STEP_B], last = (double)(int32_t)mu_fma1(MU_SQRT2, step, block[MU_OFFSET_B]);
+        const double step = block[MU_STEP_B], last = (double)mu_whole_of(mu_fma1(MU_SQRT2, step, block[MU_OFFSET_B]));
         reach = mu_min(reach, 0.5 * step);
         if (mu_fma1(at->b, step, block[MU_OFFSET_B]) >= last) {
             const double root = MU_SQRT2 - at->b;

@@ -25,14 +25,14 @@ static mu_answer mu_limit(double value, double bound, int source) {
 /* The static limit, eq. (16).  The last digit of y~ = y0 k/(mu0 Fz) counts next to y~ = 1, where
  * |sqrt(1 - y - d) - sqrt(1 - y)| <= sqrt(d). */
 static mu_answer mu_ratio_limit(double v, double y) {
-    const double cusp = y < 1.0 + MU_ROUNDING ? sqrt(2.0 * MU_ROUNDING) : 0.0;
+    const double cusp = y < 1.0 + MU_STATIC_ROUNDING ? sqrt(2.0 * MU_STATIC_ROUNDING) : 0.0;
     const mu_answer common = mu_common_limit(v, y, 1.0);
     double mu;
     if (y == HUGE_VAL) return mu_limit(NAN, NAN, -1);
     if (common.source != MU_OTHER || v > 0.0) return common;
     if (y >= 1.0) return mu_limit(0.0, cusp, MU_STATIC_LIMIT);
     mu = sqrt((1.0 - y) * (1.0 + y));
-    return mu_limit(mu, mu_min(MU_ROUNDING / mu, cusp), MU_STATIC_LIMIT);
+    return mu_limit(mu, mu_min(MU_STATIC_ROUNDING / mu, cusp), MU_STATIC_LIMIT);
 }
 
 /* Above y~ = 1 the limit v~ -> 0 is no closed form: MU_OTHER, a very small v~ stands for it. */
