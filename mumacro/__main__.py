@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from mumacro.bundled import bundled_tables
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json
-from mumacro.command import open_table, read_case, read_value, run
+from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, read_case, read_value, run
 from mumacro.extras import missing
 from mumacro.inputs import NAMES, PER_UNIT, RAD_PER_CYCLE, SI
 from mumacro.inverse import solve_for
