@@ -30,34 +30,32 @@ class Friction(om.ExplicitComponent):
 
     def answer(self, inputs, gradient=False):
         case = {name: np.asarray(inputs[name]) for name in FIELDS}
-        try:
-            found = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
-        except InputError as error:
-            raise om.AnalysisError(str(error)) from error
         if self.options["power"] and np.isinf(case["k"]).any():
             raise om.AnalysisError("the power of a rigid contact is not defined: give a finite k, or power=False")
-        return found, case["mu0"] * case["Fz"], case["omega"]
+        try:
+            found = self.table.evaluate(case, gradient=gradient, groups=True, illegal="raise")
+            return found, case["mu0"] * case["Fz"], case["omega"]
+        except InputError as error:
+            raise om.AnalysisError(str(error)) from error
 
     def compute(self, inputs, outputs):
         found, force, omega = self.answer(inputs)
         outputs["mu_macro"] = found.mu_macro
         if self.options["power"]:
-            p = self.table.power(found.v_tilde, found.y_tilde)
-            outputs["oscillation_power"] = force * found.length_scale * omega * p
+            unit = force * found.length_scale * omega
+            outputs["oscillation_power"] = unit * self.table.power(found.v_tilde, found.y_tilde)
 
     def compute_partials(self, inputs, partials):
         found, force, omega = self.answer(inputs, gradient=True)
         for name, slope in found.gradient.items():
             partials["mu_macro", name] = slope
         if self.options["power"]:
-            # force l0 omega p(v~, y~), v~ = v0 / (l0 omega), y~ = y0 / l0, l0 = force / k
             p, along_v, along_y = self.table.slopes(found.v_tilde, found.y_tilde, "power")
             by_speed, by_amplitude = quantities(self.table)["power"].slopes(found.v_tilde, found.y_tilde)
             unit, by_force = force * found.length_scale, 2.0 * p - along_v - along_y
-            slopes = {
-                "mu0": omega * unit * by_force / inputs["mu0"], "Fz": omega * unit * by_force / inputs["Fz"],
-                "k": omega * unit * (along_v + along_y - p) / inputs["k"], "omega": unit * (p - along_v),
-                "y0": force * omega * by_amplitude, "v0": force * by_speed,
-            }  # fmt: skip
-            for name, slope in slopes.items():
-                partials["oscillation_power", name] = slope
+            for name in ("mu0", "Fz"):
+                partials["oscillation_power", name] = omega * unit * by_force / inputs[name]
+            partials["oscillation_power", "k"] = omega * unit * (along_v + along_y - p) / inputs["k"]
+            partials["oscillation_power", "omega"] = unit * (p - along_v)
+            partials["oscillation_power", "y0"] = force * omega * by_amplitude
+            partials["oscillation_power", "v0"] = force * by_speed

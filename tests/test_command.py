@@ -109,8 +109,9 @@ def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys):
 def test_a_unit_may_be_given_beside_the_number_or_apart(capsys, tightest):
     expected = tightest.evaluate(**VALUES).mu_macro
     for case in (
-        "mu0=30% Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s", "mu0=30 % Fz = 0.01 kN k=1 N/um y0=2 um f=20690Hz, v0=10mm/s"
-    ):  # fmt: skip
+        "mu0=30% Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s",
+        "mu0=30 % Fz = 0.01 kN k=1 N/um y0=2 um f=20690Hz, v0=10mm/s",
+    ):
         assert json.loads(said(capsys, 0, case, "--json"))["mu_macro"] == expected
     known = CASE.replace("v0=0.01", "")
     for ends in (("1e-3", "1"), ("1mm/s", "100cm/s")):
