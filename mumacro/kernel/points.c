@@ -39,8 +39,8 @@ static mu_answer mu_answer_at(const mumacro_data *data, int quantity, double v, 
     return out;
 }
 
-/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what interpolation leaves out,
- * is 64 at both edges and up to 8 between them. */
+/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what interpolation leaves
+ * out, is 64 at both edges and up to 8 between them. */
 MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
 
 /* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from 1344 to 64. */
@@ -67,9 +67,9 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     double share_a = mu_edge_share(spot.u), share_b = mu_edge_share(spot.w);
     mu_slopes out;
     if (about->about.smooth_at_border && at->block >= MU_S_LOW && at->block != MU_CORNER) {
-        /* At the border the quantity is smooth in v~, so q has no linear term in sqrt(1 - v~/v~crit); the interpolant has
-         * one of the size of its error, which the chain rule would divide by that root.  Taken out of the last cell, it
-         * leaves the slope bounded. */
+        /* At the border the quantity is smooth in v~, so q has no linear term in sqrt(1 - v~/v~crit); the interpolant
+         * has one of the size of its error, which the chain rule would divide by that root.  Taken out of the last
+         * cell, it leaves the slope bounded. */
         const double last = (double)mu_whole_of(mu_fma1(MU_SQRT2, block[MU_STEP_B], block[MU_OFFSET_B]));
         reach = mu_min(reach, 0.5 * block[MU_STEP_B]);
         if (mu_fma1(at->b, block[MU_STEP_B], block[MU_OFFSET_B]) >= last) {
