@@ -46,12 +46,12 @@ enum { MU_BORDER_LOW, MU_BORDER_MID, MU_BORDER_HIGH, MU_PIECES };
 /* Each with coordinates a and b; s stands for sigma in evaluation and the angle for its tangent, see charts.c. */
 MU_LISTED mumacro_chart MU_CHART[MU_CHARTS] = {
     /* Continuous sliding, y~ <= 1.5.  a = y~^2, b = v~^2/(1 + v~^2): the orbit is analytic in both squares, and b
-     * brings v~ = infinity to 1.  q is the deficit 1 - mu~ over that of eq. (31), 1 at y~ = 0: no digits are lost there. */
+     * brings v~ = infinity to 1.  q is the deficit 1 - mu~ over that of eq. (31), 1 at y~ = 0: no digits are lost. */
     {"continuous_low", MU_CONTINUOUS, {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT}, {"v_squared_share", 0.0, 1.0},
      "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2", MU_ROUNDING, 0.0},
     /* Continuous sliding, 1.5 < y~ <= 2^17.  a = ln y~, b = ln(v~/v~crit) from the border to rho = 128, where two terms
-     * take over.  q is mu~ over the cosine v~/sqrt(v~^2 + y~^2): it grows from 1 as slowly as a logarithm.  Three blocks,
-     * each with its own number of cells. */
+     * take over.  q is mu~ over the cosine v~/sqrt(v~^2 + y~^2): it grows from 1 as slowly as a logarithm.  Three
+     * blocks, each with its own number of cells. */
     {"continuous_mid_1", MU_CONTINUOUS, {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID}, {"ln_rho", 0.0, MU_LN_RHO_MAX},
      MU_HYPOTENUSE, 0.0, 6.0 * MU_ROUNDING},
     {"continuous_mid_2", MU_CONTINUOUS, {"ln_y", MU_LN_Y_MID, MU_LN_Y_HIGH}, {"ln_rho", 0.0, MU_LN_RHO_MAX},
