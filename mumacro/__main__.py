@@ -71,28 +71,18 @@ def _law(words: Sequence[str]) -> int:
         prog="mumacro law",
         description="mu_macro over a range of one input, with the static value and the border of continuous sliding.",
         epilog=f"{INPUTS}\nexamples:\n"
-        "  mumacro law 'mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690' --along v0 --from 1e-4 --to 1\n"
-        "  mumacro law 'mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690' --modelica 1e-3",
+        "  mumacro law 'mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690' --along v0 --from 1e-4 --to 1",
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="the other five inputs")
     parser.add_argument("--along", choices=NAMES, default="v0", help="the swept input; default: v0")
-    parser.add_argument("--from", dest="start", type=float, help="first value, in its SI unit")
-    parser.add_argument("--to", dest="stop", type=float, help="last value, in its SI unit")
+    parser.add_argument("--from", dest="start", type=float, required=True, help="first value, in its SI unit")
+    parser.add_argument("--to", dest="stop", type=float, required=True, help="last value, in its SI unit")
     parser.add_argument("--points", type=int, default=25, help="number of values; default: 25")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
     parser.add_argument("--approximations", action="store_true", help="also print the approximations of the article")
-    parser.add_argument(
-        "--modelica", type=float, metavar="TOLERANCE",
-        help="instead print the table f_pos of Modelica's SupportFriction, within that share of mu0 Fz",
-    )  # fmt: skip
-    parser.add_argument("--radius", type=float, help="with --modelica: tau_pos of a BearingFriction of that radius [m]")
     _add_table(parser)
     chosen = parser.parse_intermixed_args(words)
-    if chosen.modelica is None and (chosen.start is None or chosen.stop is None):
-        parser.error("the following arguments are required: --from, --to")
-    if chosen.modelica is None and chosen.radius is not None:
-        parser.error("--radius requires --modelica")
-    print(command.law(chosen) if chosen.modelica is None else command.modelica_law(chosen))
+    print(command.law(chosen))
     return 0
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from mumacro.bundled import bundled_tables
 from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, read_number, suggestion
 from mumacro.inverse import Root, solve_for
-from mumacro.law import approximations, friction_law, straight_pieces, sweep_values
+from mumacro.law import approximations, friction_law, sweep_values
 from mumacro.surrogate import Surrogate
 
 __all__ = [
@@ -28,7 +28,6 @@ __all__ = [
     "OneLineParser",
     "UsageError",
     "law",
-    "modelica_law",
     "one_case",
     "open_table",
     "read_case",
@@ -214,26 +213,6 @@ def law(chosen: Namespace) -> str:
         rows.append([cell if isinstance(cell, str) else _shown(cell) for cell in cells])
     marks = [f"border of continuous sliding at {chosen.along} = {b[chosen.along]:.12g} {unit}" for b in border]
     return "\n".join([_lines(rows), *marks])
-
-
-def modelica_law(chosen: Namespace) -> str:
-    """``mumacro law --modelica``: the law over v0 as the table of SupportFriction, with a radius of BearingFriction."""
-    if chosen.along != "v0" or chosen.json or chosen.approximations:
-        raise UsageError("--modelica is a table over v0 alone: leave --along, --json and --approximations out")
-    if chosen.radius is not None and not (math.isfinite(chosen.radius) and chosen.radius > 0.0):
-        raise UsageError(f"--radius {chosen.radius:g} is no radius [m] > 0")
-    case = read_case(chosen.words, "v0")
-    surrogate = open_table(chosen.table)
-    v0, mu = straight_pieces(surrogate, case, chosen.modelica)
-    radius = chosen.radius or 1.0
-    name, heading = ("f_pos", "v [m/s], f [N]") if chosen.radius is None else ("tau_pos", "w [rad/s], tau [N.m]")
-    pairs = zip((v0 / radius).tolist(), (mu * (case["Fz"] * radius)).tolist(), strict=True)
-    return "\n".join([
-        f"// {' '.join(chosen.words)}; {surrogate.id}; within {chosen.modelica:g} mu0 Fz at every speed",
-        f"// {heading}; the first row is the static limit, the last two lie on the plateau",
-        f"{name} = [",
-        ";\n".join(f"  {x!r}, {y!r}" for x, y in pairs) + "]",
-    ])  # fmt: skip
 
 
 def _shown(value: float) -> str:

@@ -27,7 +27,6 @@ __all__ = [
     "border_speeds",
     "borders",
     "friction_law",
-    "straight_pieces",
     "sweep_values",
 ]
 
@@ -78,8 +77,6 @@ _FORMULAS = {
     "large_amplitude": (closed_forms.border_large_amplitude, 1.0, math.inf),
     "blend": (closed_forms.border_blend, 0.0, math.inf),
 }
-# straight pieces are fitted to so many values; below the first of them mu_macro / mu0 has risen by 1e-6 at the most
-_SAMPLES, _FIRST_SHARE, _LEAST_SPEED = 9001, 1e-18, 1e-280
 
 
 @dataclass(frozen=True)
@@ -178,67 +175,6 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
         np.broadcast_to(at_rest.mu_macro, values.shape),
         border_crossings(surrogate, along, known, float(values[0]), float(values[-1])),
     )
-
-
-def straight_pieces(
-    surrogate: Surrogate, case: Mapping[str, float | None], tolerance: float = 1e-3
-) -> tuple[Array, Array]:
-    """The friction law over v0 as few straight pieces, for simulators that interpolate a table.
-
-    The first row is the static limit, v0 = 0.  The last two have one value, so that a simulator that extrapolates
-    through them stays on the plateau: there mu_macro is within ``tolerance / 2`` of mu0, by (2/pi) K(iq) >= 1 - q^2 / 4
-    with q = y0 omega / v0, eq. (37).
-
-    Parameters
-    ----------
-    surrogate : Surrogate
-        The table to evaluate.
-    case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
-    tolerance : float
-        Largest distance from mu_macro at any v0, as a share of mu0; above 0, up to 0.1.
-
-    Returns
-    -------
-    v0, mu_macro : ndarray
-        Speeds [m/s], ascending from 0, and values [-]; both (n,).
-
-    Raises
-    ------
-    InputError
-        An input that is missing or out of bounds, a tolerance out of bounds, y0 omega beyond double range.
-
-    Examples
-    --------
-    >>> import mumacro
-    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
-    >>> v0, mu = straight_pieces(mumacro.open(), case, 0.02)
-    >>> print(v0.round(3), mu.round(4))
-    [0.    0.012 0.028 0.047 0.068 0.594 1.3   2.6  ] [0.2236 0.2431 0.2581 0.2675 0.2715 0.2906 0.2973 0.2973]
-    """
-    if not 0.0 < tolerance <= 0.1:
-        raise InputError("tolerance", tolerance, "> 0 and <= 0.1")
-    known = checked_case(case, "v0")
-    if known["y0"] == 0.0 or known["omega"] == 0.0:
-        return np.array([0.0, 1.0]), np.full(2, known["mu0"])
-    peak = known["y0"] * known["omega"]
-    end = peak / math.sqrt(2.0 * tolerance)
-    if not (_LEAST_SPEED < end < 1.0 / _LEAST_SPEED):
-        raise InputError("omega", known["omega"], f"such that y0 omega = {peak:.3g} m/s is a speed in double range")
-    v0 = np.concatenate(([0.0], np.geomspace(_FIRST_SHARE * end, end, _SAMPLES)))
-    v0 = np.union1d(v0, [c.value for c in border_crossings(surrogate, "v0", known, 0.0, end)])
-    mu = surrogate.evaluate({**known, "v0": v0}).mu_macro
-    kept, pieces = {0, v0.size - 1}, [(0, v0.size - 1)]
-    while pieces:
-        first, last = pieces.pop()
-        inner = slice(first + 1, last)
-        gap = np.abs(mu[inner] - np.interp(v0[inner], v0[[first, last]], mu[[first, last]]))
-        if gap.size and gap.max() > 0.5 * tolerance * known["mu0"]:
-            worst = first + 1 + int(np.argmax(gap))
-            kept.add(worst)
-            pieces += [(first, worst), (worst, last)]
-    rows = sorted(kept)
-    return np.append(v0[rows], 2.0 * end), np.append(mu[rows], mu[-1])
 
 
 def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:

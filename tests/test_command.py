@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 import subprocess
 import sys
 
@@ -15,7 +14,7 @@ from mumacro.__main__ import COMMANDS, main
 from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
-LAW_FROM = ("law", CASE, "--from", "1", "--to", "2", "--radius", "1")
+LAW_FROM = ("law", CASE, "--from", "1", "--to", "2", "--scale", "cubic")
 VALUES = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
 
 
@@ -161,26 +160,6 @@ def test_a_law_along_the_frequency_is_one_along_omega(capsys):
     assert over_f["border"][0]["f"] * math.tau == close(over_omega["border"][0]["omega"], rel=1e-14)
     text = said(capsys, 0, "law", known, "--along", "f", "--from", "100", "--to", "1e5", "--approximations")
     assert "small_amplitude" in text
-
-
-def test_a_law_for_modelica_is_the_force_or_the_torque(capsys, tightest):
-    known = CASE.replace("v0=0.01", "")
-    tables = {}
-    for name, words in (("f_pos", ()), ("tau_pos", ("--radius", "0.02"))):
-        text = said(capsys, 0, "law", known, "--modelica", "1e-3", *words)
-        matrix = re.search(rf"^{name} = \[([^\]]*)\]$", text, re.MULTILINE)[1]
-        tables[name] = np.array([[float(x) for x in row.split(",")] for row in matrix.split(";")])
-        assert all(line.startswith("//") for line in text.split(name)[0].splitlines())
-    speeds, force = tables["f_pos"].T
-    expected = 10.0 * tightest.evaluate(**{**VALUES, "v0": speeds[:-1]}).mu_macro
-    assert force[:-1] == close(expected, rel=1e-14)
-    assert (speeds[0], force[-1]) == (0.0, force[-2])
-    assert tables["tau_pos"] == close(tables["f_pos"] * [50.0, 0.02], rel=1e-14)
-    for words, part in (
-        (("--modelica", "1e-3", "--along", "y0"), "leave --along"), (("--modelica", "1e-3", "--json"), "leave --along"),
-        (("--modelica", "1e-3", "--radius", "0"), "no radius"), (("--modelica", "0"), "tolerance must be > 0"),
-    ):  # fmt: skip
-        assert part in said(capsys, 2, "law", known, *words)
 
 
 @pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])

@@ -7,7 +7,6 @@ import pytest
 
 from comparing import close
 from mumacro import closed_forms
-from mumacro.errors import InputError
 from mumacro.inputs import FIELDS
 from mumacro.law import (
     APPROXIMATIONS,
@@ -16,7 +15,6 @@ from mumacro.law import (
     approximations,
     border_speeds,
     friction_law,
-    straight_pieces,
     sweep_values,
 )
 
@@ -110,31 +108,3 @@ def test_rigid_contact_is_given_as_none_or_infinity(surrogate) -> None:
         law = friction_law(surrogate, "v0", values, case)
         assert (border_speeds(surrogate, law, case)["exact"] == 0.0).all()
         assert approximations(surrogate, law, case)["rigid"] == close(0.3 * closed_forms.outer(r), rel=1e-14)
-
-
-@pytest.mark.parametrize("tolerance", [0.1, 1e-2, 1e-3, 1e-4])
-@pytest.mark.parametrize("y", [1e-3, 0.3, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 3.0, 1e3, math.inf])
-def test_straight_pieces_are_as_near_as_they_promise_at_every_speed(surrogate, y, tolerance) -> None:
-    case = {**UNIT, "y0": y * LENGTH} if math.isfinite(y) else {**UNIT, "k": None, "y0": 0.1}
-    v0, mu = straight_pieces(surrogate, case, tolerance)
-    assert v0[0] == 0.0
-    assert mu[0] == surrogate.evaluate(**case, v0=0.0).mu_macro == 0.25 * closed_forms.static_limit(y)
-    assert mu[-1] == mu[-2]
-    assert (np.diff(v0) > 0.0).all()
-    rng = np.random.default_rng(5)
-    tried = np.concatenate((v0, np.geomspace(v0[-1] * 1e-24, v0[-1] * 1e6, 20_011), rng.uniform(0.0, v0[-1], 20_011)))
-    error = np.abs(np.interp(tried, v0, mu) - surrogate.evaluate(**case, v0=tried).mu_macro)
-    assert error.max() <= tolerance * case["mu0"]
-    assert v0.size <= 8 + 4 / math.sqrt(tolerance)
-
-
-def test_straight_pieces_without_vibration_and_with_bad_inputs(surrogate) -> None:
-    for still in ({"y0": 0.0}, {"y0": 1.0, "omega": 0.0}):
-        v0, mu = straight_pieces(surrogate, {**UNIT, **still})
-        assert (v0.tolist(), mu.tolist()) == ([0.0, 1.0], [0.25, 0.25])
-    for wrong in ({"y0": 1e-200, "omega": 1e-200}, {"y0": 1e300}, {"y0": -1.0}):
-        with pytest.raises(InputError):
-            straight_pieces(surrogate, {**UNIT, **wrong})
-    for tolerance in (0.0, 0.2, math.nan):
-        with pytest.raises(InputError, match="tolerance"):
-            straight_pieces(surrogate, {**UNIT, "y0": 1.0}, tolerance)
