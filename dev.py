@@ -19,6 +19,7 @@ its lock files are unchanged; the kernel, ``mumacro/_kernel.so``, is compiled ag
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import http.client
 import json
@@ -30,7 +31,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -194,30 +195,23 @@ def ask(port: int, path: str) -> tuple[int, str]:
 def wait_until_ready(server: subprocess.Popen[bytes], port: int) -> float:
     """Poll /readyz; return the seconds it took."""
     started = time.monotonic()
-    last = "no connection yet"
-    while time.monotonic() - started < READY_S:
+    while (seconds := time.monotonic() - started) < READY_S:
         if server.poll() is not None:
             raise FailedError(f"The service ended by itself with exit code {server.returncode}")
-        try:
-            status, body = ask(port, "/readyz")
-        except (OSError, http.client.HTTPException) as error:
-            last = str(error)
-        else:
-            if status == 200:
-                return time.monotonic() - started
-            last = f"{status} {body}"
+        with contextlib.suppress(OSError, http.client.HTTPException):
+            if ask(port, "/readyz")[0] == 200:
+                return seconds
         time.sleep(0.1)
-    raise FailedError(f"The service was not ready after {READY_S:.0f} s: {last}")
+    raise FailedError(f"The service was not ready after {READY_S:.0f} s")
 
 
 def stop(server: subprocess.Popen[bytes]) -> None:
-    if server.poll() is None:
-        server.terminate()
-        try:
-            server.wait(STOP_S)
-        except subprocess.TimeoutExpired:
-            server.kill()
-            server.wait()
+    server.terminate()
+    try:
+        server.wait(STOP_S)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
 
 
 def demo() -> int:
@@ -283,14 +277,24 @@ def docs_command(folder: str | Path) -> tuple[str | Path, ...]:
     return BIN / "sphinx-build", "-W", "--keep-going", "-q", "docs", folder
 
 
-def build_page(folder: str) -> int:
+def docs() -> int:
+    ensure("dev")
+    code = run(*docs_command("build/docs"), env=environment())
+    print("The site is in build/docs: open build/docs/index.html" if code == 0 else "FAILED: see above")
+    return code
+
+
+def page() -> int:
     """Make the page that computes in the browser from the table of 1e-7: a folder for any static host."""
-    table, module = "tables/mumacro-1e-7.nc", "build/mumacro.wasm"
+    ensure("dev")
+    table, module, folder = "tables/mumacro-1e-7.nc", "build/mumacro.wasm", "build/page"
     (ROOT / "build").mkdir(exist_ok=True)
     python = (PYTHON, "-m")
     export = (*python, "builder", "export", table, "--format", "wasm", "--out", module)
     code = run(*export, env=environment(), quiet=True)
-    return code or run(*python, "service.static_page", table, module, folder, env=environment())
+    code = code or run(*python, "service.static_page", table, module, folder, env=environment())
+    print(f"The page is in {folder}; try it:  python3 -m http.server -d {folder}" if code == 0 else "FAILED")
+    return code
 
 
 def passes(title: str, tool: str | Path, *arguments: str | Path, **variables: str) -> bool:
@@ -301,12 +305,6 @@ def passes(title: str, tool: str | Path, *arguments: str | Path, **variables: st
     )
     print(f"--- {title}\n{done.stdout}", end="", flush=True)
     return done.returncode == 0
-
-
-def documentation_builds() -> bool:
-    """Build the site into a temporary folder."""
-    with tempfile.TemporaryDirectory() as folder:
-        return passes("documentation", *docs_command(folder))
 
 
 def packages_pass(folder: Path, platforms: Iterable[str]) -> bool:
@@ -325,9 +323,10 @@ def packages_pass(folder: Path, platforms: Iterable[str]) -> bool:
     return good
 
 
-def packages_of_this_machine_pass() -> bool:
+def in_a_folder(check: Callable[[Path], bool]) -> bool:
+    """Run a check that writes files, in a folder that ends with it."""
     with tempfile.TemporaryDirectory() as folder:
-        return packages_pass(Path(folder), [""])
+        return check(Path(folder))
 
 
 def wheels() -> int:
@@ -341,7 +340,7 @@ def wheels() -> int:
     return not good
 
 
-def check() -> list[str]:
+def failed_checks() -> list[str]:
     """Run every check but pytest, one on each processor; return the names of those that failed."""
     if stale := stale_locks():
         raise FailedError(
@@ -353,7 +352,7 @@ def check() -> list[str]:
         raise FailedError("no *.nc in tables/")
     commands: dict[str, tuple[str | Path, ...]] = {
         "mypy": ("mypy",),
-        "mypy of dev.py": ("mypy", "dev.py"),
+        "mypy of dev.py": ("mypy", "dev.py", "hatch_build.py"),
         "CF conventions": ("compliance-checker", "--test=cf:1.11", *tables),
         "ruff check": ("ruff", "check", "."),
         "ruff format": ("ruff", "format", "--check", "."),
@@ -365,11 +364,17 @@ def check() -> list[str]:
     }
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # the longest first
         results = {
-            "documentation": pool.submit(documentation_builds),
-            "packages": pool.submit(packages_of_this_machine_pass),
+            "documentation": pool.submit(in_a_folder, lambda folder: passes("documentation", *docs_command(folder))),
+            "packages": pool.submit(in_a_folder, lambda folder: packages_pass(folder, [""])),
         }
         results |= {title: pool.submit(passes, title, *words) for title, words in commands.items()}
     return [title for title, result in results.items() if not result.result()]
+
+
+def check() -> int:
+    failed = failed_checks()
+    print(f"FAILED: {', '.join(failed)}" if failed else "All checks passed")
+    return len(failed)
 
 
 def test(arguments: list[str]) -> int:
@@ -378,7 +383,7 @@ def test(arguments: list[str]) -> int:
     Without ``--quick`` the slow tests run too: an empty ``-m`` replaces the ``-m`` of pyproject.toml.  Every
     processor runs a file at a time; ``-n 0`` among ARGS keeps them in one process.
     """
-    failed = check()
+    failed = failed_checks()
     print("--- pytest", flush=True)
     chosen = [word for word in arguments if word != "--quick"]
     which = () if len(chosen) < len(arguments) else ("-m", "")
@@ -452,6 +457,13 @@ def lock(arguments: list[str]) -> int:
     return 0
 
 
+def execute(command: list[str]) -> int:
+    """Run any command in the development environment."""
+    ensure("dev")
+    found = shutil.which(command[0], path=environment()["PATH"])
+    return run(found or command[0], *command[1:], env=environment())
+
+
 # --- command line -------------------------------------------------------------------------------------
 
 
@@ -465,39 +477,20 @@ def use_a_newer_python() -> None:
     raise FailedError(f"Python 3.11 or newer is needed; this is {version}, and no newer one is on the PATH")
 
 
+ALONE = {"demo": demo, "check": check, "docs": docs, "page": page, "wheels": wheels}
+WITH_ARGUMENTS = {"test": test, "serve": serve, "exec": execute, "lock": lock}
+
+
 def main(arguments: list[str]) -> int:
     """Run the command that the first argument names; 2 if it is unknown."""
     word, rest = (arguments[0], arguments[1:]) if arguments else ("", [])
     try:
         if sys.version_info < OLDEST:
             use_a_newer_python()
-        if word == "demo" and not rest:
-            return demo()
-        if word == "test":
-            return test(rest)
-        if word == "check" and not rest:
-            failed = check()
-            print(f"FAILED: {', '.join(failed)}" if failed else "All checks passed")
-            return len(failed)
-        if word == "docs" and not rest:
-            ensure("dev")
-            code = run(*docs_command("build/docs"), env=environment())
-            print("The site is in build/docs: open build/docs/index.html" if code == 0 else "FAILED: see above")
-            return code
-        if word == "page" and not rest:
-            ensure("dev")
-            code = build_page("build/page")
-            print("The page is in build/page; try it:  python3 -m http.server -d build/page" if code == 0 else "FAILED")
-            return code
-        if word == "wheels" and not rest:
-            return wheels()
-        if word == "serve":
-            return serve(rest)
-        if word == "exec" and rest:
-            ensure("dev")
-            return run(shutil.which(rest[0], path=environment()["PATH"]) or rest[0], *rest[1:], env=environment())
-        if word == "lock":
-            return lock(rest)
+        if word in ALONE and not rest:
+            return ALONE[word]()
+        if word in WITH_ARGUMENTS and (rest or word != "exec"):
+            return WITH_ARGUMENTS[word](rest)
     except FailedError as error:
         print(f"dev.py {word}: {error}", file=sys.stderr)
         return 1

@@ -98,22 +98,19 @@ def run_together(commands: list[list[str]], folder: str) -> None:
 
 def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     """Compile into a folder; return the path of the shared object and its platform."""
-    compiler, platform = choose(platform)
-    system = ([], "_kernel.dll") if platform.startswith("win") else (["-lm"], "_kernel.so")
-    units = {level: ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in levels(platform).items()}
-    units["dispatch"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in levels(platform))]
-    compiler = [*compiler, *FLAGS]
+    command, platform = choose(platform)
+    name = "_kernel.dll" if platform.startswith("win") else "_kernel.so"
+    # musl has another file name on every system; it is always there, Python has loaded it.
+    libraries = {"win": [], "mus": ["-nostdlib"]}.get(platform[:3], ["-lm"])
+    sources = ROOT / "mumacro" / "kernel"
+    objects = {
+        f"{level}.o": [f"{sources / 'level.c'}", f"-DMUMACRO_LEVEL={level}", *flags]
+        for level, flags in levels(platform).items()
+    }
+    objects["dispatch.o"] = [f"{sources / 'dispatch.c'}", *(f"-DMUMACRO_HAS_{x.upper()}" for x in levels(platform))]
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        sources = ROOT / "mumacro" / "kernel"
-        run_together(
-            [
-                [*compiler, *flags, "-c", str(sources / name), "-o", f"{unit}.o"]
-                for unit, (name, *flags) in units.items()
-            ],
-            place,
-        )
-        libraries, name = system
-        run_together([[*compiler, "-shared", *(f"{unit}.o" for unit in units), "-o", name, *libraries]], place)
+        run_together([[*command, *FLAGS, *words, "-c", "-o", made] for made, words in objects.items()], place)
+        run_together([[*command, *FLAGS, "-shared", *objects, "-o", name, *libraries]], place)
         # A running program keeps the old file: the new one takes its place and is not written into it.
         return (Path(place) / name).replace(folder / name), platform
 

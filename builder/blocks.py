@@ -6,18 +6,19 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from mumacro.kernel_cache import kernel
 from numpy.typing import NDArray
 
 from mumacro import charts
 from mumacro.border import Border
-from mumacro.cells import LOCAL, WIDTH, chebyshev_coefficients, interpolation_matrix, nodes
-from mumacro.charts import BORDER_PIECES, CONTINUOUS, MU, POWER, STICK, Axis, Chart
+from mumacro.cells import LOCAL, WIDTH, cell_scale, chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.charts import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
+from mumacro.library import kernels
 from mumacro.table import Block, BorderPiece
 
+from .quantities import SOLVED
 from .sweep import Sweep
 
-__all__ = ["build_block", "build_border", "forms", "tabulated"]
+__all__ = ["build_block", "build_border", "solve_nodes", "tabulated"]
 
 Array = NDArray[np.float64]
 MAX_NODES = 96
@@ -29,31 +30,28 @@ CELL_SHARE = (
 NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
 
 
-@kernel
-def _forms(quantity: int, block: int, v: Array, y: Array, eta: Array, base: Array, factor: Array) -> None:
-    for i in range(v.size):
-        phi = charts.normal_form_root(v[i], eta[i]) if block == charts.CORNER else 0.0
-        base[i], factor[i] = charts.form(quantity, block, v[i], y[i], phi)
+def tabulated(index: int, v: Array, y: Array, eta: Array, sweep: Sweep) -> dict[str, Array]:
+    """What a block tabulates at points of one shape, by quantity, from fresh solves; eta = y~ - 1."""
+    chart = charts.CHARTS[index]
+    solved = sweep.solve("continuous" if chart.regime == CONTINUOUS else "full", v, y, eta)
+    found = {}
+    for code, quantity in enumerate(QUANTITIES):
+        if chart.holds(quantity):
+            base, factor = kernels[-1].forms(code, index, v, y, eta)
+            rest, complement = solved[quantity.name] - base, SOLVED[quantity.name].complement
+            if complement:  # next to 1 it has the digits
+                rest = np.where(base == 1.0, -solved[complement], rest)
+            found[quantity.name] = rest / factor
+    return found
 
 
-def forms(quantity: int, block: int, v: Array, y: Array, eta: Array) -> tuple[Array, Array]:
-    """(base, factor) of :func:`mumacro.charts.form` at points of one shape; eta = y~ - 1 is exact in the corner."""
-    v, y, eta = (np.ascontiguousarray(x, dtype=np.float64) for x in (v, y, eta))
-    base, factor = np.empty(v.shape), np.empty(v.shape)
-    _forms(quantity, block, *(x.reshape(-1) for x in (v, y, eta, base, factor)))
-    return base, factor
-
-
-def tabulated(block: int, v: Array, y: Array, eta: Array, solved: dict[str, Array]) -> tuple[Array, Array, Array]:
-    """What the block tabulates for mu~, power and stick fraction, from solves at its points."""
-    base, factor = forms(MU, block, v, y, eta)
-    # next to mu~ = 1 the deficit has the digits
-    mu = np.where(base == 1.0, -solved["deficit"], solved["mu_ratio"] - base) / factor
-    lead, scale = forms(POWER, block, v, y, eta)
-    power = (solved["power"] - lead) / scale
-    if charts.CHARTS[block].regime == CONTINUOUS:
-        return mu, power, np.empty(0)
-    return mu, power, solved["stick_fraction"] / forms(STICK, block, v, y, eta)[1]
+def solve_nodes(
+    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves."""
+    chart = charts.CHARTS[index]
+    a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
+    return a, b, tabulated(index, *chart.point(a[:, None], b[None, :], border), sweep)
 
 
 def _next(n: int) -> int:
@@ -117,12 +115,12 @@ def _block_cells(chart: Chart, values: Array, axis: int, wanted: float) -> int:
     return _fewest(own, exact, wanted, False)
 
 
-def _border_cells(axis: Axis, values: Array, wanted: float) -> int:
-    c = chebyshev_coefficients(values)[:, None]
+def _border_cells(piece: int, values: Array, wanted: float) -> int:
+    axis, c = BORDER_PIECES[piece][1], chebyshev_coefficients(values)
 
     def exact(x: Array) -> Array:
-        out: Array = interpolation_matrix(values.size, _position(axis, x)) @ c
-        return out * np.exp(0.5 * x)[:, None] if axis.name == "ln_y" else out
+        out: Array = interpolation_matrix(values.size, _position(axis, x)) @ c * cell_scale(piece, x)
+        return out[:, None]
 
     return _fewest(axis, exact, wanted, True)
 
@@ -131,17 +129,17 @@ def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
     """The stored border; its own tolerance is tighter than the table's, since every stick-slip node is built on it."""
     wanted = max(1e-3 * tolerance, 4e-15)
     pieces = []
-    for name, axis, _ in BORDER_PIECES:
-        n = 4 if name == "high" else 12
+    for piece, (_, axis, _) in enumerate(BORDER_PIECES):
+        to_infinity = axis.name == "inverse_y"
+        n = 4 if to_infinity else 12
         while True:
             x = nodes(n, axis.low, axis.high)
-            y = charts.amplitude(axis, x)
-            crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
-            values = 2.0 * crit / (y * y) if name == "low" else crit / np.sqrt(y)
-            if _tail(chebyshev_coefficients(values), 0) <= wanted or n >= MAX_NODES or name == "high":
+            y = axis.amplitude(x)
+            values = sweep.solve("border", np.ones_like(y), y)["deficit"] / kernels[-1].border_scales(piece, y)[0]
+            if _tail(chebyshev_coefficients(values), 0) <= wanted or n >= MAX_NODES or to_infinity:
                 break
             n = _next(n)
-        pieces.append(BorderPiece(x, values, _border_cells(axis, values, wanted)))
+        pieces.append(BorderPiece(x, values, _border_cells(piece, values, wanted)))
     return pieces
 
 
@@ -154,7 +152,6 @@ def build_block(
 ) -> Block:
     """Solve nodes until the Chebyshev tail in both directions is below SHARE * tolerance, then cut the cells."""
     chart = charts.CHARTS[index]
-    kind = "continuous" if chart.regime == CONTINUOUS else "full"
     wanted = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
     na, nb = 3 if tail_block else 8, 8
@@ -162,9 +159,8 @@ def build_block(
     stuck = [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
-        a, b = nodes(na, chart.a.low, chart.a.high), nodes(nb, chart.b.low, chart.b.high)
-        v, y, eta = charts.point(chart, a[:, None], b[None, :], border)
-        values, power, stick = tabulated(index, v, y, eta, sweep.solve(kind, v, y, eta))
+        a, b, found = solve_nodes(index, (na, nb), border, sweep)
+        values = found["mu_ratio"]
         c = chebyshev_coefficients(values)
         left = [_tail(c, 0), _tail(c, 1)]
         for axis in (0, 1):
@@ -180,4 +176,4 @@ def build_block(
     if tail_block:
         follow[0] = wanted
     cells = (_block_cells(chart, values, 0, follow[0]), _block_cells(chart, values, 1, follow[1]))
-    return Block(a, b, values, cells, power, stick)
+    return Block(a, b, cells, found)

@@ -1,9 +1,6 @@
 """How far each block is off: the errors that a table states, measured on fresh solves.
 
-Values are compared with solves at points that crowd towards edges and seams.  Slopes are compared in two steps.  How
-far cells are from the interpolant of the nodes is found on many points, most of them on edges of cells, where the
-derivative of a piecewise polynomial errs most; cells cut four times finer stand for the interpolant.  How far that
-is from the model is smooth, and found on fewer points, with differences of fresh solves.
+Values are compared with solves at points that crowd towards edges and seams; for slopes see :mod:`.cell_errors`.
 """
 
 from __future__ import annotations
@@ -14,29 +11,35 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import Surrogate, batch, charts
-from mumacro.charts import CHARTS, CONTINUOUS, ERROR, FLOOR, MU, PIECE_ERROR, POWER, QUANTITIES, STICK, Axis
+from mumacro import Surrogate, charts
+from mumacro.charts import CHARTS, CONTINUOUS, Axis
 
+from .blocks import solve_nodes
+from .cell_errors import cell_errors, finer
+from .quantities import solver_noise
 from .sweep import Sweep
 
-__all__ = ["BlockErrors", "block_errors", "differences", "near_seams", "power_noise", "solver_noise"]
+__all__ = ["SEAMS", "BlockErrors", "block_errors", "fast_from", "log_uniform", "near_seams"]
 
 Array = NDArray[np.float64]
-#: what a fresh solve itself may be wrong by, relative to mu~: rounding, and the input's last digit next to the corner
-SOLVER_NOISE = 2e-15
-STICK_NOISE = 1e-15  # the same of the stick fraction, absolute, away from the border
-FINER = 4
-_STENCIL = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
-_SIXTH_ORDER = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
-_FOURTH_ORDER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
-_STEP = 0.003  # in ln v~ and ln y~: beside the corner 0.01 leaves out more than the finest table errs by
 
 
 @dataclasses.dataclass
 class BlockErrors:
-    """Largest errors over a block: as :class:`mumacro.table.Block` states them, and of mu~ (absolute, relative)."""
+    """Largest errors of a block.
 
-    errors: Array
+    Attributes
+    ----------
+    values : dict of str to float
+        Of what is tabulated, over the block, by quantity.
+    cells : dict of str to ndarray
+        As :attr:`mumacro.table.Block.cell_errors`.
+    absolute, relative : float
+        Of mu~.
+    """
+
+    values: dict[str, float]
+    cells: dict[str, Array]
     absolute: float
     relative: float
 
@@ -48,7 +51,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Ar
 def fast_from(s: Surrogate, y: Array) -> Array:
     """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
     crit = s.v_tilde_crit(y)
-    return np.where(y <= charts.Y_TAIL, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y))
+    found: Array = np.where(y <= charts.Y_TAIL, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y))
+    return found
 
 
 SEAMS = (charts.Y_STICK_LO, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL)
@@ -69,157 +73,50 @@ def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, A
     return v, y
 
 
-def power_noise(v: Array, y: Array, power: Array, sliding: NDArray[np.bool_] | bool) -> Array:
-    """What the power of a fresh solve itself may be wrong by.
+def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
+    """The same table with one error for all that it tabulates, and a share of the border's.
 
-    Where it is small it is the difference of larger numbers: in stick-slip what the drive puts in during stick, v~,
-    is taken out; in continuous sliding the angle swings by y~, and only v~ of that is out of phase.
+    With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the table's error.
     """
-    lost = np.where(sliding, 1e-15 * y * y, 4e-15 * v)
-    noise: Array = SOLVER_NOISE * power + np.where((y < 1.0) & (v < 1.0), lost, 0.0)
-    return noise
-
-
-def solver_noise(which: int, v: Array, y: Array, solved: dict[str, Array], sliding: NDArray[np.bool_] | bool) -> Array:
-    """What a solve may be wrong by, absolute."""
-    if which == MU:
-        return SOLVER_NOISE * solved["mu_ratio"]
-    if which == POWER:
-        return power_noise(v, y, solved["power"], sliding)
-    return np.full(v.shape, STICK_NOISE)
-
-
-def _with_errors(surrogate: Surrogate, which: int, error: float, border_share: float) -> batch.Data:
-    """The table's arrays with one error for all blocks: bounds of values are then their scale, plus rounding."""
-    coef, blocks, border, pieces = surrogate._of(which)
-    blocks, pieces = blocks.copy(), pieces.copy()
-    blocks[: len(CHARTS), ERROR:] = error
-    blocks[:, FLOOR] = 0.0
-    pieces[:, PIECE_ERROR] *= border_share
-    return coef, blocks, border, pieces
+    table = surrogate.table
+    border = [dataclasses.replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border]
+    stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
+    blocks = [dataclasses.replace(block, errors=stated) for block in table.blocks]
+    return Surrogate(dataclasses.replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads)
 
 
 def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
-    """Largest errors of every block on ``n`` fresh solves; those which belong to a neighbour are left out."""
-    finer = dataclasses.replace(
-        surrogate.table,
-        blocks=[dataclasses.replace(b, cells=(FINER * b.cells[0], FINER * b.cells[1])) for b in surrogate.table.blocks],
-    )
-    fine = Surrogate(finer, surrogate.path, surrogate.threads)
+    """Largest errors of every block, those of values on ``n`` fresh solves, without those of a neighbour."""
+    stating = tuple(_stating(surrogate, *how) for how in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0)))
     found = []
-    for index in range(len(CHARTS)):
-        rng = np.random.default_rng([seed, index])
-        largest = _value_errors(surrogate, sweep, index, rng, n)
-        largest.errors[:, 1:] = _slope_errors(surrogate, fine, sweep, index, rng, n)
-        found.append(largest)
+    for index, block in enumerate(surrogate.table.blocks):
+        errors = _value_errors(surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n)
+        _, _, exact = solve_nodes(index, finer((block.a.size, block.b.size)), surrogate.border, sweep)
+        errors.cells = cell_errors(index, block, exact)
+        found.append(errors)
     return found
 
 
-def _value_errors(surrogate: Surrogate, sweep: Sweep, index: int, rng: np.random.Generator, n: int) -> BlockErrors:
+def _value_errors(
+    surrogate: Surrogate, stating: tuple[Surrogate, ...], sweep: Sweep, index: int, rng: np.random.Generator, n: int
+) -> BlockErrors:
     chart = CHARTS[index]
     radial = chart.a.name == "radius"
-    v, y, _ = charts.point(chart, _crowded(rng, chart.a, n, radial), _crowded(rng, chart.b, n), surrogate.border)
+    v, y, _ = chart.point(_crowded(rng, chart.a, n, radial), _crowded(rng, chart.b, n), surrogate.border)
     v_seam, y_seam = near_seams(rng, 2 * n, surrogate)
     v, y = np.concatenate([v, v_seam]), np.concatenate([y, y_seam])
     mu, _, source = surrogate.ratio_with_bound(v, y)
     v, y, mu = v[source == index], y[source == index], mu[source == index]
     solved = sweep.solve("full", v, y)
     error = np.abs(mu - solved["mu_ratio"])
-    errors = np.zeros((3, 3))
-    for which in (MU, POWER, STICK) if chart.regime != CONTINUOUS else (MU, POWER):
-        value = batch.quantity(which, surrogate._of(which), v, y, surrogate.threads)[0]
-        _, scale, _ = batch.quantity(which, _with_errors(surrogate, which, 1.0, 0.0), v, y, surrogate.threads)
-        # the bound's own allowances: half of rounding, and of what the border's error does to the stick fraction
-        _, slack, _ = batch.quantity(which, _with_errors(surrogate, which, 0.0, 0.5), v, y, surrogate.threads)
-        noise = solver_noise(which, v, y, solved, chart.regime == CONTINUOUS)
-        if which != MU:
-            noise = noise + (slack if which == STICK else 0.5 * slack)
-        off = np.maximum(np.abs(value - solved[QUANTITIES[which]]) - noise, 0.0)
-        errors[which, 0] = float((off / scale).max())
-    return BlockErrors(errors, float(error.max()), float((error / solved["mu_ratio"]).max()))
-
-
-def _slope_errors(
-    surrogate: Surrogate, fine: Surrogate, sweep: Sweep, index: int, rng: np.random.Generator, n: int
-) -> Array:
-    """Largest errors of both logarithmic slopes over a block, per scale of their bound, shape (3, 2)."""
-    chart, cells, threads = CHARTS[index], surrogate.table.blocks[index].cells, surrogate.threads
-
-    def points(a: Array, b: Array) -> tuple[Array, Array]:
-        v, y, _ = charts.point(chart, a, b, surrogate.border)
-        _, _, source = surrogate.ratio_with_bound(v, y)
-        return v[source == index], y[source == index]
-
-    v, y = points(_at_cells(rng, chart.a, cells[0], 8 * n), _at_cells(rng, chart.b, cells[1], 8 * n))
-    few = max(n // 6, 50)
-    around = neighbours(
-        surrogate, sweep, *points(_crowded(rng, chart.a, few, chart.a.name == "radius"), _crowded(rng, chart.b, few))
-    )
-    total = np.zeros((3, 2))
-    for which in (MU, POWER, STICK) if chart.regime != CONTINUOUS else (MU, POWER):
-        unit = _with_errors(surrogate, which, 1.0, 0.0)
-        tables = surrogate._of(which), fine._of(which), unit
-        ours, near, scale = (batch.slopes(which, data, v, y, threads) for data in tables)
-        cut = (np.abs(ours[1:3] - near[1:3]) / scale[3:5]).max(axis=1)
-        truth, noise = around.slopes(which)
-        near, scale = (batch.slopes(which, data, around.v, around.y, threads) for data in tables[1:])
-        off = np.maximum(np.abs(near[1:3] - truth) - noise, 0.0) / scale[3:5]
-        if which == STICK:  # a square root of the distance: differences across the border mean nothing
-            off = off[:, around.v < 0.999 * around.crit]
-        total[which] = cut + off.max(axis=1)
-    return total
-
-
-@dataclasses.dataclass
-class Neighbours:
-    """Fresh solves around points (n,): three on either side along ln v~ and along ln y~, ``steps`` (2, n) apart."""
-
-    v: Array
-    y: Array
-    crit: Array
-    steps: Array
-    solved: list[dict[str, Array]]
-
-    def slopes(self, which: int) -> tuple[Array, Array]:
-        """Slopes along ln v~ and ln y~, (2, n), by central differences, and what these may be wrong by."""
-        slope, noise = np.empty_like(self.steps), np.empty_like(self.steps)
-        for row, (step, solved) in enumerate(zip(self.steps, self.solved, strict=True)):
-            values = solved[QUANTITIES[which]]
-            slope[row] = values @ _SIXTH_ORDER / step
-            # what the fourth order leaves out; the sixth leaves out up to a seventh of it
-            left_out = np.abs(slope[row] - values @ _FOURTH_ORDER / step)
-            sliding = (self.v > self.crit)[:, None]
-            each = solver_noise(which, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
-            noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
-        return slope, noise
-
-
-def neighbours(surrogate: Surrogate, sweep: Sweep, v: Array, y: Array) -> Neighbours:
-    """Solve around the points; a step is a share of the distance to what is not smooth: border and corner."""
-    crit, (mu, *_) = surrogate.v_tilde_crit(y), surrogate.slopes(v, y)
-    gap = np.abs(np.log(v / crit))
-    stiff = np.maximum(mu * mu, np.abs(1.0 - y * y))
-    steps = np.stack((np.minimum(_STEP, gap / 32.0), np.minimum(np.minimum(_STEP, gap / 64.0), _STEP * stiff)))
-    solved = []
-    for row, step in enumerate(steps):
-        moved = ((v, y)[row])[:, None] * np.exp(_STENCIL * step[:, None])
-        held = np.broadcast_to(((y, v)[row])[:, None], moved.shape)
-        solved.append(sweep.solve("full", *((moved, held) if row == 0 else (held, moved))))
-    return Neighbours(v, y, crit, steps, solved)
-
-
-def differences(surrogate: Surrogate, sweep: Sweep, which: int, v: Array, y: Array) -> tuple[Array, Array]:
-    """:meth:`Neighbours.slopes` of one quantity at points (n,)."""
-    return neighbours(surrogate, sweep, v, y).slopes(which)
-
-
-def _at_cells(rng: np.random.Generator, axis: Axis, cells: int, n: int) -> Array:
-    """File coordinates: two thirds just inside an edge of a cell, the others anywhere."""
-    low, high = axis.span
-    inside = rng.choice([1e-7, 1.0 - 1e-7], n)
-    t = np.where(rng.random(n) < 0.67, (rng.integers(0, cells, n) + inside) / cells, rng.random(n))
-    at = axis.to_file(low + (high - low) * np.clip(t, 1e-6 / cells, 1.0 - 1e-6 / cells))
-    return np.clip(at, axis.low + 1e-7 * (axis.high - axis.low), axis.high - 1e-7 * (axis.high - axis.low))
+    errors = {}
+    for name in surrogate.table.blocks[index].nodes:
+        value, *_ = surrogate.quantity(name, v, y)
+        scale, beside, rounding = (table.quantity(name, v, y)[1] for table in stating)
+        # what the bound allows anyway: half of rounding, and what the border's error does, of which it states twice
+        noise = solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
+        errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
+    return BlockErrors(errors, {}, float(error.max()), float((error / solved["mu_ratio"]).max()))
 
 
 def _crowded(rng: np.random.Generator, axis: Axis, n: int, radial: bool = False) -> Array:

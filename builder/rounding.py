@@ -49,7 +49,5 @@ def round_block(block: Block, tolerance: float) -> Block:
     """
     return dataclasses.replace(
         block,
-        values=to_step(block.values, tolerance),
-        power=to_step(block.power, tolerance),
-        stick=to_step(block.stick, tolerance),
+        nodes={name: to_step(values, tolerance) for name, values in block.nodes.items()},
     )

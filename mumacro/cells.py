@@ -29,6 +29,7 @@ __all__ = [
     "block_rows",
     "border_cells",
     "cell_positions",
+    "cell_scale",
     "cells_1d",
     "cells_2d",
     "chebyshev_coefficients",
@@ -57,9 +58,9 @@ def chebyshev_coefficients(values: Array) -> Array:
     out = np.asarray(values, dtype=np.float64)
     for axis in range(out.ndim):
         n = out.shape[axis]
-        x = (np.arange(n) + 0.5) * np.pi / n
-        k = np.arange(n)
-        matrix = 2.0 / n * np.cos(np.outer(k, np.pi - x))
+        # the angle in whole parts of a turn: rounding it is seen in second derivatives at the edges
+        parts = np.outer(np.arange(n), 2 * np.arange(n, 0, -1) - 1) % (4 * n)
+        matrix = 2.0 / n * np.cos(np.pi * parts / (2 * n))
         matrix[0] *= 0.5
         out = np.moveaxis(np.tensordot(matrix, out, axes=(1, axis)), 0, axis)
     return out
@@ -97,14 +98,16 @@ def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
 
 def cells_1d(piece: int, values: Array, cells: int) -> Array:
     """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node ``values`` (n,)."""
-    axis = charts.BORDER_PIECES[piece][1]
-    x, at = cell_positions(axis, cells)
-    y = axis.amplitude(x)
-    with np.errstate(invalid="ignore"):  # both are infinite at y~ = infinity
-        of_nodes, of_cells = kernels[-1].border_scales(piece, y)
-        scale = np.where(of_nodes == of_cells, 1.0, of_nodes / of_cells)
-    local = interpolation_matrix(values.size, at) @ chebyshev_coefficients(values) * scale
+    x, at = cell_positions(charts.BORDER_PIECES[piece][1], cells)
+    local = interpolation_matrix(values.size, at) @ chebyshev_coefficients(values) * cell_scale(piece, x)
     return _to_powers(local.reshape(cells, WIDTH))
+
+
+def cell_scale(piece: int, x: Array) -> Array:
+    """What a piece of v~crit is multiplied by from nodes to cells, at its coordinate ``x`` (n,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):  # both are infinite at y~ = infinity
+        of_nodes, of_cells = kernels[-1].border_scales(piece, charts.BORDER_PIECES[piece][1].amplitude(x))
+        return np.where(of_nodes == of_cells, 1.0, of_nodes / of_cells)
 
 
 def _to_powers(local: Array) -> Array:
@@ -160,21 +163,22 @@ def block_rows(blocks: Sequence[Block]) -> Array:
 
 
 def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
-    """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors of slopes."""
+    """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors in every cell."""
     name, errors = charts.QUANTITY_NAMES[quantity], np.zeros((len(charts.SOURCES) + 1, 2))
-    patches, slope_errors = [], []
+    patches, in_cells = [], []
     for error, chart, block in zip(errors, charts.CHARTS, blocks, strict=False):
         cells = block.cells[0] * block.cells[1]
         nodes = block.nodes.get(name)
         patches.append(
             np.zeros((cells, WIDTH, WIDTH)) if nodes is None else cells_2d(chart.a, chart.b, nodes, block.cells)
         )
-        value, along_v, along_y = block.errors[name]
+        value, *of_slopes = block.errors[name]
         error[0] = value
         if quantity == charts.MU:
             error += chart.rounding, chart.floor
-        slope_errors.append(block.slope_errors.get(name, np.broadcast_to([along_v, along_y], (cells, 2))))
-    return _joined(patches), errors, np.concatenate(slope_errors)
+        # an older table's errors of slopes hold for q and both derivatives together, over the whole block
+        in_cells.append(block.cell_errors.get(name, np.full((cells, 3), max(of_slopes))))
+    return _joined(patches), errors, np.concatenate(in_cells)
 
 
 @functools.cache

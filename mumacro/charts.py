@@ -132,6 +132,10 @@ class Chart:
             v = border_of(y) * np.sin(0.5 * math.pi * b) ** 2
         return v, y, y - 1.0
 
+    def holds(self, quantity: Quantity) -> bool:
+        """Whether the block tabulates a quantity; elsewhere it is zero."""
+        return self.regime != CONTINUOUS or quantity.while_sliding
+
 
 @dataclass(frozen=True)
 class Quantity:

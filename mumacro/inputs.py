@@ -27,6 +27,7 @@ __all__ = [
     "GAP",
     "MOST_HZ",
     "NAMES",
+    "PER_UNIT",
     "POSITIVE",
     "RAD_PER_CYCLE",
     "RIGID",
@@ -61,6 +62,7 @@ SI = {
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}
+PER_UNIT = {"mu0": "-", "Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}  # of a slope along each
 POSITIVE = ("mu0", "Fz", "k")
 BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in FIELDS}
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
@@ -192,21 +194,23 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
 
 
 def read_number(name: str, text: str) -> float:
-    """The value of an input from text, in SI; ``rigid`` is an infinite stiffness.
+    """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an infinite stiffness.
 
     Raises
     ------
     ValueError
-        The text is not a plain number; the message states what to write.
+        The text is no number, or in no known unit; the message states what to write.
 
     Examples
     --------
     >>> read_number("y0", "2e-6")
     2e-06
-    >>> read_number("y0", "2um")
+    >>> read_number("k", "1 N/um")
+    1000000.0
+    >>> read_number("y0", "2 N")
     Traceback (most recent call last):
     ...
-    ValueError: y0=2um: give metres, 2e-6
+    ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
     """
     words = SI[name][1]
     text = text.strip()
@@ -217,12 +221,12 @@ def read_number(name: str, text: str) -> float:
     with_unit = _WITH_UNIT.fullmatch(text)
     scale = scale_of(name, with_unit[2].strip(" []()")) if with_unit else None
     if with_unit and scale:
-        value = re.sub(r"e([+-])0*", r"e\1", f"{scale.si(float(with_unit[1])):.15g}").replace("e+", "e")
-        raise ValueError(f"{name}={text}: give {words}, {value}")
+        return scale.si(float(with_unit[1]))
     if _PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
+    units = ", ".join([unit for unit in UNITS_OF[name] if unit][:4])
     hint = ", or rigid" if name == "k" else ""
-    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6{hint}")
+    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {units}, ...{hint}")
 
 
 # --- columns --------------------------------------------------------------------------------------------

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro.dimensional import real
 from mumacro.errors import InputError
 from mumacro.extras import missing
+from mumacro.inputs import real
 
 try:
     import dask.array

@@ -206,7 +206,7 @@ class Surrogate:
         >>> round(mu, 6), bound < 1e-12, int(source)
         (0.942004, True, 5)
         """
-        return self._quantity("mu_ratio", v_tilde, y_tilde)
+        return self.quantity("mu_ratio", v_tilde, y_tilde)
 
     def v_tilde_crit(self, y_tilde: ArrayLike) -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
@@ -256,7 +256,7 @@ class Surrogate:
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
-        return self._quantity("power", v_tilde, y_tilde)[:2]
+        return self.quantity("power", v_tilde, y_tilde)[:2]
 
     def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
         """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
@@ -264,7 +264,7 @@ class Surrogate:
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
         """
-        return self._quantity("stick_fraction", v_tilde, y_tilde)[:2]
+        return self.quantity("stick_fraction", v_tilde, y_tilde)[:2]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
@@ -308,8 +308,19 @@ class Surrogate:
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
-    def _quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
-        """Value, bound and source."""
+    def quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+        """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
+
+        ``name`` is one of ``table.quantities``; the other arguments, shapes and errors are those of :meth:`mu_ratio`.
+
+        Examples
+        --------
+        >>> power, bound, source = Surrogate.open().quantity("power", 0.1, 0.5)
+        >>> round(power, 6), bound < 1e-12, int(source)
+        (0.012142, True, 5)
+        """
+        if name not in charts.QUANTITY_NAMES:
+            raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
         data = self._with(name)
         v, y, shape = _points(v_tilde, y_tilde)
         value, bound, source = batch.values(_CODES[name], data, v, y, self.threads)
@@ -581,16 +592,20 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
 
 
 def _picked(cases: Any) -> dict[str, Any]:
-    """The inputs among the columns of a mapping, DataFrame or Dataset."""
+    """The inputs among the columns of a mapping, a data frame, an Arrow table or a Dataset."""
     try:
-        cases.keys()  # which a list or a string does not have
-        # coordinates of a Dataset are inputs, too, although they are not keys
-        picked = {name: cases[name] for name in (*FIELDS, "f") if name in cases}
+        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
+        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
+        picked = {name: cases[name] for name in (*FIELDS, "f") if name in there}
     except (AttributeError, TypeError, KeyError) as error:
+        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(
-            "cases", type(cases).__name__, "a mapping, DataFrame or Dataset with the inputs by name"
-        ) from error
-    return picked
+            "cases", kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
+            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
+        ) from error  # fmt: skip
+    # columns that are neither arrays nor labelled, such as those of Arrow and Polars
+    return {name: np.asarray(x) if hasattr(type(x), "__arrow_c_stream__") and not _labels(x) else x
+            for name, x in picked.items()}  # fmt: skip
 
 
 _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
@@ -598,8 +613,11 @@ _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
 
 def _labelled(inputs: Mapping[str, Any], cases: Any) -> bool:
     """Whether labels or chunks are to be kept."""
-    kinds = {*map(type, inputs.values()), type(cases)} - _PLAIN
-    return any(kind.__module__.partition(".")[0] in ("pandas", "xarray", "dask") for kind in kinds)
+    return any(_labels(x) for x in (cases, *inputs.values()) if type(x) not in _PLAIN)
+
+
+def _labels(x: Any) -> bool:
+    return type(x).__module__.partition(".")[0] in ("pandas", "xarray", "dask")
 
 
 def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:

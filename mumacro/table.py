@@ -62,6 +62,8 @@ _PLAIN = {
     "v_tilde_crit": ("border of continuous sliding: smallest dimensionless speed without stick", ("y_tilde",)),
 }  # fmt: skip
 FIRST_QUANTITIES = "mu_ratio power stick_fraction"  # of a file that does not name its quantities
+CELL_AXES = ("quantity", "cell", "derivative")
+_NAMED = {quantity.name: quantity for quantity in charts.QUANTITIES}
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
 
 
@@ -84,10 +86,10 @@ class Block:
     nodes : dict of str to ndarray
         Node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity is zero.
     errors : dict of str to ndarray
-        By quantity (3,): bounds of the errors of what is tabulated, and of the slopes along ln v~ and ln y~ as
-        ``kernel/points.c`` scales them, over the whole block.
-    slope_errors : dict of str to ndarray
-        The last two for every cell (cells, 2), in the order of the cells; older tables have none.
+        By quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a and b, over the whole
+        block.  In older tables the last two bound what all three together do to a slope along ln v~ and ln y~.
+    cell_errors : dict of str to ndarray
+        The same for every cell (cells, 3), in the order of the cells, for slopes; older tables have none.
     max_abs_error, max_rel_error : float
         The largest errors of mu~ found.
     """
@@ -97,7 +99,7 @@ class Block:
     cells: tuple[int, int]
     nodes: dict[str, Array] = field(default_factory=dict)
     errors: dict[str, Array] = field(default_factory=lambda: {name: np.zeros(3) for name in charts.QUANTITY_NAMES})
-    slope_errors: dict[str, Array] = field(default_factory=dict)
+    cell_errors: dict[str, Array] = field(default_factory=dict)
     max_abs_error: float = 0.0
     max_rel_error: float = 0.0
 
@@ -119,7 +121,15 @@ class Table:
     @property
     def quantities(self) -> list[str]:
         """The names of the tabulated quantities, mu_ratio first."""
-        return str(self.attributes.get("quantities", FIRST_QUANTITIES)).split()
+        return _names(self.attributes)
+
+    def held(self, chart: charts.Chart) -> list[charts.Quantity]:
+        """Those that the block of ``chart`` tabulates."""
+        return [_NAMED[name] for name in self.quantities if chart.holds(_NAMED[name])]
+
+
+def _names(attributes: dict[str, Any]) -> list[str]:
+    return str(attributes.get("quantities", FIRST_QUANTITIES)).split()
 
 
 def _digest(table: Table) -> str:
@@ -141,7 +151,7 @@ def _digest(table: Table) -> str:
     for chart, block in zip(charts.CHARTS, table.blocks, strict=True):
         put(chart, tuple(block.cells), float(block.max_abs_error), float(block.max_rel_error))
         put(*(block.errors[name] for name in table.quantities), block.a, block.b)
-        put(*(part[name] for part in (block.nodes, block.slope_errors) for name in table.quantities if name in part))
+        put(*(part[name] for part in (block.nodes, block.cell_errors) for name in table.quantities if name in part))
     return h.hexdigest()
 
 
@@ -159,13 +169,17 @@ def _put(group: Any, name: str, data: Array, long_name: str, axes: tuple[str, ..
     variable[...] = data
 
 
-def _put_slope_errors(group: Any, quantity: charts.Quantity, errors: Array) -> None:
-    """The errors of slopes of every cell, over the dimensions ``cell`` and ``slope``."""
-    if "cell" not in group.dimensions:
-        group.createDimension("cell", errors.shape[0])
-        group.createDimension("slope", errors.shape[1])
-    long_name = f"errors of the slopes of {quantity.name} along ln v_tilde and ln y_tilde, as bounds scale them"
-    _put(group, f"{quantity.variable}_slope_errors", errors, long_name, ("cell", "slope"))
+def _put_cell_errors(group: Any, table: Table) -> None:
+    """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and a dimension too."""
+
+    def rows(block: Block, name: str) -> Array:
+        return block.cell_errors[name] if name in block.nodes else np.zeros((block.cells[0] * block.cells[1], 3))
+
+    errors = np.stack([np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities])
+    for axis, size in zip(CELL_AXES, errors.shape, strict=True):
+        group.createDimension(axis, size)
+    long_name = "errors of what is tabulated, and of its derivatives along both coordinates, in all cells of all blocks"
+    _put(group, "cell_errors", errors, long_name, CELL_AXES)
 
 
 def _geometry(chart: charts.Chart) -> dict[str, Any]:
@@ -183,25 +197,24 @@ def _fill(root: Any, table: Table) -> None:
         extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
         _put(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
-    for (name, axis, quantity), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
+    for (name, axis, tabulated), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
         group = border.createGroup(name)
         _put(group, axis.name, piece.nodes, charts.COORDINATES[axis.name])
-        _put(group, "value", piece.values, quantity, (axis.name,))
+        _put(group, "value", piece.values, tabulated, (axis.name,))
         group.setncatts({"cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error,
                          "range": np.array([axis.low, axis.high])})  # fmt: skip
     # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
     blocks = border.createGroup("blocks")
+    if any(block.cell_errors for block in table.blocks):
+        _put_cell_errors(blocks, table)
     for chart, block in zip(charts.CHARTS, table.blocks, strict=True):
         group = blocks.createGroup(chart.name)
         axes = (chart.a.name, chart.b.name)
         _put(group, axes[0], block.a, charts.COORDINATES[axes[0]])
         _put(group, axes[1], block.b, charts.COORDINATES[axes[1]])
-        for about in charts.QUANTITIES:
-            if about.name in block.nodes:
-                meaning = chart.quantity if about.name == "mu_ratio" else f"{about.meaning}, scaled for this block"
-                _put(group, about.variable, block.nodes[about.name], meaning, axes)
-            if about.name in block.slope_errors:
-                _put_slope_errors(group, about, block.slope_errors[about.name])
+        for quantity in table.held(chart):
+            meaning = chart.quantity if quantity.name == "mu_ratio" else f"{quantity.meaning}, scaled for this block"
+            _put(group, quantity.variable, block.nodes[quantity.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
         group.setncatts({
             **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32),
@@ -299,14 +312,18 @@ class _Reader:
             raise self.refuse(f"{group.path}: an error is negative")
         return found
 
-    def slope_errors(self, group: hdf5.Group, quantity: charts.Quantity, block: Block) -> None:
-        """The errors of slopes of every cell, which older tables have for whole blocks only."""
-        name = f"{quantity.variable}_slope_errors"
-        if group.has_variable(name):
-            found = self.array(group, name, (block.cells[0] * block.cells[1], 2))
-            if np.any(found < 0.0):
-                raise self.refuse(f"{group.path}: an error in {name!r} is negative")
-            block.slope_errors[quantity.name] = found
+    def cell_errors(self, group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
+        """The errors in every cell, which older tables have for whole blocks only."""
+        if not group.has_variable("cell_errors"):
+            return
+        last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
+        found = self.array(group, "cell_errors", (len(names), int(last[-1]), 3))
+        if np.any(found < 0.0):
+            raise self.refuse(f"{group.path}: an error in 'cell_errors' is negative")
+        for name, errors in zip(names, found, strict=True):
+            for block, part in zip(blocks, np.split(errors, last[:-1]), strict=True):
+                if name in block.nodes:
+                    block.cell_errors[name] = part
 
     def same(self, group: hdf5.Group, name: str, wanted: object) -> None:
         found = group.attribute(name)
@@ -345,10 +362,10 @@ def _read(root: hdf5.Group, reader: _Reader) -> Table:
     strange = sorted(set(blocks_group.groups()) - set(charts.NAMES))
     if strange:
         raise reader.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
-    names = str(attributes.get("quantities", FIRST_QUANTITIES)).split()
-    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= {*charts.QUANTITY_NAMES}:
-        raise reader.refuse(f"attribute 'quantities' is {names}, this program knows {', '.join(charts.QUANTITY_NAMES)}")
-    quantities = [charts.QUANTITIES[charts.QUANTITY_NAMES.index(name)] for name in names]
+    names = _names(attributes)
+    if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= _NAMED.keys():
+        raise reader.refuse(f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}")
+    quantities = [_NAMED[name] for name in names]
     border, blocks = [], []
     for name, axis, _ in charts.BORDER_PIECES:
         group = border_group.group(name)
@@ -364,15 +381,14 @@ def _read(root: hdf5.Group, reader: _Reader) -> Table:
         a, b = reader.nodes(group, chart.a), reader.nodes(group, chart.b)
         shape = (a.size, b.size)
         largest = reader.errors(group, "verified_max_abs_error", "verified_max_rel_error")
+        found = {q.name: reader.array(group, q.variable, shape) for q in quantities if chart.holds(q)}
         na, nb = reader.cells(group, 2)
-        block = Block(a, b, (na, nb), max_abs_error=float(largest[0][0]), max_rel_error=float(largest[1][0]))
+        block = Block(a, b, (na, nb), found)
+        block.max_abs_error, block.max_rel_error = (error.item() for error in largest)
         (errors,) = reader.errors(group, "errors", count=3 * len(quantities))
-        for quantity, error in zip(quantities, errors.reshape(-1, 3), strict=True):
-            block.errors[quantity.name] = error
-            if chart.regime != charts.CONTINUOUS or quantity.while_sliding:
-                block.nodes[quantity.name] = reader.array(group, quantity.variable, shape)
-                reader.slope_errors(group, quantity, block)
+        block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))
         blocks.append(block)
+    reader.cell_errors(blocks_group, blocks, names)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         plain[name] = reader.array(root, name, tuple(plain[axis].size for axis in axes) if axes else None)

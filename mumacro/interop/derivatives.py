@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.charts import QUANTITY_NAMES
 from mumacro.inputs import FIELDS
-
-if TYPE_CHECKING:
-    from mumacro.answer import Answer
-    from mumacro.surrogate import Surrogate
+from mumacro.surrogate import Surrogate
 
 __all__ = ["NO_SECOND", "DifferentiableFriction", "Quantity", "quantities"]
 
@@ -49,41 +46,45 @@ class Quantity:
 class DifferentiableFriction:
     """What the classes for JAX and PyTorch share: the quantities by name.  Arguments broadcast together."""
 
-    def _call(self, name: str, *arguments: Any) -> Any:
+    def __init__(self, surrogate: Surrogate | None = None) -> None:
+        known = quantities(Surrogate.open() if surrogate is None else surrogate)
+        self._known = {name: self._made(quantity) for name, quantity in known.items()}
+
+    def _made(self, quantity: Quantity) -> Any:
+        return quantity
+
+    def _call(self, quantity: Any, *arguments: Any) -> Any:
         raise NotImplementedError
 
     def mu_macro(self, mu0: Any, Fz: Any, k: Any, y0: Any, omega: Any, v0: Any) -> Any:
         """mu_macro [-] from SI inputs, see :meth:`mumacro.Surrogate.evaluate`; k None or inf is rigid contact."""
-        return self._call("mu_macro", mu0, Fz, math.inf if k is None else k, y0, omega, v0)
+        return self._call(self._known["mu_macro"], mu0, Fz, math.inf if k is None else k, y0, omega, v0)
 
     def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
         """mu~ = mu_macro/mu0 [-], see :meth:`mumacro.Surrogate.mu_ratio`."""
-        return self._call("mu_ratio", v_tilde, y_tilde)
+        return self._call(self._known["mu_ratio"], v_tilde, y_tilde)
 
     def power(self, v_tilde: Any, y_tilde: Any) -> Any:
         """Mean power of the shaker [-], see :meth:`mumacro.Surrogate.power`."""
-        return self._call("power", v_tilde, y_tilde)
+        return self._call(self._known["power"], v_tilde, y_tilde)
 
     def stick_fraction(self, v_tilde: Any, y_tilde: Any) -> Any:
         """Share of the period that sticks [-], see :meth:`mumacro.Surrogate.stick_fraction`."""
-        return self._call("stick_fraction", v_tilde, y_tilde)
+        return self._call(self._known["stick_fraction"], v_tilde, y_tilde)
 
 
 def quantities(surrogate: Surrogate) -> Mapping[str, Quantity]:
     """The differentiable quantities of a table by name."""
 
-    def cases(six: tuple[Array, ...], gradient: bool = False) -> Answer[Any]:
-        answer: Answer[Any] = surrogate.evaluate(
-            dict(zip(FIELDS, map(np.atleast_1d, six), strict=True)), gradient=gradient
-        )
-        return answer
+    def evaluated(six: tuple[Array, ...], **options: bool) -> Any:
+        return surrogate.evaluate(dict(zip(FIELDS, map(np.atleast_1d, six), strict=True)), **options)
 
     def mu_macro(*six: Array) -> Array:
-        found: Array = cases(six).mu_macro
+        found: Array = evaluated(six).mu_macro
         return found.reshape(np.shape(six[0]))
 
     def mu_macro_slopes(*six: Array) -> Array:
-        gradient = cases(six, gradient=True).gradient or {}
+        gradient = evaluated(six, gradient=True).gradient
         return np.stack([gradient[name] for name in FIELDS]).reshape(6, *np.shape(six[0]))
 
     pointwise = {name: _of_groups(surrogate, name) for name in QUANTITY_NAMES}
