@@ -19,7 +19,6 @@ from mumacro import Surrogate
 from mumacro.bundled import bundled_tables
 from mumacro.files import answer, evaluate_files
 from mumacro.files.answering import added_fields
-from mumacro.files.writing import parquet_writer
 
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 STEPS = (("parquet", "parquet"), ("csv", "csv"), ("ndjson", "ndjson"), ("csv", "parquet"), ("parquet", "csv"))
@@ -38,7 +37,8 @@ def floor(source: Path, out: Path) -> None:
     with pq.ParquetFile(source, pre_buffer=False) as file:
         schema = pa.schema([*file.schema_arrow, *added_fields()])
         noise = np.random.default_rng(0).random(2**19)
-        with parquet_writer(out, schema) as writer:
+        coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
+        with pq.ParquetWriter(out, schema, use_dictionary=coded, compression="snappy") as writer:
             for batch in file.iter_batches(262_144):
                 n = batch.num_rows
                 words = pa.DictionaryArray.from_arrays(

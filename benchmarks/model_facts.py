@@ -25,7 +25,7 @@ from builder.steady import border, solve, solve_raw, workspace
 from builder.sweep import Sweep
 from mumacro import Surrogate, closed_forms
 from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
-from mumacro.charts import CHARTS, CONTINUOUS, NAMES, SOURCES, point
+from mumacro.charts import CHARTS, NAMES, SOURCES
 from mumacro.settling import settling
 
 Array = NDArray[np.float64]
@@ -42,11 +42,9 @@ def g(x: float) -> str:
 def _block_errors(index: int, s: Surrogate, sweep: Sweep) -> list[float]:
     """Largest errors of the n x n interpolants of the block's tabulated function, on random points of its rectangle."""
     chart = CHARTS[index]
-    kind = "continuous" if chart.regime == CONTINUOUS else "full"
 
     def values(a: Array, b: Array) -> Array:
-        v, y, eta = point(chart, a, b, s.border)
-        return tabulated(index, v, y, eta, sweep.solve(kind, v, y, eta))[0]
+        return tabulated(index, *chart.point(a, b, s.border), sweep)["mu_ratio"]
 
     rng = np.random.default_rng(3)
     axes = (chart.a, chart.b)

@@ -1,11 +1,11 @@
-"""Cases a second from 1e6 to 1e9 cases: one thread, all threads, one and two worker processes of Dask.
+"""Processor time a case up to 1e9 cases: one thread, all threads, one and two worker processes of Dask.
 
     python benchmarks/scale.py [--largest 1e8] [--write]
 
 Every chunk of cases is generated, evaluated and reduced (mean, extremes, a histogram); no case is stored.  The last
 table builds one lookup table with threads and with two worker processes, for docs/decisions/0019.  Starting a worker is
-not timed; its kernels are loaded before.  Processor time is the sum over all processes; the cost model is fitted to
-it, since other work on the machine has little effect on it.
+not counted; its kernels are loaded before.  Processor time is the sum over all processes: other work on the machine
+has little effect on it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 
 import dask
@@ -65,7 +65,7 @@ def stages(surrogate: Surrogate, n: int) -> dict[str, float]:
     cases = design(n)
     spent = {}
     started = process_time()
-    columns = [cases[name].values for name in FIELDS]
+    columns = dask.compute(*(cases[name].data for name in FIELDS))
     spent["make"] = 1e9 * (process_time() - started) / n
     started = process_time()
     surrogate.evaluate_columns(*columns)
@@ -96,6 +96,9 @@ def workers(n: int, surrogate: Surrogate) -> Iterator[Any]:
 def _load(surrogate: Surrogate) -> None:
     with dask.config.set(scheduler="synchronous"):
         lazy(surrogate, 1000)
+
+
+def _compile() -> None:
     for kind in ("full", "continuous", "border"):
         solve_chunk(kind, np.array([[1.0, 1.0, 0.0]]))
 
@@ -113,12 +116,21 @@ class DaskSweep(Sweep):
         return np.concatenate([np.empty((0, len(COLUMNS))), *done])
 
 
-def built(sweep: Sweep, tolerance: float) -> tuple[float, int, str]:
-    """Seconds of a build, its solves, and the digest of the table's data."""
+def processor_time(client: Any = None) -> float:
+    """Processor seconds so far of this process and of the client's workers."""
+    return process_time() + (0.0 if client is None else sum(client.run(process_time).values()))
+
+
+def built(sweep: Sweep, tolerance: float, client: Any = None) -> tuple[float, int, str]:
+    """Processor seconds of a build, its solves, and the digest of the table's data."""
+    _compile()
+    if client is not None:
+        client.run(_compile)
     with tempfile.TemporaryDirectory() as folder, sweep:
-        started = perf_counter()
+        started = processor_time(client)
         table = build_table(Path(folder) / "table.nc", tolerance, sweep)
-        return perf_counter() - started, sweep.n_solves, hashlib.sha256(table.checksum.encode()).hexdigest()[:12]
+        spent = processor_time(client) - started
+        return spent, sweep.n_solves, hashlib.sha256(table.checksum.encode()).hexdigest()[:12]
 
 
 def main() -> None:
@@ -132,95 +144,76 @@ def main() -> None:
     sizes = [10**e for e in range(6, 12) if 10**e <= given.largest] if not given.quick else [10_000, 100_000]
     surrogate = Surrogate.open(1e-10)
     _load(surrogate)
-    seconds: dict[str, dict[int, float]] = {}
     busy: dict[str, dict[int, float]] = {}
     memory: dict[str, float] = {}
     found: dict[int, set[Reduced]] = {n: set() for n in sizes}
 
     def measure(name: str, client: Any = None) -> None:
-        def processor_time() -> float:
-            remote = client.run(process_time).values() if client is not None else ()
-            return process_time() + sum(remote)
-
-        seconds[name], busy[name] = {}, {}
+        busy[name] = {}
         for n in sizes:
-            before, started = processor_time(), perf_counter()
+            before = processor_time(client)
             mean, least, largest, count = lazy(surrogate, n)
-            seconds[name][n] = perf_counter() - started
-            busy[name][n] = processor_time() - before
+            busy[name][n] = processor_time(client) - before
             found[n].add((round(mean, 12), least, largest, count))
-            progress(f"{name}, {n:.0e} cases: {seconds[name][n]:.2f} s, processor {busy[name][n]:.2f} s")
+            progress(f"{name}, {n:.0e} cases: {busy[name][n]:.2f} s of processor time")
+        peak = _worker_memory() if client is None else max(client.run(_worker_memory).values())
+        memory[name] = peak / 1024
 
     with dask.config.set(scheduler="synchronous"):
         measure("one thread, no scheduler")
-        memory["one thread, no scheduler"] = _worker_memory() / 1024
-        parts = stages(surrogate, sizes[0])
+        parts = stages(surrogate, sizes[-1] if given.quick else 10**6)
     with dask.config.set(scheduler="threads", num_workers=processors()):
         measure(f"{processors()} threads")
-        memory[f"{processors()} threads"] = _worker_memory() / 1024
     tolerance = 1e-3 if given.quick else 1e-10
-    builds = {f"{processors()} threads": built(Sweep(processors()), tolerance)}
+    builds = {}
     for n in (1, 2):
-        name = f"{n} worker process{'es' * (n > 1)}"
         with workers(n, surrogate) as client:
-            measure(name, client)
-            memory[name] = max(client.run(_worker_memory).values()) / 1024
+            measure(f"{n} worker process{'es' * (n > 1)}", client)
             if n == 2:
-                builds[name] = built(DaskSweep(client), tolerance)
+                builds["2 worker processes"] = built(DaskSweep(client), tolerance, client)
+    builds[f"{processors()} threads"] = built(Sweep(processors()), tolerance)
     if any(len(answers) != 1 for answers in found.values()):
         raise SystemExit(f"error: results differ: {found}")
-    text = report(sizes, seconds, busy, memory, parts, builds, tolerance)
+    text = report(sizes, busy, memory, parts, builds, tolerance)
     print(text)
     if given.write:
         write_section("scale", text, PAGE)
 
 
 def report(
-    sizes: list[int], seconds: dict[str, dict[int, float]], busy: dict[str, dict[int, float]],
-    memory: dict[str, float], parts: dict[str, float], builds: dict[str, tuple[float, int, str]], tolerance: float,
+    sizes: list[int], busy: dict[str, dict[int, float]], memory: dict[str, float], parts: dict[str, float],
+    builds: dict[str, tuple[float, int, str]], tolerance: float,
 ) -> str:  # fmt: skip
     """The section of docs/scale.md."""
-    base = seconds["one thread, no scheduler"]
-    rows = []
-    for name, times in seconds.items():
-        used = min(processors(), 2) if name.startswith("2 worker") else (processors() if "threads" in name else 1)
-        for n in sizes:
-            rows.append(  # noqa: PERF401 (reads better)
-                [name, f"{n:.0e}", quantity(times[n]), quantity(n / times[n] / 1e6),
-                 f"{base[n] / (times[n] * used):.2f}", quantity(1e9 * busy[name][n] / n), quantity(memory[name])]
-            )  # fmt: skip
+    n = sizes[-1]
+    rows = [[name, quantity(1e9 * times[n] / n), quantity(memory[name])] for name, times in busy.items()]
     fixed, each = fit(sizes, busy["2 worker processes"])
-    share = base[sizes[-1]] / (seconds["2 worker processes"][sizes[-1]] * min(processors(), 2))
     core_hours = PLAN * each / 3600.0
     stored = PLAN * 8 / 1e12
     plan = [
         ["work of one core", f"{quantity(core_hours)} core hours"],
         [f"{CORES} workers of one thread, each with a core of its own", f"{quantity(60 * core_hours / CORES)} min"],
-        ["tasks of Dask, about twelve a chunk", quantity(12 * PLAN / 2**20)],
-        ["chunks of 2^20 cases", f"{quantity(PLAN / 2**20)}"],
         ["mu_macro alone, if it were stored as doubles", f"{quantity(stored)} TB"],
         ["the six inputs beside it", f"{quantity(6 * stored)} TB"],
-        ["result of the reductions, 1000 bins", "10 kB"],
     ]
-    local, remote = builds[f"{processors()} threads"], builds["2 worker processes"]
-    built_rows = [[name, quantity(t), f"{solves:,}", digest] for name, (t, solves, digest) in builds.items()]
+    same = len({digest for _, _, digest in builds.values()}) == 1
+    built_rows = [[name, quantity(spent), f"{solves:,}", digest] for name, (spent, solves, digest) in builds.items()]
     return "\n\n".join(
         [
             machine(*PACKAGES),
-            "Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes and a "
-            "histogram in one pass, in chunks of 2^20. Wall clock, once each; efficiency is against one thread, for "
-            "each core used; processor time is that of all processes; memory is that of the largest process so far.",
-            markdown(["run", "cases", "seconds", "M cases/s", "efficiency", "processor ns a case", "peak MB"], rows, 2),
-            f"Cost model, least squares of the processor time of two worker processes: {quantity(fixed)} s + "
-            f"{quantity(1e9 * each)} ns a case; the two reach {share:.2f} of twice the rate of one thread. Between "
-            "processes only the reduced numbers are sent, 8 kB a chunk for the histogram.",
-            f"Of the processor time on one thread, making the six inputs is {quantity(parts['make'])} ns a case, "
-            f"answering {quantity(parts['answer'])} ns; the rest is the reductions and Dask.",
+            f"{n:.0e} Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes "
+            "and a histogram in one pass, in chunks of 2^20. Processor time is that of all processes; memory is that "
+            "of the largest process so far.",
+            markdown(["run", "processor ns a case", "peak MB"], rows, 1),
+            f"Cost model, least squares of two worker processes from {sizes[0]:.0e} cases on: {quantity(fixed)} s + "
+            f"{quantity(1e9 * each)} ns a case. Between processes only the reduced numbers are sent, 8 kB a chunk for "
+            "the histogram.",
+            f"On one thread, making the six inputs is {quantity(parts['make'])} ns a case, answering "
+            f"{quantity(parts['answer'])} ns; the rest is the reductions and Dask.",
             f"For {PLAN:.0e} cases the model gives:",
             markdown(["what", "how much"], plan, 1),
-            f"A lookup table of {tolerance:.0e} built by threads and through Dask on the same {processors()} cores, "
-            f"{'the same data' if local[2] == remote[2] else 'OTHER data'}; time ratio {remote[0] / local[0]:.2f}:",
-            markdown(["run", "seconds", "solves", "digest"], built_rows, 1),
+            f"A table of {tolerance:.0e} built through Dask and by threads, {'the same' if same else 'OTHER'} data:",
+            markdown(["run", "processor seconds", "solves", "digest"], built_rows, 1),
         ]
     )
 

@@ -28,10 +28,9 @@ from numpy.typing import NDArray
 from peers import Contender
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
-from builder.measure import differences
+from builder.differences import differences
 from builder.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
-from mumacro.charts import MU
 from mumacro.inverse import solve_for
 
 Array = NDArray[np.float64]
@@ -231,7 +230,7 @@ def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
         truth = sweep.solve("full", v_few, y_few)
         for s in tables():
             progress(f"other quantities of {s.id}")
-            slopes, noise = differences(s, sweep, MU, v_few, y_few)
+            slopes, noise = differences(s, sweep, "mu_ratio", v_few, y_few)
             calls: dict[str, Callable[[], object]] = {
                 "gradient": partial(s.evaluate, y0=y, v0=v, **case, gradient=True),
                 "power": partial(s.power_with_bound, v, y),

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from mumacro import InputError, Surrogate
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
@@ -153,7 +154,7 @@ def _parser(prog: str) -> OneLineParser:
         made.set_defaults(run=run, title=made.prog)
         return made
 
-    workers = {
+    workers: dict[str, Any] = {
         "type": _whole(1, 1024),
         "default": processors(),
         "help": "threads; default: %(default)s",

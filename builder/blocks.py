@@ -18,7 +18,7 @@ from mumacro.table import Block, BorderPiece
 from .quantities import SOLVED
 from .sweep import Sweep
 
-__all__ = ["build_block", "build_border", "solve_nodes"]
+__all__ = ["build_block", "build_border", "solve_nodes", "tabulated"]
 
 Array = NDArray[np.float64]
 MAX_NODES = 96
@@ -30,13 +30,9 @@ CELL_SHARE = (
 NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
 
 
-def solve_nodes(
-    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
-) -> tuple[Array, Array, dict[str, Array]]:
-    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves."""
+def tabulated(index: int, v: Array, y: Array, eta: Array, sweep: Sweep) -> dict[str, Array]:
+    """What a block tabulates at points of one shape, by quantity, from fresh solves; eta = y~ - 1."""
     chart = charts.CHARTS[index]
-    a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
-    v, y, eta = chart.point(a[:, None], b[None, :], border)
     solved = sweep.solve("continuous" if chart.regime == CONTINUOUS else "full", v, y, eta)
     found = {}
     for code, quantity in enumerate(QUANTITIES):
@@ -46,7 +42,16 @@ def solve_nodes(
             if complement:  # next to 1 it has the digits
                 rest = np.where(base == 1.0, -solved[complement], rest)
             found[quantity.name] = rest / factor
-    return a, b, found
+    return found
+
+
+def solve_nodes(
+    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves."""
+    chart = charts.CHARTS[index]
+    a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
+    return a, b, tabulated(index, *chart.point(a[:, None], b[None, :], border), sweep)
 
 
 def _next(n: int) -> int:

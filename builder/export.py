@@ -1,4 +1,4 @@
-"""The plain grid of a table in the formats of other tools: CSV, MAT, Modelica's text tables, Parquet.
+"""A table in the formats of other tools: C sources; its plain grid as CSV, MAT, Modelica's text tables, Parquet.
 
 The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and ``error_estimate`` over
 (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all dimensionless.  It is a grid for tools with
@@ -27,7 +27,7 @@ from mumacro.errors import MumacroError
 from mumacro.table import Table, json_attributes, read_table
 
 from .c.fmu.model import write_fmu2, write_fmu3
-from .c.header import write_header
+from .c.source import write_c
 from .c.wasm import write_wasm
 
 __all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
@@ -118,9 +118,9 @@ def _parquet(table: Table, out: BinaryIO) -> None:
     parquet.write_table(arrow, out, compression="zstd")
 
 
-#: format -> (name of the file after the table's, writer)
-FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None]]] = {
-    "c": ("mumacro.h", write_header),
+#: format -> (name of the file after the table's, writer to a stream; C alone may be a folder of files)
+FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None] | None]] = {
+    "c": ("mumacro.h", None),
     "csv": ("{}.csv", _csv),
     "fmu": ("mumacro.fmu", write_fmu2),
     "fmu3": ("mumacro-fmi3.fmu", write_fmu3),
@@ -132,12 +132,14 @@ FORMATS: dict[str, tuple[str, Callable[[Table, BinaryIO], None]]] = {
 
 
 def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
-    """Write the plain grid of the table at ``path`` to ``out`` in the format ``kind``, one of :data:`FORMATS`.
+    """Write the table at ``path`` to ``out`` in the format ``kind``, one of :data:`FORMATS`.
 
     Raises
     ------
     ExportError
         Unknown format, a package missing, ``out`` is the table itself.
+    OutputError
+        ``out`` is no place for C sources.
     TableError
         The table cannot be read.
     OSError
@@ -148,11 +150,14 @@ def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
     path, out = Path(path), Path(out)
     if path.resolve() == out.resolve():
         raise ExportError(f"{out} is the table itself")
-    table = read_table(path)
+    table, write = read_table(path), FORMATS[kind][1]
+    if write is None:
+        write_c(table, out)
+        return table
     handle, name = tempfile.mkstemp(dir=out.parent, prefix=out.name, suffix=".partial")
     try:
         with os.fdopen(handle, "wb") as stream:
-            FORMATS[kind][1](table, stream)
+            write(table, stream)
             stream.flush()
             os.fsync(stream.fileno())
         os.chmod(name, 0o644)

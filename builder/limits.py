@@ -1,7 +1,7 @@
 """The range of the solver: v~ and y~ for which it is right to rounding.
 
-Below it products underflow, and above y~ = 1e14 the section's root is lost in rounding.  The limits of the model hold
-to rounding there, so a table answers for every v~ and y~.
+Below it products underflow.  Above y~ = 1e14 the section's root is lost in rounding, and at v~ = 1e12 some points need
+too many steps.  The limits of the model hold to rounding there, so a table answers for every v~ and y~.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ def _power_noise(v: Array, y: Array, power: Array, sliding: Sliding) -> Array:
     In stick-slip what the drive puts in during stick, v~, is taken out; in continuous sliding the angle swings by y~,
     and only v~ of that is out of phase.
     """
-    lost = np.where(sliding, 1e-15 * y * y, 4e-15 * v)
-    noise: Array = SOLVER_NOISE * power + np.where((y < 1.0) & (v < 1.0), lost, 0.0)
+    lost = np.where(sliding, np.where(y < 1.0, 1e-15 * y * y, 0.0), np.where(y < 2.0, 4e-15 * v, 0.0))
+    noise: Array = SOLVER_NOISE * power + np.where(v < 1.0, lost, 0.0)
     return noise
 
 

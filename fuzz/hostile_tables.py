@@ -13,7 +13,7 @@ import numpy as np
 import reporting
 
 from mumacro.cells import nodes
-from mumacro.charts import BORDER_PIECES, CHARTS, CORNER
+from mumacro.charts import BORDER_PIECES, CHARTS
 from mumacro.table import Table, read_table, write_table
 
 SMALLEST = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
@@ -70,13 +70,14 @@ def many_cells(table: Table) -> None:
 
 def huge_numbers(table: Table) -> None:
     for block in table.blocks:
-        block.values[...] = 1.7e308
-        block.power[...] = -1.7e308
+        block.nodes["mu_ratio"][...] = 1.7e308
+        block.nodes["power"][...] = -1.7e308
 
 
 def shuffled(table: Table) -> None:
     for block in table.blocks:
-        block.values[...] = np.random.default_rng(1).normal(size=block.values.shape) * 1e100
+        nodes = block.nodes["mu_ratio"]
+        nodes[...] = np.random.default_rng(1).normal(size=nodes.shape) * 1e100
 
 
 def wild_border(table: Table) -> None:
@@ -154,7 +155,7 @@ HOSTILE: dict[str, Make] = {
     "random numbers of 1e100, checksum right": signed(shuffled),
     "a border of 1e300, checksum right": signed(wild_border),
     "amplitudes of 1e300, checksum right": signed(lambda table: setattr(table, "y_tilde", table.y_tilde * 1e300)),
-    "errors of 1e308, checksum right": signed(lambda table: table.blocks[CORNER].errors.fill(1e308)),
+    "errors of 1e308, checksum right": signed(lambda table: table.blocks[0].errors["mu_ratio"].fill(1e308)),
     "a grid of another shape": edited(lambda file: replaced(file, "mu_ratio", shape=(3, 3))),
 }  # fmt: skip
 assert len(CHARTS) == 12

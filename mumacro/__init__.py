@@ -8,7 +8,7 @@ try:
     from mumacro.errors import InputError, MumacroError, TableError
     from mumacro.surrogate import Surrogate
     from mumacro.version import __version__
-except ModuleNotFoundError as _error:
+except ImportError as _error:
     # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing; argv[0] is "-m" meanwhile.
     if _sys.argv[:1] != ["-m"]:
         raise

@@ -230,7 +230,7 @@ def _part(name: str) -> Any:
     package = Path(__file__).resolve().parent
     if (package / name).is_dir():
         return importlib.import_module(f"mumacro.{name}.__main__")
-    if not (package.parent / name / "__main__.py").is_file():
+    if not (package.parent / name).is_dir():
         raise ImpossibleError(f"this installation has no {name}: pip install 'mumacro[{name}]'")
     if str(package.parent) not in sys.path:
         sys.path.insert(0, str(package.parent))

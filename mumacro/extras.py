@@ -32,8 +32,10 @@ def missing(extra: str, error: ImportError) -> str:
     >>> missing("files", ModuleNotFoundError("No module named 'pyarrow'", name="pyarrow"))
     "pyarrow is not installed: pip install 'mumacro[files]' (in a checkout: pip install -e '.[files]')"
     """
-    package = (error.name or "").partition(".")[0]
-    if not package or package in _OURS:
+    if error.name is None:  # a sentence of our own: the compiled kernel is missing
+        return str(error)
+    package = error.name.partition(".")[0]
+    if package in _OURS:
         raise error
     brackets = f"[{extra}]" if extra else ""
     return f"{package} is not installed: pip install 'mumacro{brackets}' (in a checkout: pip install -e '.{brackets}')"

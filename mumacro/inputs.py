@@ -244,13 +244,14 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
         An input is missing, given twice, or not a real number.
     """
     converted: dict[str, Array] = {}
-    if (given.get("omega") is None) == (given.get("f") is None):
-        both = given.get("omega") is not None
-        raise InputError(
-            "omega", given.get("omega"), "given or f [Hz] in its place, " + ("not both" if both else "one of them")
-        )
     for name in FIELDS:
-        source = "f" if name == "omega" and given.get("omega") is None else name
+        source = name
+        if name == "omega":
+            both = given.get("omega") is not None
+            if both == (given.get("f") is not None):
+                told = "not both" if both else "one of them"
+                raise InputError("omega", given.get("omega"), f"given or f [Hz] in its place, {told}")
+            source = "omega" if both else "f"
         if source not in given:
             hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
             raise InputError(name, None, f"given{hint}")
@@ -311,7 +312,9 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
             field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
-            raise InputError(field, float(told.ravel()[i]), BOUNDS[name], i if values.ndim else None)
+            value = float(told.ravel()[i])
+            bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
+            raise InputError(field, value, bound, i if values.ndim else None)
 
 
 def _bad(name: str, values: Array) -> NDArray[np.bool_]:

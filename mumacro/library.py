@@ -1,8 +1,8 @@
 """The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
 
-It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/library.h``.  A call runs without the
-interpreter's lock.  There is a kernel for every instruction level of the processor; the best one is used, and those
-with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
+It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``, ``records.h`` and
+``library.h``.  A call runs without the interpreter's lock.  There is a kernel for every instruction level of the
+processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ __all__ = ["BLOCK_COLUMNS", "PIECE_COLUMNS", "Data", "Kernel", "kernels"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-#: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/library.h``
+#: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
 BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
 _HERE = Path(__file__).resolve().parent
 _SHARED = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
-_DECLARED = (_HERE / "kernel" / "library.h").read_text("ascii")
+_DECLARED = "".join((_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h"))
 _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
 _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"))
@@ -61,6 +61,7 @@ class Data:
             self._keep(self.pointer, name, array)
             for name, array in (("border", border), ("pieces", pieces), ("blocks", blocks), ("outer", outer))
         )
+        self.pointer.border_cells = self.border.shape[0]
 
     def put(self, quantity: int, polynomials: Array, errors: Array, slope_errors: Array) -> None:
         """Add the cells of a quantity, see :attr:`quantities`."""
@@ -147,6 +148,13 @@ class Kernel:
         out = np.empty(y.size)
         self._found.border(data.pointer, y.size, _numbers(y), _numbers(out))
         return out
+
+    def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
+        """Blocks of points (n,) with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them."""
+        block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
+        codes = _FFI.from_buffer(_CODES, block)
+        self._found.places(data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b))
+        return block, a, b
 
     # --- for the builder ------------------------------------------------------------------------------
 

@@ -172,7 +172,7 @@ def _put_cell_errors(group: Any, table: Table) -> None:
     """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and a dimension too."""
 
     def rows(block: Block, name: str) -> Array:
-        return block.cell_errors.get(name, np.zeros((block.cells[0] * block.cells[1], 3)))
+        return block.cell_errors[name] if name in block.nodes else np.zeros((block.cells[0] * block.cells[1], 3))
 
     errors = np.stack([np.concatenate([rows(block, name) for block in table.blocks]) for name in table.quantities])
     for axis, size in zip(CELL_AXES, errors.shape, strict=True):
@@ -196,10 +196,10 @@ def _fill(root: Any, table: Table) -> None:
         extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
         _put(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
-    for (name, axis, quantity), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
+    for (name, axis, tabulated), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
         group = border.createGroup(name)
         _put(group, axis.name, piece.nodes, charts.COORDINATES[axis.name])
-        _put(group, "value", piece.values, quantity, (axis.name,))
+        _put(group, "value", piece.values, tabulated, (axis.name,))
         group.setncatts({"cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error,
                          "range": np.array([axis.low, axis.high])})  # fmt: skip
     # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"

@@ -13,7 +13,7 @@ from builder.steady import NOT_CONVERGED, border, solve
 from builder.sweep import Sweep
 from comparing import close
 from mumacro import InputError, Surrogate
-from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL, amplitude
+from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL
 
 Array = NDArray[np.float64]
 
@@ -132,4 +132,4 @@ def test_pieces_cover_every_amplitude() -> None:
     assert (high.low, high.high) == (0.0, 1.0 / Y_TAIL)
     for axis, y in ((low, [0.0, Y_CONT]), (mid, [Y_CONT, Y_TAIL]), (high, [math.inf, Y_TAIL])):
         with np.errstate(divide="ignore"):
-            assert amplitude(axis, np.array([axis.low, axis.high])) == close(y, rel=1e-14)
+            assert axis.amplitude(np.array([axis.low, axis.high])) == close(y, rel=1e-14)

@@ -1,30 +1,26 @@
-"""From Chebyshev nodes to cells: exact for polynomials, close for smooth functions, the same in Python and compiled."""
+"""From Chebyshev nodes to cells: exact for polynomials, close for smooth functions; and how the kernel reads cells."""
 
 import math
 
 import numpy as np
 import pytest
-from numba import njit
-from numba.core.errors import TypingError
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from comparing import close
+from made_cells import Cells
 from mumacro import charts
 from mumacro.cells import (
     WIDTH,
-    block_rows,
     cell_positions,
     cells_1d,
     cells_2d,
     chebyshev_coefficients,
     interpolation_matrix,
-    joined,
     nodes,
-    patch_value,
 )
-from mumacro.charts import CHARTS, SQRT2, Axis, Chart
-from mumacro.table import Block
+from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
+from mumacro.library import Kernel, kernels
 
 Array = NDArray[np.float64]
 PLAIN = Axis("y", 0.0, 1.0)
@@ -33,16 +29,15 @@ S = Axis("s", 0.0, 1.0)
 ANGLE = Axis("angle", 0.0, 1.0)
 
 
-@njit
-def _value(coef: Array, p: int, u: float, w: float) -> float:
-    out: float = patch_value(coef, p, u, w)
-    return out
+def value(cell: Array, u: float, w: float) -> float:
+    """The polynomial of one cell, rows and columns of falling powers of w and u."""
+    return float(np.polynomial.polynomial.polyval2d(w, u, cell[::-1, ::-1]))
 
 
 def at(coef: Array, cells: tuple[int, int], x: float, z: float) -> float:
     """Value at (x, z) in [0, 1]^2 of cells in the layout of :func:`cells_2d`."""
     i, j = min(int(x * cells[0]), cells[0] - 1), min(int(z * cells[1]), cells[1] - 1)
-    return float(_value(coef, i * cells[1] + j, 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0))
+    return value(coef[i * cells[1] + j], 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0)
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 40])
@@ -76,7 +71,7 @@ def test_coefficients_of_a_plane_work_along_both_axes() -> None:
 def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
     rng = np.random.default_rng(cells)
     c = rng.normal(size=WIDTH)
-    local = cells_1d(Axis("y", -1.0, 1.0), chebyshev.chebval(nodes(20, -1.0, 1.0), c), cells)
+    local = cells_1d(0, chebyshev.chebval(nodes(20, -1.0, 1.0), c), cells)  # of v~crit, in y~^2
     assert local.shape == (cells, WIDTH)
     for x in np.linspace(0.0, 1.0, 57):
         i = min(int(x * cells), cells - 1)
@@ -89,9 +84,8 @@ def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[in
     rng = np.random.default_rng(sum(cells))
     c = rng.normal(size=(WIDTH, WIDTH))
     values = chebyshev.chebgrid2d(nodes(12, -1.0, 1.0), nodes(15, -1.0, 1.0), c)
-    coef = joined([cells_2d(PLAIN, PLAIN, values, cells)])
+    coef = cells_2d(PLAIN, PLAIN, values, cells)
     assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
-    assert coef.flags.c_contiguous
     for x, z in rng.random((80, 2)):
         assert at(coef, cells, x, z) == close(chebyshev.chebval2d(2 * x - 1, 2 * z - 1, c), abs=2e-10)
 
@@ -100,7 +94,7 @@ def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
     values = np.exp(np.sin(3.0 * nodes(60, 0.0, 1.0)))
     errors = []
     for cells in (2, 4, 8):
-        local = cells_1d(PLAIN, values, cells)
+        local = cells_1d(0, values, cells)
         x = np.linspace(0.0, 1.0, 500, endpoint=False)
         i = (x * cells).astype(int)
         found = np.array([np.polyval(local[k], 2.0 * (t * cells - k) - 1.0) for t, k in zip(x, i, strict=True)])
@@ -112,85 +106,82 @@ def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
 def test_neighbouring_cells_meet() -> None:
     x, z = nodes(40, 0.0, 1.0), nodes(40, 0.0, 1.0)
     values = np.exp(-x[:, None]) * np.cos(2.0 * z[None, :]) + x[:, None] * z[None, :] ** 2
-    coef = joined([cells_2d(PLAIN, PLAIN, values, (6, 6))])
+    coef = cells_2d(PLAIN, PLAIN, values, (6, 6))
     for i in range(5):
         for t in np.linspace(-1.0, 1.0, 9):
-            assert _value(coef, i * 6 + 2, 1.0, t) == close(_value(coef, (i + 1) * 6 + 2, -1.0, t), abs=2e-12)
-            assert _value(coef, 12 + i, t, 1.0) == close(_value(coef, 13 + i, t, -1.0), abs=2e-12)
+            assert value(coef[i * 6 + 2], 1.0, t) == close(value(coef[(i + 1) * 6 + 2], -1.0, t), abs=2e-12)
+            assert value(coef[12 + i], t, 1.0) == close(value(coef[13 + i], t, -1.0), abs=2e-12)
 
 
-# --- the patch itself ---------------------------------------------------------------------------------
+# --- what the kernel reads ------------------------------------------------------------------------------
 
 
-def test_patch_is_a_polynomial_in_falling_powers() -> None:
-    coef = np.zeros((3, WIDTH, WIDTH))
-    coef[1, 2, 5] = 3.0  # w^5 u^2
-    coef[1, 7, 7] = -1.0
-    for value in (patch_value, _value):
-        assert value(coef, 1, 0.5, -0.7) == close(3.0 * (-0.7) ** 5 * 0.5**2 - 1.0, rel=1e-15)
-        assert value(coef, 0, 0.5, -0.7) == 0.0
-        assert value(coef, 2, 0.5, -0.7) == 0.0
-
-
-def test_compiled_patch_equals_plain_python() -> None:
+@pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
+def test_a_cell_is_a_polynomial_in_falling_powers(kernel: Kernel) -> None:
+    """In stick_slip_mid the power is what is tabulated, 1 q."""
+    index = NAMES.index("stick_slip_mid")
     rng = np.random.default_rng(8)
-    coef = rng.normal(size=(50, WIDTH, WIDTH))
-    for p in range(50):
-        u, w = rng.uniform(-1.0, 1.0, 2)
-        expected = np.polynomial.polynomial.polyval2d(w, u, coef[p, ::-1, ::-1])
-        scale = np.abs(coef[p]).sum()
-        assert patch_value(coef, p, u, w) == close(expected, abs=4e-16 * scale)
-        assert _value(coef, p, u, w) == close(expected, abs=4e-16 * scale)
+    made = Cells((1, 1))
+    v, y = made.points(index, rng.random(200), rng.uniform(0.5, 0.99, 200))
+    block, a, b = kernel.places(made.data, v, y)
+    assert np.all(block == index)
+    (low_a, high_a), (low_b, high_b) = CHARTS[index].a.span, CHARTS[index].b.span
+    u, w = 2.0 * (a - low_a) / (high_a - low_a) - 1.0, 2.0 * (b - low_b) / (high_b - low_b) - 1.0
+    for size in (1.0, 1e-3):
+        cell = size * rng.random((WIDTH, WIDTH))
+        cell[-1, -1] += 10.0  # below zero a power is cut off
+        coef = np.zeros((len(CHARTS), WIDTH, WIDTH))
+        coef[index] = cell
+        found = made.values(coef, v, y, kernel)
+        expected = np.polynomial.polynomial.polyval2d(w, u, cell[::-1, ::-1])
+        assert found == close(expected, rel=1e-14)
 
 
-def test_a_patch_that_is_not_contiguous_is_refused_not_misread() -> None:
-    with pytest.raises(TypingError, match="patch_value"):
-        _value(np.zeros((3, WIDTH, 2 * WIDTH))[:, :, ::2], 1, 0.0, 0.0)
+@pytest.mark.parametrize("index", range(len(CHARTS)), ids=NAMES)
+@pytest.mark.parametrize("cells", [(1, 1), (2, 7), (7, 2), (40, 1)])
+def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cells: tuple[int, int]) -> None:
+    """A table whose cells hold their own numbers: none is skipped, neighbours follow one another."""
+    made = Cells(cells)
+    chart, n = CHARTS[index], cells[0] * cells[1]
+    number = np.zeros((n * len(CHARTS), WIDTH, WIDTH))
+    number[:, -1, -1] = np.tile(np.arange(n), len(CHARTS))
+    for axis, other in ((0, 0.37), (1, 0.73)):
+        along = np.linspace(1e-6, 1.0 - 1e-6, 997)
+        v, y = made.points(index, *((along, other) if axis == 0 else (other, along)))
+        mine = kernels[-1].places(made.data, v, y)[0] == index
+        if chart.regime == charts.CONTINUOUS or axis == 1:
+            assert np.count_nonzero(mine) > 200
+        found = np.rint(made.tabulated(index, number, v[mine], y[mine])).astype(int)
+        assert np.all((found >= 0) & (found < n))
+        a, b = np.divmod(found, cells[1])
+        moving, fixed = (a, b) if axis == 0 else (b, a)
+        assert np.all(np.diff(moving) >= 0)
+        assert np.all(np.diff(moving) <= 1)
+        assert np.unique(fixed).size <= 1
+        if mine.all():
+            assert (moving[0], moving[-1]) == (0, cells[axis] - 1)
+
+
+@pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
+def test_no_geometry_and_no_coordinate_makes_the_kernel_read_elsewhere(kernel: Kernel) -> None:
+    """Rows of blocks that count cells anywhere: what is read is one of the table's own cells."""
+    rng = np.random.default_rng(3)
+    made = Cells((3, 3))
+    around = np.zeros((30 * len(CHARTS), WIDTH, WIDTH))
+    own = around[10 * len(CHARTS) : 19 * len(CHARTS)]
+    around[:, -1, -1], own[:, -1, -1] = 7.0, 1.0
+    v, y = 10.0 ** rng.uniform(-9.0, 5.0, 3000), 10.0 ** rng.uniform(-6.0, 8.0, 3000)
+    for size in (1.0, 1e3, 1e9, 1e300, math.inf, math.nan):
+        made.data.blocks[:] = size * rng.normal(size=made.data.blocks.shape)
+        for index in range(len(CHARTS)):
+            mine = kernel.places(made.data, v, y)[0] == index
+            if CHARTS[index].a.name != "inverse_y":  # there a base is added
+                found = made.tabulated(index, own, v[mine], y[mine], kernel)
+                # coordinates that are infinite give no number
+                assert np.all((np.abs(found - 1.0) <= 1e-12) | (np.isnan(found) & (size not in (1.0, 1e3, 1e9))))
 
 
 # --- the coordinates that evaluation uses --------------------------------------------------------------
-
-
-@njit
-def _cell(blocks: Array, patches: int, block: int, a: float, b: float) -> tuple[int, float, float]:
-    found: tuple[int, float, float] = charts.cell(blocks, patches, block, a, b)
-    return found
-
-
-@pytest.mark.parametrize("index", range(len(CHARTS)), ids=charts.NAMES)
-@pytest.mark.parametrize("cells", [(1, 1), (2, 7), (7, 2), (40, 1)])
-def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cells: tuple[int, int]) -> None:
-    """Numbering in the evaluation: the first cell contains the low end, the last the high end, none is skipped."""
-    none = np.empty(0)
-    blocks = block_rows([Block(none, none, none, cells, none)] * len(CHARTS))
-    size = cells[0] * cells[1]
-    spans = CHARTS[index].a.span, CHARTS[index].b.span
-    for axis in (0, 1):
-        start, stop = spans[axis]
-        other = spans[1 - axis][0]
-        ends = [start, np.nextafter(start, stop), 0.5 * (start + stop), np.nextafter(stop, start), stop]
-        visited = set()
-        for x in [*ends, *np.linspace(start, stop, 997)]:
-            patch, *local = _cell(blocks, len(CHARTS) * size, index, *((x, other) if axis == 0 else (other, x)))
-            patch -= index * size
-            assert 0 <= patch < size
-            assert -1.0 - 1e-9 <= local[axis] <= 1.0 + 1e-9
-            assert local[1 - axis] == close(-1.0, abs=1e-9)
-            visited.add(patch)
-        assert visited == {i * cells[1] if axis == 0 else i for i in range(cells[axis])}
-    last, u, w = _cell(blocks, len(CHARTS) * size, index, spans[0][1], spans[1][1])
-    assert last == (index + 1) * size - 1
-    assert (u, w) == (close(1.0, abs=1e-9), close(1.0, abs=1e-9))
-
-
-def test_no_coordinate_makes_a_cell_of_another_table() -> None:
-    """For any input, an existing patch is read."""
-    none = np.empty(0)
-    blocks = block_rows([Block(none, none, none, (3, 3), none)] * len(CHARTS))
-    for index in range(charts.OTHER + 1):
-        for a in (-1e300, -1.0, 0.0, 1e9, 1e300, math.inf, -math.inf, math.nan):
-            for b in (-1e300, 1e300, math.inf, math.nan):
-                assert 0 <= _cell(blocks, 9 * len(CHARTS), index, a, b)[0] < 9 * len(CHARTS)
 
 
 @pytest.mark.parametrize("axis", AXES, ids=repr)
@@ -208,21 +199,15 @@ def test_both_coordinates_of_an_axis_are_inverse_and_rise_together(axis: Axis) -
 
 def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
     low, high = ANGLE.to_evaluation(np.array([0.0, 1.0]))
-    for v, eta in ((1e-9, 1e-3), (1e-3, 0.0), (0.02, -0.2), (1e-7, 0.4)):
-        y = 1.0 + eta
-        radius, half, phi = _corner(v, y)
-        s0 = math.sqrt(2.0 * math.pi * v / phi)
-        assert low < half < high
-        assert phi**3 + 2.0 * (y - 1.0) * phi == close(math.pi * v, rel=1e-14)
-        assert radius == close(math.hypot(s0 / SQRT2, SQRT2 * phi), rel=1e-15)
-        angle = 2.0 / math.pi * math.atan2(2.0 * phi, s0)
-        assert ANGLE.to_file(np.array([half]))[0] == close(angle, rel=1e-14)
-
-
-@njit
-def _corner(v: float, y: float) -> tuple[float, float, float]:
-    found: tuple[float, float, float] = charts.corner(v, y)
-    return found
+    v, eta = np.array([1e-9, 1e-3, 0.02, 1e-7]), np.array([1e-3, 0.0, -0.2, 0.4])
+    y = 1.0 + eta
+    _, radius, half = kernels[-1].places(Cells((1, 1)).data, v, y)
+    phi = kernels[-1].normal_form_root(v, y - 1.0)
+    s0 = np.sqrt(2.0 * math.pi * v / phi)
+    assert np.all((low < half) & (half < high))
+    assert phi**3 + 2.0 * (y - 1.0) * phi == close(math.pi * v, rel=1e-14)
+    assert radius == close(np.hypot(s0 / SQRT2, SQRT2 * phi), rel=1e-15)
+    assert ANGLE.to_file(half) == close(2.0 / math.pi * np.arctan2(2.0 * phi, s0), rel=1e-14)
 
 
 def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
@@ -260,10 +245,10 @@ def test_cells_along_s_are_on_the_nodes_axis_and_have_an_edge_at_the_knot(chart:
 
 
 def test_cells_along_s_follow_a_smooth_function() -> None:
-    chart = CHARTS[charts.S_LOW]
+    chart = CHARTS[NAMES.index("stick_slip_low")]
     a, s = nodes(20, chart.a.low, chart.a.high), nodes(30, chart.b.low, chart.b.high)
     values = np.exp(-a[:, None]) * np.cos(2.0 * s[None, :])
-    coef = joined([cells_2d(chart.a, chart.b, values, (4, 12))])
+    coef = cells_2d(chart.a, chart.b, values, (4, 12))
     rng = np.random.default_rng(2)
     for x, sigma in zip(rng.random(200), SQRT2 * rng.random(200), strict=True):
         expected = math.exp(-x * chart.a.high) * math.cos(2.0 * float(chart.b.to_file(np.array([sigma]))[0]))

@@ -1,51 +1,25 @@
 """The atlas: point to place and place to point are inverse, in every block, on nodes, edges and seams."""
 
-import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.typing import NDArray
 
 from comparing import close
 from mumacro import Surrogate, charts
 from mumacro.cells import nodes
-from mumacro.charts import CHARTS, CORNER, FAST, MU, NAMES, REGIME_OF_SOURCE, Axis
+from mumacro.charts import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES, Axis
+from mumacro.library import Kernel, kernels
 
 Array = NDArray[np.float64]
+C_LOW, S_MID, CORNER = (NAMES.index(name) for name in ("continuous_low", "stick_slip_mid", "corner"))
 PARTS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.37, 0.5, 0.5 + 1e-9, 0.71, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9)
 
 
 @pytest.fixture(scope="module", params=["mumacro-1e-4", "mumacro-1e-12"])
 def table(request: pytest.FixtureRequest, tables_dir: Path) -> Surrogate:
     return Surrogate.open(tables_dir / f"{request.param}.nc")
-
-
-@njit
-def _locate(v: Array, y: Array, border: Array, pieces: Array) -> Any:
-    block, out = np.empty(v.size, np.int64), np.empty((3, v.size))
-    for i in range(v.size):
-        block[i], out[0, i], out[1, i], out[2, i], _, _ = charts.locate(v[i], y[i], border, pieces)
-    return block, out
-
-
-@njit
-def _place(v: Array, y: Array, border: Array, pieces: Array) -> Any:
-    block, out = np.empty(v.size, np.int64), np.empty((4, v.size))
-    for i in range(v.size):
-        crit, _, ln_y = charts.border(y[i], border, pieces)
-        block[i], out[0, i], out[1, i], out[2, i], out[3, i] = charts.place(v[i], y[i], crit, ln_y)
-    return block, out
-
-
-@njit
-def _form(block: Any, v: Array, y: Array, phi: Array) -> Any:
-    out = np.empty((2, v.size))
-    for i in range(v.size):
-        out[0, i], out[1, i] = charts.form(charts.MU, block[i], v[i], y[i], phi[i])
-    return out
 
 
 def along(axis: Axis) -> Array:
@@ -58,13 +32,13 @@ def points(table: Surrogate, index: int) -> tuple[Array, Array, Array, Array]:
     """(a, b) in the file's coordinates and the points (v~, y~) there that are representable as doubles."""
     chart = CHARTS[index]
     a, b = (x.ravel() for x in np.meshgrid(along(chart.a), along(chart.b), indexing="ij"))
-    v, y, _ = charts.point(chart, a, b, table.border)
+    v, y, _ = chart.point(a, b, table.border)
     crit = table.v_tilde_crit(y)
     keep = (v > 1e-280) & np.isfinite(y) & (y > 1e-140) & (v < 1e140)
     # on the wrong side of the border, or of the cut between stick_slip_mid and the corner, another block applies
     if chart.regime == charts.CONTINUOUS:
         keep &= v >= crit
-    elif index == charts.S_MID:
+    elif index == S_MID:
         keep &= v >= charts.SIGMA_CUT**2 * crit
     elif index == CORNER:
         keep &= (v < charts.SIGMA_CUT**2 * crit) & (y > charts.Y_STICK_LO) & (y <= charts.Y_STICK_HI)
@@ -75,7 +49,7 @@ def points(table: Surrogate, index: int) -> tuple[Array, Array, Array, Array]:
 def test_place_and_point_undo_each_other(table: Surrogate, index: int) -> None:
     chart = CHARTS[index]
     a, b, v, y = points(table, index)
-    block, (found_a, found_b, phi) = _locate(v, y, *table.border.arrays)
+    block, found_a, found_b = kernels[-1].places(table._data, v, y)
     # a point on an edge belongs to any block with this edge
     inside = (a > chart.a.low) & (a < chart.a.high) & (b > chart.b.low + 1e-9) & (b < chart.b.high * (1 - 1e-9))
     away = np.minimum(a - chart.a.low, chart.a.high - a) > 1e-11 * max(abs(chart.a.low), abs(chart.a.high))
@@ -92,11 +66,6 @@ def test_place_and_point_undo_each_other(table: Surrogate, index: int) -> None:
         if axis.name == "v_squared_share":
             slack = slack + 4e-15
         assert np.all(np.abs(back - given[mine]) <= slack), axis.name
-    corner = phi[mine] if index == CORNER else np.zeros(np.count_nonzero(mine))
-    if index == CORNER:
-        eta = y[mine] - 1.0
-        rest = corner**3 + 2.0 * eta * corner - math.pi * v[mine]
-        assert np.all(np.abs(rest) <= 4e-15 * (corner**3 + 2.0 * np.abs(eta) * corner))
 
 
 @pytest.mark.parametrize("index", range(len(CHARTS)), ids=NAMES)
@@ -105,13 +74,13 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
     v, y = 10.0 ** rng.uniform(-8.0, 6.0, 60_000), 10.0 ** rng.uniform(-3.0, 8.0, 60_000)
     near = rng.random(v.size) < 0.5
     y[near] = rng.uniform(0.7, 3.5, np.count_nonzero(near))
-    block, (a, b, _) = _locate(v, y, *table.border.arrays)
+    block, a, b = kernels[-1].places(table._data, v, y)
     mine = block == index
     assert np.count_nonzero(mine) > 100
     chart = CHARTS[index]
-    again_v, again_y, eta = charts.point(chart, chart.a.to_file(a[mine]), chart.b.to_file(b[mine]), table.border)
+    again_v, again_y, eta = chart.point(chart.a.to_file(a[mine]), chart.b.to_file(b[mine]), table.border)
     # d ln v~ / d b is unbounded where b ends: in continuous_low at v~ -> 0 and at v~ -> infinity, along s at v~ -> 0
-    share = 1.0 + (v[mine] ** 2 + v[mine] ** -2 if index == charts.C_LOW else 0.0)
+    share = 1.0 + (v[mine] ** 2 + v[mine] ** -2 if index == C_LOW else 0.0)
     crit = table.v_tilde_crit(y[mine])
     low = 1.0 + (np.sqrt(crit / v[mine]) if chart.b.name == "s" else 0.0)
     assert np.all(np.abs(again_v / v[mine] - 1.0) <= 4e-14 * share * low + (1e-9 if index == CORNER else 0.0))
@@ -119,37 +88,12 @@ def test_the_inverse_leads_back_to_the_point(table: Surrogate, index: int) -> No
     assert eta == close(y[mine] - 1.0, abs=1e-13 * y[mine].max())
 
 
-def test_selections_and_branches_place_a_point_alike(table: Surrogate) -> None:
-    """`place` selects where `locate` branches; `form` gives the same bits as `place`, at common points and seams."""
-    rng = np.random.default_rng(3)
-    n = 40_000
-    v, y = 10.0 ** rng.uniform(-12.0, 8.0, n), 10.0 ** rng.uniform(-8.0, 5.0, n)
-    y[: n // 4] = rng.choice(
-        [charts.Y_STICK_LO, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL], n // 4
-    ) * (1.0 + rng.integers(-3, 4, n // 4) * 2.0**-53)  # fmt: skip
-    crit = table.v_tilde_crit(y)
-    beside = slice(n // 4, n // 2)
-    share = rng.choice([1.0, 0.5, charts.SIGMA_CUT**2, charts.RHO_MAX], n // 4)
-    v[beside] = crit[beside] * share * (1.0 + rng.integers(-3, 4, n // 4) * 2.0**-53)
-    common = y <= charts.Y_TAIL
-    v, y = v[common], y[common]
-    block, (a, b, base, factor) = _place(v, y, *table.border.arrays)
-    other, (found_a, found_b, phi) = _locate(v, y, *table.border.arrays)
-    np.testing.assert_array_equal(block, other)
-    plain = (block != CORNER) & (block != FAST)
-    assert np.unique(block[plain]).size == len(CHARTS) - 3  # without the corner and the tails
-    np.testing.assert_array_equal(a[plain], found_a[plain])
-    np.testing.assert_array_equal(b[plain], found_b[plain])
-    form = _form(block[plain], v[plain], y[plain], phi[plain])
-    np.testing.assert_array_equal(form[0], base[plain])
-    np.testing.assert_array_equal(form[1], factor[plain])
-
-
 def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surrogate) -> None:
     values = np.concatenate([10.0 ** np.arange(-320.0, 308.0, 4.0), [5e-324, 1.7e308]])
     v, y = (x.ravel() for x in np.meshgrid(values, values))
-    block, (a, b, _) = _locate(v, y, *table.border.arrays)
-    assert np.all((block >= 0) & (block <= FAST))
+    block, a, b = kernels[-1].places(table._data, v, y)
+    np.testing.assert_array_equal(block, table.ratio_with_bound(v, y)[2])
+    assert np.all((block >= 0) & (block <= SOURCES.index("tail_fast")))
     for index, chart in enumerate(CHARTS):
         mine = block == index
         for axis, found in ((chart.a, a[mine]), (chart.b, b[mine])):
@@ -160,15 +104,41 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
     np.testing.assert_array_equal(sliding, v >= table.v_tilde_crit(y))
 
 
-def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate) -> None:
-    """mu~ = base + factor q with q from the file: exact at nodes, to the table's error."""
+@pytest.mark.parametrize("quantity", charts.QUANTITIES, ids=charts.QUANTITY_NAMES)
+def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate, quantity: charts.Quantity) -> None:
+    """value = base + factor q with q from the file: exact at nodes, to the table's error."""
     for index, (chart, part) in enumerate(zip(CHARTS, table.table.blocks, strict=True)):
+        assert (quantity.name in part.nodes) == chart.holds(quantity)
         a, b = np.meshgrid(part.a, part.b, indexing="ij")
-        v, y, eta = charts.point(chart, a, b, table.border)
+        v, y, eta = chart.point(a, b, table.border)
         keep = (table.ratio_with_bound(v, y)[2] == index) & (v > 1e-200)
-        phi = np.array([charts.normal_form_root(*p) for p in zip(v[keep], eta[keep], strict=True)])
-        base, factor = _form(np.full(phi.size, index), v[keep], y[keep], phi)
-        expected = base + factor * part.values[keep]
-        mu, bound, _ = table.ratio_with_bound(v[keep], y[keep])
-        assert np.all(np.abs(mu - expected) <= 1.01 * bound + 4e-16), chart.name
-        assert MU == 0
+        base, factor = kernels[-1].forms(charts.QUANTITY_NAMES.index(quantity.name), index, v[keep], y[keep], eta[keep])
+        value, bound, _ = table.quantity(quantity.name, v[keep], y[keep])
+        assert np.all((factor != 0.0) == chart.holds(quantity))
+        expected = base + factor * part.nodes[quantity.name][keep] if chart.holds(quantity) else 0.0 * base
+        assert np.all(np.abs(value - expected) <= 1.01 * bound + 4e-16), chart.name
+
+
+def test_levels_of_the_processor_place_and_scale_alike(table: Surrogate) -> None:
+    """Places and forms at every instruction level: equal bits with fused multiply-add, else to the last digits."""
+    rng = np.random.default_rng(3)
+    y = 10.0 ** rng.uniform(-8.0, 8.0, 4000)
+    v = table.v_tilde_crit(y) * 10.0 ** rng.uniform(-3.0, 1.0, y.size)
+
+    def found(kernel: Kernel) -> list[Array]:
+        block, a, b = kernel.places(table._data, v, y)
+        parts = [block.astype(float), a, b, kernel.border(table._data, y), kernel.normal_form_root(v, y - 1.0)]
+        for quantity, about in enumerate(charts.QUANTITIES):
+            for index, chart in enumerate(CHARTS):
+                mine = block == index
+                if chart.holds(about):
+                    parts += kernel.forms(quantity, index, v[mine], y[mine], y[mine] - 1.0)
+        return parts
+
+    best = found(kernels[-1])
+    for kernel in kernels[:-1]:
+        for ours, theirs in zip(found(kernel), best, strict=True):
+            if kernel.level == "base":
+                assert ours == close(theirs, rel=1e-13, abs=4e-16)
+            else:
+                np.testing.assert_array_equal(ours, theirs)

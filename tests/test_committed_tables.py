@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from builder.assemble import ABS_TO_REL, build_table
-from builder.measure import SOLVER_NOISE, STICK_NOISE, power_noise
+from builder.quantities import SOLVER_NOISE, STICK_NOISE, solver_noise
 from builder.sweep import Sweep
 from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps
 from comparing import close
@@ -191,7 +191,7 @@ def inside(table, sweep, v, y):
     power, of_power = table.power_with_bound(v, y)
     stick, of_stick = table.stick_fraction_with_bound(v, y)
     source = table.ratio_with_bound(v, y)[2]
-    noise = power_noise(v, y, solved["power"], REGIME_OF_SOURCE[source] == CONTINUOUS)
+    noise = solver_noise("power", v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
     assert np.all(np.abs(power - solved["power"]) <= of_power + noise)
     assert np.all(np.abs(stick - solved["stick_fraction"]) <= of_stick + STICK_NOISE)
     return of_power / power, of_stick

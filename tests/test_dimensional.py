@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import ellipk, mpf, pi, workdps
-from mumacro.dimensional import group_columns
 
 from builder.steady import solve
 from comparing import close
-from mumacro import InputError, Surrogate, dimensional
+from mumacro import InputError, Surrogate
 from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, UNITS, as_columns, check_inputs
 
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-10.nc"
@@ -59,12 +58,10 @@ def test_groups_are_right_whatever_overflows_on_the_way(
     assert (whole.v_tilde[0], whole.y_tilde[0], whole.length_scale[0]) == (
         found.v_tilde, found.y_tilde, found.length_scale,
     )  # fmt: skip
-    # the fast path for whole columns gives the same result, or none
-    v, y = np.empty(1), np.empty(1)
-    odd = group_columns(*(np.array([x]) for x in (mu0, Fz, k, y0, omega, v0)), v, y)
-    assert odd == (v[0] == -1.0)
-    if not odd:
-        assert (v[0], y[0]) == (found.v_tilde, found.y_tilde)
+    column = table.evaluate(
+        **{name: np.array([x]) for name, x in zip(FIELDS, (mu0, Fz, k, y0, omega, v0), strict=True)}, groups=True
+    )
+    assert (column.v_tilde[0], column.y_tilde[0]) == (found.v_tilde, found.y_tilde)
 
 
 @pytest.mark.parametrize(
@@ -398,9 +395,7 @@ def test_columns_on_one_thread_equal_the_array(table: Surrogate, n: int) -> None
         np.testing.assert_array_equal(source, expected.source_code)
         for i in range(0, n, 17):
             case = [float(c[i if c.size == n else 0]) for c in given]
-            ratio, of_ratio, code = table.evaluate_case(*case)
-            assert (ratio, code) == (mu[i], source[i])
-            assert case[0] * of_ratio == bound[i]
+            assert table.evaluate_case(*case) == (macro[i], mu[i], bound[i], source[i])
 
 
 def test_columns_mark_illegal_cases_and_take_infinite_stiffness_for_rigid(table: Surrogate) -> None:
@@ -415,8 +410,7 @@ def test_columns_mark_illegal_cases_and_take_infinite_stiffness_for_rigid(table:
     assert macro[2] == table.evaluate(**{**PLAIN, "k": None}).mu_macro
     for i in range(6):
         one = table.evaluate_case(float(mu0[i]), float(force[i]), float(k[i]), 2e-6, 1.3e5, 0.01)
-        assert one[2] == source[i]
-        np.testing.assert_array_equal(one[0], mu[i])
+        np.testing.assert_array_equal(one, (macro[i], mu[i], bound[i], source[i]))
 
 
 def test_columns_of_different_lengths_are_refused(table: Surrogate) -> None:
@@ -426,10 +420,3 @@ def test_columns_of_different_lengths_are_refused(table: Surrogate) -> None:
     with pytest.raises(InputError, match="columns of one length"):
         table.evaluate_columns(one, one, one, one, one, np.ones((2, 1)))
     assert table.evaluate_columns(one, one, one, one, one, np.empty(0))[0].shape == (0,)
-
-
-def test_one_compiled_kernel_serves_every_mix_of_numbers_and_columns(table):
-    for name in FIELDS:
-        for columns in ({name: [PLAIN[name]] * 3}, {other: [PLAIN[other]] * 2 for other in FIELDS if other != name}):
-            table.evaluate(**{**PLAIN, **columns}, gradient=True)
-    assert len(dimensional.gradients.signatures) == 1

@@ -128,9 +128,19 @@ def test_the_same_table_gives_the_same_bytes(path, written, tmp_path, kind):
         with pytest.raises(wasm.WasmError, match="zig"):
             export_table(path, kind, tmp_path / "again")
         pytest.skip("neither zig nor clang with lld is installed")
-    export_table(path, kind, tmp_path / "again")
-    assert (tmp_path / "again").read_bytes() == (written / FORMATS[kind][0].format("grid")).read_bytes()
-    assert [entry.name for entry in tmp_path.iterdir()] == ["again"]
+    export_table(path, kind, tmp_path / "again.h")
+    assert (tmp_path / "again.h").read_bytes() == (written / FORMATS[kind][0].format("grid")).read_bytes()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["again.h"]
+
+
+def test_c_in_three_files_is_written_twice_alike(path, tmp_path):
+    for folder in ("one", "two", "two"):
+        export_table(path, "c", tmp_path / folder)
+    one, two = (
+        {entry.name: entry.read_bytes() for entry in (tmp_path / folder).iterdir()} for folder in ("one", "two")
+    )
+    assert set(one) == {"mumacro.h", "mumacro.c", "mumacro_table.c"}
+    assert one == two
 
 
 def test_octave_reads_the_mat_file(table, written, repository, surrogate):

@@ -18,7 +18,7 @@ from builder.radau import RADAU_NODES
 from builder.steady import border, solve
 from builder.sweep import Sweep
 from builder.verify import draw
-from mumacro import Surrogate, cells, charts, closed_forms, evaluate, table
+from mumacro import Surrogate, cells, charts, closed_forms, table
 from mumacro.inverse import solve_for
 from mumacro.stiffness import Material, ball_on_flat, in_series
 
@@ -265,7 +265,6 @@ STATED: list[tuple[str, str, Callable[..., tuple[float, ...]]]] = [
     (ARCHITECTURE, "forms v~ = # and y~ = #",
      lambda *_: (1e6 * 0.01 / (0.3 * 10.0 * 1.3e5), 1e6 * 2e-6 / (0.3 * 10.0))),
     (ARCHITECTURE, "sums its # coefficients", lambda _: (float(cells.WIDTH**2),)),
-    (ARCHITECTURE, "in passes of # points", lambda _: (float(evaluate.CHUNK),)),
     ("docs/how-to/uncertainty.md", "# evenly spread samples",
      lambda _: (float(pytest.importorskip("service.quantities").SAMPLES),)),
     ("docs/how-to/amplitude.md", "The shaker needs # times the power that the drive saves",

@@ -10,18 +10,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from mumacro import Surrogate, TableError, charts
+from mumacro import InputError, Surrogate, TableError, charts
 from mumacro.cells import nodes
-from mumacro.charts import BORDER_PIECES, CHARTS, CORNER, NAMES
+from mumacro.charts import BORDER_PIECES, CHARTS, NAMES
 from mumacro.table import MOST_BYTES, MOST_CELLS, Table, _digest, read_table, write_table
 
 Array = NDArray[np.float64]
+CORNER = NAMES.index("corner")
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-4.nc"
 
 
@@ -75,9 +77,12 @@ def _same_numbers(one: Table, two: Table) -> None:
         assert np.array_equal(low.values, high.values)
         assert (low.cells, low.max_rel_error) == (high.cells, high.max_rel_error)
     for left, right in zip(one.blocks, two.blocks, strict=True):
-        for name in ("a", "b", "values", "power", "stick"):
-            assert np.array_equal(getattr(left, name), getattr(right, name))
-        assert np.array_equal(left.errors, right.errors)
+        assert np.array_equal(left.a, right.a)
+        assert np.array_equal(left.b, right.b)
+        for part in ("nodes", "errors", "cell_errors"):
+            ours, theirs = getattr(left, part), getattr(right, part)
+            assert ours.keys() == theirs.keys()
+            assert all(np.array_equal(ours[name], theirs[name]) for name in ours)
         for name in ("cells", "max_abs_error", "max_rel_error"):
             assert getattr(left, name) == getattr(right, name)
 
@@ -99,7 +104,9 @@ def test_every_variable_of_the_plain_grid_is_needed(copy: Path, name: str) -> No
         Surrogate.open(copy)
 
 
-@pytest.mark.parametrize("name", ["mu_ratio", "border/mid/value", "border/blocks/corner/stick"])
+@pytest.mark.parametrize(
+    "name", ["mu_ratio", "border/mid/value", "border/blocks/corner/stick", "border/blocks/cell_errors"]
+)
 def test_infinity_is_refused(copy: Path, name: str) -> None:
     with netCDF4.Dataset(str(copy), "a") as root:
         variable = root[name]
@@ -121,7 +128,7 @@ def test_attributes_of_a_block_are_needed_and_covered_by_the_checksum(copy: Path
     with netCDF4.Dataset(str(copy), "a") as root:
         block = root["border/blocks/corner"]
         block.setncattr(attribute, 2 * np.asarray(block.getncattr(attribute)))
-    with pytest.raises(TableError, match="checksum does not match"):
+    with pytest.raises(TableError, match=r"checksum does not match|the shape of 'cell_errors' is \(3, 40, 3\)"):
         Surrogate.open(copy)
     with netCDF4.Dataset(str(copy), "a") as root:
         root["border/blocks/corner"].delncattr(attribute)
@@ -144,8 +151,9 @@ def foreign(path: Path, change: Callable[[Table], None]) -> Path:
 @pytest.mark.parametrize("axis", ["a", "b"])
 def test_nodes_of_another_chart_are_refused_whatever_the_checksum(tmp_path: Path, index: int, axis: str) -> None:
     def move(table: Table) -> None:
-        nodes = getattr(table.blocks[index], axis)
-        nodes[0] = np.nextafter(nodes[0], 1e9)
+        # the last digit may be that of another mathematical library
+        own = getattr(CHARTS[index], axis)
+        getattr(table.blocks[index], axis)[0] += 2e-15 * max(abs(own.low), abs(own.high))
 
     path = foreign(tmp_path / "foreign.nc", move)
     name = getattr(CHARTS[index], axis).name
@@ -156,7 +164,7 @@ def test_nodes_of_another_chart_are_refused_whatever_the_checksum(tmp_path: Path
 @pytest.mark.parametrize("index", range(len(BORDER_PIECES)))
 def test_nodes_of_another_border_are_refused_whatever_the_checksum(tmp_path: Path, index: int) -> None:
     def move(table: Table) -> None:
-        table.border[index].nodes *= 1.0 + 2.0**-52
+        table.border[index].nodes *= 1.0 + 2e-14
 
     path = foreign(tmp_path / "foreign.nc", move)
     with pytest.raises(TableError, match=r"the nodes of .* are not those of this program's chart"):
@@ -174,14 +182,21 @@ def test_another_atlas_is_refused_whatever_the_checksum(
     new, told = {
         "moved seam": (replace(old, a=replace(old.a, high=old.a.high * 1.25)), f"{block}: range_of_a is"),
         "another quantity": (replace(old, quantity="mu_ratio^2"), f"{block}: quantity is 'mu_ratio.2'"),
-        "another regime": (replace(old, regime=charts.STATIC), f"{block}: regime is 'static'"),
+        "another regime": (
+            replace(old, regime=1 - old.regime),
+            f"{block}: regime is '{charts.REGIMES[1 - old.regime]}'",
+        ),
         "another name": (replace(old, name="middle"), "block 'middle' is unknown"),
         "another axis": (replace(old, b=replace(old.b, name="inverse_y")), "variable .* is missing"),
     }[change]
     table = read_table(TABLE)
     part = table.blocks[index]
-    if new.regime != charts.STICK_SLIP:
-        part.stick = np.empty(0)
+    for held in (part.nodes, part.cell_errors):  # the stick fraction, in stick-slip only
+        some = held["power"]
+        for about in charts.QUANTITIES:
+            held[about.name] = held.get(about.name, some)
+            if not new.holds(about):
+                del held[about.name]
     part.a, part.b = (nodes(x.size, axis.low, axis.high) for x, axis in ((part.a, new.a), (part.b, new.b)))
     with monkeypatch.context() as other:
         other.setattr(charts, "CHARTS", (*CHARTS[:index], new, *CHARTS[index + 1 :]))
@@ -223,11 +238,12 @@ def test_one_checksum_covers_every_number_that_takes_part(tmp_path: Path) -> Non
             yield lambda t, i=i: setattr(t.border[i], "cells", t.border[i].cells + 1)
             yield lambda t, i=i: setattr(t.border[i], "max_rel_error", 1e-3)
         for i in range(len(CHARTS)):
-            for name in ("values", "power", "stick"):
-                if getattr(sound.blocks[i], name).size:
-                    yield lambda t, i=i, name=name: shift(getattr(t.blocks[i], name))
-            for k in range(9):
-                yield lambda t, i=i, k=k: t.blocks[i].errors.flat.__setitem__(k, 0.123)
+            for name in sound.blocks[i].nodes:
+                yield lambda t, i=i, name=name: shift(t.blocks[i].nodes[name])
+                yield lambda t, i=i, name=name: shift(t.blocks[i].cell_errors[name])
+            for name in sound.quantities:
+                for k in range(3):
+                    yield lambda t, i=i, name=name, k=k: t.blocks[i].errors[name].__setitem__(k, 0.123)
             yield lambda t, i=i: setattr(t.blocks[i], "cells", (t.blocks[i].cells[0], t.blocks[i].cells[1] + 1))
             yield lambda t, i=i: setattr(t.blocks[i], "max_abs_error", 0.5)
             yield lambda t, i=i: setattr(t.blocks[i], "max_rel_error", 0.5)
@@ -239,6 +255,68 @@ def test_one_checksum_covers_every_number_that_takes_part(tmp_path: Path) -> Non
         seen.add(_digest(table))
         count += 1
     assert len(seen) == count > 150
+
+
+def older(table: Table) -> Table:
+    """As written before quantities had names and cells errors: errors of slopes hold for a block, three together."""
+    del table.attributes["quantities"]
+    for block in table.blocks:
+        for name, errors in block.cell_errors.items():
+            block.errors[name][1:] = errors.max()
+        block.cell_errors = {}
+    return table
+
+
+def test_a_table_without_names_of_quantities_and_errors_of_cells_opens(tmp_path: Path) -> None:
+    write_table(older(read_table(TABLE)), tmp_path / "older.nc")
+    with h5py.File(tmp_path / "older.nc") as root:
+        assert "quantities" not in root.attrs
+        assert "cell_errors" not in root["border/blocks"]
+    opened, sound = Surrogate.open(tmp_path / "older.nc"), Surrogate.open(TABLE)
+    assert opened.table.quantities == sound.table.quantities == ["mu_ratio", "power", "stick_fraction"]
+    rng = np.random.default_rng(4)
+    v, y = 10.0 ** rng.uniform(-6.0, 4.0, 3000), 10.0 ** rng.uniform(-4.0, 6.0, 3000)
+    for name in opened.table.quantities:
+        for ours, theirs in zip(opened.quantity(name, v, y), sound.quantity(name, v, y), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+        ours, theirs = (np.array(table.slopes(v, y, name, bounds=True)) for table in (opened, sound))
+        np.testing.assert_array_equal(ours[:3], theirs[:3])
+        # a bound that holds for a whole block is the larger one, but for the share that a derivative has in its cell
+        assert np.all(ours[3:] >= theirs[3:])
+
+
+def test_a_table_may_hold_fewer_quantities(tmp_path: Path) -> None:
+    table = read_table(TABLE)
+    table.attributes["quantities"] = "mu_ratio stick_fraction"
+    for block in table.blocks:
+        del block.nodes["power"], block.cell_errors["power"]
+    write_table(table, tmp_path / "fewer.nc")
+    opened, sound = Surrogate.open(tmp_path / "fewer.nc"), Surrogate.open(TABLE)
+    assert opened.table.quantities == ["mu_ratio", "stick_fraction"]
+    v, y = np.geomspace(1e-3, 10.0, 200), np.geomspace(10.0, 1e-3, 200)
+    for name in opened.table.quantities:
+        for ours, theirs in zip(opened.quantity(name, v, y), sound.quantity(name, v, y), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+    with pytest.raises(TableError, match=r"fewer\.nc: holds no power: build it anew"):
+        opened.power(0.1, 0.5)
+    with pytest.raises(InputError, match="of must be one of mu_ratio, stick_fraction"):
+        opened.slopes(0.1, 0.5, of="power")
+
+
+@pytest.mark.parametrize("names", ["", "power mu_ratio", "mu_ratio mu_ratio", "mu_ratio warmth"])
+def test_quantities_that_are_unknown_or_in_disorder_are_refused(copy: Path, names: str) -> None:
+    with netCDF4.Dataset(str(copy), "a") as root:
+        root.setncattr("quantities", names)
+    with pytest.raises(TableError, match=r"attribute 'quantities' is .*this program knows mu_ratio, power"):
+        Surrogate.open(copy)
+
+
+def test_an_error_of_a_cell_below_zero_is_refused_whatever_the_checksum(tmp_path: Path) -> None:
+    def change(table: Table) -> None:
+        table.blocks[CORNER].cell_errors["power"][0, 1] = -1e-300
+
+    with pytest.raises(TableError, match="an error in 'cell_errors' is negative"):
+        read_table(foreign(tmp_path / "foreign.nc", change))
 
 
 def test_titles_are_not_part_of_the_checksum(tmp_path: Path) -> None:

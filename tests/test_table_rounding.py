@@ -45,13 +45,14 @@ def test_digits_are_kept_at_every_size(values: np.ndarray, digits: int) -> None:
 
 
 def test_a_block_without_stick_fraction_keeps_none() -> None:
-    block = Block(np.zeros(2), np.zeros(1), np.full((2, 1), 1.0 / 3.0), (1, 2), np.full((2, 1), 2.0 / 3.0))
-    block.errors[1, 2] = 0.5
+    nodes = {"mu_ratio": np.full((2, 1), 1.0 / 3.0), "power": np.full((2, 1), 2.0 / 3.0)}
+    block = Block(np.zeros(2), np.zeros(1), (1, 2), nodes)
+    block.errors["power"] = np.array([0.5, 0.0, 0.25])
     rounded = round_block(block, 1e-3)
-    assert rounded.stick.size == 0
+    assert rounded.nodes.keys() == nodes.keys()
     assert rounded.cells == (1, 2)
-    assert np.array_equal(rounded.errors, block.errors)
-    assert np.all((rounded.values != block.values) & (rounded.power != block.power))
+    assert rounded.errors == block.errors
+    assert all(np.all(rounded.nodes[name] != block.nodes[name]) for name in nodes)
 
 
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
@@ -59,5 +60,5 @@ def test_committed_nodes_are_rounded_to_what_their_block_was_built_for(path: Pat
     table = read_table(path)
     targets = json.loads(table.attributes["builder_options"])["block_targets"]
     for block, target in zip(table.blocks, targets, strict=True):
-        for nodes in (block.values, block.power, block.stick):
+        for nodes in block.nodes.values():
             assert np.array_equal(nodes, to_step(nodes, target))

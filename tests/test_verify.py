@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from builder.measure import SEAMS, block_errors, fast_from
 from builder.sweep import Sweep
-from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, verify
+from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, uncovered, verify
 from comparing import close
 from mumacro import Surrogate
-from mumacro.charts import CHARTS, MU, NAMES, POWER, QUANTITIES, SIGMA_CUT, SOURCES, STICK
+from mumacro.charts import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
 from mumacro.table import Table, read_table
 
 pytestmark = pytest.mark.slow
@@ -32,7 +32,7 @@ def sound() -> Surrogate:
 def damaged(block: str, factor: float) -> Surrogate:
     """The same table with one block's values multiplied by ``factor``."""
     table: Table = copy.deepcopy(read_table(TABLE))
-    table.blocks[NAMES.index(block)].values *= factor
+    table.blocks[NAMES.index(block)].nodes["mu_ratio"] *= factor
     return Surrogate(table, TABLE)
 
 
@@ -130,46 +130,52 @@ def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None
     found = block_errors(sound, sweep, 200, seed=1)
     assert len(found) == len(CHARTS)
     for chart, block, errors in zip(CHARTS, sound.table.blocks, found, strict=True):
-        assert np.all(errors.errors >= 0.0)
-        assert np.all(errors.errors <= block.errors), chart.name
+        assert errors.values.keys() == errors.cells.keys() == block.nodes.keys()
+        for name in block.nodes:
+            assert 0.0 < errors.values[name] <= block.errors[name][0], chart.name
+            assert np.all((errors.cells[name] >= 0.0) & (errors.cells[name] <= block.cell_errors[name])), chart.name
         assert errors.absolute <= sound.tolerance
         assert errors.relative <= 10.0 * sound.tolerance
     wrong = block_errors(damaged("corner", 1.0 + 1e-5), sweep, 200, seed=1)[NAMES.index("corner")]
-    assert wrong.errors[MU, 0] == close(1e-5, rel=0.3)
-    assert wrong.errors[MU, 1:].max() > 1e-6  # the slopes are wrong by the same factor
+    assert wrong.values["mu_ratio"] == close(1e-5, rel=0.3)
+    assert wrong.cells["mu_ratio"][:, 1:].max() > 1e-6  # the slopes are wrong by the same factor
 
 
 def test_report_of_power_stick_fraction_and_slopes(sound: Surrogate, sweep: Sweep) -> None:
     report = verify(sound, sweep, 1000, seed=3)
-    for key, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error"), ("slopes", "max_abs_error")):
-        part = report[key]
+    assert report["slopes"].keys() == {*QUANTITY_NAMES}
+    slopes = [(part, "max_abs_error") for part in report["slopes"].values()]
+    for part, error in ((report["power"], "max_rel_error"), (report["stick_fraction"], "max_abs_error"), *slopes):
         assert part["not_covered"] == 0
-        assert 0.0 < part[error] < 1e-5
+        assert part[error] > 0.0
         assert part[error] == max(source[error] for source in part["sources"].values())
-        assert set(part["sources"]) == set(report["sources"]) or key == "slopes"
-    assert len(report["slopes"]["sources"]) > 8
+        assert len(part["sources"]) > 8
+    for name, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error")):
+        assert report[name][error] < 1e-5
+        assert set(report[name]["sources"]) == set(report["sources"])
+    assert report["slopes"]["mu_ratio"]["max_abs_error"] < 1e-5
+    assert set(uncovered(report)) == {*QUANTITY_NAMES, *(f"slopes of {name}" for name in QUANTITY_NAMES)}
 
 
 @pytest.mark.parametrize(
-    ("key", "nodes", "block"),
+    ("key", "block"),
     [
-        ("power", "power", "continuous_mid_2"),
-        ("power", "power", "stick_slip_low"),
-        ("stick_fraction", "stick", "corner"),
-        ("stick_fraction", "stick", "stick_slip_high"),
+        ("power", "continuous_mid_2"),
+        ("power", "stick_slip_low"),
+        ("stick_fraction", "corner"),
+        ("stick_fraction", "stick_slip_high"),
     ],
 )
-def test_companions_off_by_a_hundred_thousandth_are_found(sweep: Sweep, key: str, nodes: str, block: str) -> None:
+def test_companions_off_by_a_hundred_thousandth_are_found(sweep: Sweep, key: str, block: str) -> None:
     table: Table = copy.deepcopy(read_table(TABLE))
-    values = getattr(table.blocks[NAMES.index(block)], nodes)
-    values *= 1.0 + 1e-5
+    table.blocks[NAMES.index(block)].nodes[key] *= 1.0 + 1e-5
     wrong = Surrogate(table, TABLE)
     report = verify(wrong, sweep, 1000, seed=3)
     assert report["not_covered"] == 0
-    assert report[key]["not_covered"] > 0
+    assert report[key]["not_covered"] == uncovered(report)[key] > 0
     assert [name for name, part in report[key]["sources"].items() if part["not_covered"]] == [block]
     found = block_errors(wrong, sweep, 200, seed=1)[NAMES.index(block)]
-    assert found.errors[QUANTITIES.index(key), 0] > 1e-6
+    assert found.values[key] > 1e-6
 
 
 @pytest.mark.parametrize("block", ["continuous_low", "stick_slip_mid", "stick_slip_high"])
@@ -177,9 +183,11 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
     """Every second node off by half the stated error: values stay within their bound, slopes do not."""
     table: Table = copy.deepcopy(read_table(TABLE))
     part = table.blocks[NAMES.index(block)]
-    part.values += 0.25 * part.errors[MU, 0] * (-1.0) ** np.arange(part.values.shape[1])
+    values = part.nodes["mu_ratio"]
+    values += 0.25 * part.errors["mu_ratio"][0] * (-1.0) ** np.arange(values.shape[1])
     wrong = Surrogate(table, TABLE)
     found = block_errors(wrong, sweep, 200, seed=1)[NAMES.index(block)]
-    assert found.errors[MU, 1:].max() > part.errors[MU, 1:].max()
-    assert found.errors[POWER, 0] <= part.errors[POWER, 0]
-    assert found.errors[STICK, 0] <= part.errors[STICK, 0]
+    assert np.any(found.cells["mu_ratio"][:, 2] > part.cell_errors["mu_ratio"][:, 2])
+    for name in part.nodes.keys() - {"mu_ratio"}:
+        assert found.values[name] <= part.errors[name][0]
+        assert np.all(found.cells[name] <= part.cell_errors[name])

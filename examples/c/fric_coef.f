@@ -1,5 +1,5 @@
 c     Abaqus/Standard: mu_macro of a contact that is oscillated transversely, with its derivatives by slip rate and
-c     pressure.  Interface of the releases from 2020 on; link with mumacro.f90 and mumacro.c.
+c     pressure.  Interface of the releases from 2020 on; link with mumacro.f90, mumacro.c and mumacro_table.c.
 c
 c     *Friction, user=COEFFICIENT, properties=4
 c     mu0 [-], k [N/m^3], y0 [m], omega [rad/s]

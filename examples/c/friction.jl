@@ -1,4 +1,4 @@
-# mumacro.h in Julia: gcc -O2 -std=gnu99 -march=native -shared -fPIC mumacro.c -o libmumacro.so -lm
+# mumacro.h in Julia: gcc -O2 -std=gnu99 -march=native -shared -fPIC mumacro.c mumacro_table.c -o libmumacro.so -lm
 struct Answer
     mu_macro::Cdouble; mu_ratio::Cdouble; error_bound::Cdouble; v_tilde::Cdouble; y_tilde::Cdouble
     source::Cint; regime::Cint

@@ -1,5 +1,5 @@
 !> Macroscopic friction of an oscillated sliding contact: the functions of mumacro.h for Fortran 2003.
-!! Link with mumacro.c; every function and its units are explained in mumacro.h.
+!! Link with mumacro.c and mumacro_table.c; every function and its units are explained in mumacro.h.
 module mumacro
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   implicit none

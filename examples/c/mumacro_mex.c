@@ -2,7 +2,8 @@
  *
  * Every input is a number or a matrix; matrices have one size.  mu_macro and its bound are of that size, the gradient
  * has six columns, the regime is 0 (continuous sliding), 1 (stick-slip), 2 (static) or -1; illegal cases give NaN.
- * Octave: mkoctfile --mex mumacro_mex.c      MATLAB: mex mumacro_mex.c      with mumacro.h beside it. */
+ * Octave: mkoctfile --mex mumacro_mex.c      MATLAB: mex mumacro_mex.c      with mumacro.h beside it, the export in one
+ * header. */
 #include "mex.h"
 #include "mumacro.h"
 

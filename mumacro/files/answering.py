@@ -16,24 +16,23 @@ from mumacro.files.columns import ANSWERS, Columns, FilesError, find_columns
 from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, RAD_PER_CYCLE, Scale
 from mumacro.surrogate import Surrogate
 
-__all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "numbers"]
+__all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "answer_columns", "numbers"]
 
 Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
 
 #: of a row without a result: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema([("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())])
 
 _PLAIN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(?i:nan|inf|infinity)$"
-_REGIMES, _SOURCES = pa.array(REGIMES, pa.string()), pa.array(SOURCES, pa.string())
-_MISSING, _NO_NUMBER, _TOO_LARGE = 1, 2, 3
-_WHY = {_MISSING: "is missing", _NO_NUMBER: "must be a number", _TOO_LARGE: "is beyond double range"}
+_NO_NUMBER, _TOO_LARGE = 1, 2
+_WHY = {_NO_NUMBER: "must be a number", _TOO_LARGE: "is beyond double range"}
 
 
 def added_fields(include: Sequence[str] = ()) -> list[pa.Field]:
     """The Arrow fields that :func:`answer` adds."""
     words = pa.dictionary(pa.int8(), pa.string())
-    kinds = {"regime": words, "source": words}
-    fields = [pa.field(name, kinds.get(name, pa.float64())) for name in ANSWERS]
+    fields = [pa.field(name, words if name in ("regime", "source") else pa.float64()) for name in ANSWERS]
     if "gradient" in include:
         fields += [pa.field(f"d_mu_macro_d_{name}", pa.float64()) for name in FIELDS]
     return fields
@@ -52,8 +51,9 @@ def answer(
     ----------
     batch : pyarrow.RecordBatch
         Columns ``mu0`` [-], ``Fz`` [N], ``k`` [N/m], ``y0`` [m], ``omega`` [rad/s] or ``f`` [Hz], ``v0`` [m/s], with
-        another unit where the heading has it in brackets; numbers or text.  A null, an empty or a ``rigid`` k is a
-        rigid contact.  Other columns are copied unchanged.
+        another unit where the heading has it in brackets; numbers or text.  An infinite k, or the word ``rigid``, is a
+        rigid contact.  A null, a NaN or an empty cell is missing, in k as elsewhere.  Other columns are copied
+        unchanged.
     surrogate : Surrogate, optional
         The table; left out, the tightest one that comes with the library.
     rigid : bool
@@ -83,124 +83,112 @@ def answer(
     """
     fields = added_fields(include)
     columns = find_columns(batch.schema.names, rigid, [field.name for field in fields])
-    return answer_columns(batch, surrogate or Surrogate.open(), columns, include)
+    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), columns, include)
+    schema = pa.schema([*batch.schema, *fields], batch.schema.metadata)
+    return pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema), rejects
 
 
 def answer_columns(
-    batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, include: Sequence[str] = ()
-) -> tuple[pa.RecordBatch, pa.RecordBatch]:
-    """:func:`answer` where the columns are known already."""
+    batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, include: Sequence[str] = (), decimal: str = "."
+) -> tuple[list[pa.Array], pa.RecordBatch, dict[str, Array]]:
+    """The columns that :func:`answer` adds, the rejects, and the inputs as doubles in their units by heading."""
     n = batch.num_rows
+    given: dict[str, Array] = {}
     values: dict[str, Array] = {"k": np.array([math.inf])}
-    faults: dict[str, NDArray[np.int8]] = {}
+    faults: dict[str, Codes] = {}
     for name, (heading, scale) in columns.places.items():
         field = "omega" if name == "f" else name
         try:
-            found, fault = numbers(batch.column(heading), name == "k")
+            given[heading], fault = numbers(batch.column(heading), name == "k", decimal)
         except FilesError as error:
             raise FilesError(f"the column {heading!r} {error}") from None
-        values[field] = _in_si(found, scale, RAD_PER_CYCLE if name == "f" else 1.0)
-        if fault is not None:
-            faults[field] = fault
-    if n == 0:  # a column of one value would count as a case
-        values["k"] = np.empty(0)
+        values[field] = _in_si(given[heading], scale, RAD_PER_CYCLE if name == "f" else 1.0, fault)
+        faults[field] = fault
     macro, ratio, bound, source = surrogate.evaluate_columns(
-        values["mu0"], values["Fz"], values["k"], values["y0"], values["omega"], values["v0"]
+        values["mu0"], values["Fz"], values["k"], values["y0"], values["omega"], values["v0"], n=n
     )
     bad = source < 0
     mask = bad if bad.any() else None
-    words = {
-        "regime": (np.append(REGIME_OF_SOURCE, np.int8(0))[source], _REGIMES),
-        "source": (np.where(bad, 0, source).astype(np.int8) if mask is not None else source, _SOURCES),
+    code = np.where(bad, 0, source).astype(np.int8)
+    found: dict[str, Any] = {
+        "mu_macro": pa.array(macro, mask=mask),
+        "mu_ratio": pa.array(ratio, mask=mask),
+        "regime": _words(REGIME_OF_SOURCE[code], REGIMES, mask),
+        "error_bound": pa.array(bound, mask=mask),
+        "source": _words(code, SOURCES, mask),
     }
-    plain = {"mu_macro": macro, "mu_ratio": ratio, "error_bound": bound}
     if "gradient" in include:
         full: dict[str, Any] = {name: np.broadcast_to(column, n) for name, column in values.items()}
         slopes = surrogate.evaluate(**full, gradient=True).gradient or {}
         # the slope along k is 0 for a rigid contact, which has no k
         slopes["k"] = np.where(np.isinf(full["k"]), math.nan, slopes["k"])
-        plain |= {f"d_mu_macro_d_{name}": column for name, column in slopes.items()}
-    added = []
-    for field in added_fields(include):
-        if field.name in words:
-            codes, texts = words[field.name]
-            added.append(pa.DictionaryArray.from_arrays(pa.array(codes, pa.int8(), mask=mask), texts))
-        else:
-            column = plain[field.name]
-            added.append(pa.array(column, mask=np.isnan(column) if field.name.startswith("d_") else mask))
-    schema = pa.schema([*batch.schema, *added_fields(include)], batch.schema.metadata)
+        found |= {f"d_mu_macro_d_{name}": pa.array(slope, mask=np.isnan(slope)) for name, slope in slopes.items()}
     rejects = _rejects(batch, columns, np.flatnonzero(bad), values, faults)
-    return pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema), rejects
+    return [found[field.name] for field in added_fields(include)], rejects, given
 
 
-def _in_si(found: Array, scale: Scale, factor: float) -> Array:
+def _words(codes: Codes, words: Sequence[str], mask: NDArray[np.bool_] | None) -> pa.Array:
+    return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string()))
+
+
+def _in_si(found: Array, scale: Scale, factor: float, fault: Codes) -> Array:
     """Values in SI; a power of ten below one divides, so that 2 um is the double 2e-6."""
-    if scale != Scale():
-        with np.errstate(over="ignore"):
-            found = found * scale.times / scale.over
-    return found * factor if factor != 1.0 else np.require(found, requirements=("C", "W"))
+    if scale == Scale() and factor == 1.0:
+        return np.require(found, requirements=("C", "W"))
+    with np.errstate(over="ignore"):
+        values: Array = found * scale.times / scale.over * factor
+    beyond = np.isinf(values) & np.isfinite(found)  # a large stiffness is not a rigid contact
+    values[beyond], fault[beyond] = math.nan, _TOO_LARGE
+    return values
 
 
-def numbers(array: pa.Array, stiffness: bool) -> tuple[Array, NDArray[np.int8] | None]:
-    """A column as doubles (n,), NaN where it holds none, and why (n,) (None: no such place).
+def numbers(array: pa.Array, stiffness: bool = False, decimal: str = ".") -> tuple[Array, Codes]:
+    """A column as doubles (n,), NaN where it holds none, and a code (n,) for text that is no number.
 
-    With ``stiffness`` a null, an empty or a ``rigid`` cell is infinite.
+    With ``stiffness`` the word ``rigid`` is infinite.
 
     Raises
     ------
     FilesError
         The column's type is none of numbers or text.
     """
-    kind = array.type
-    if pa.types.is_dictionary(kind):
+    if pa.types.is_dictionary(array.type):
         array = array.dictionary_decode()
-        kind = array.type
-    fault: NDArray[np.int8] | None = None
+    kind = array.type
+    fault: Codes = np.zeros(len(array), np.int8)
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind):
-        array, fault = _parsed(array, stiffness)
+        array = _parsed(array, stiffness, decimal, fault)
     elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
         array = pc.cast(array, pa.float64(), safe=False)
     elif pa.types.is_null(kind):
         array = pa.nulls(len(array), pa.float64())
     else:
         raise FilesError(f"holds {kind}, not numbers")
-    if array.null_count == 0:
-        return array.to_numpy(zero_copy_only=False), fault
-    if stiffness and fault is None:
-        return pc.fill_null(array, math.inf).to_numpy(zero_copy_only=False), None
-    empty = array.is_null().to_numpy(zero_copy_only=False)
-    out: Array = array.to_numpy(zero_copy_only=False).copy()
-    fault = np.zeros(out.size, np.int8) if fault is None else fault
-    if stiffness:
-        out[empty & (fault == 0)] = math.inf
-    else:
-        fault[empty & (fault == 0)] = _MISSING
-    return out, fault
+    if array.null_count:
+        array = pc.fill_null(array, math.nan)
+    return array.to_numpy(zero_copy_only=False), fault
 
 
-def _parsed(array: pa.Array, stiffness: bool) -> tuple[pa.Array, NDArray[np.int8] | None]:
-    """Text as doubles, null where a cell is empty (or rigid) or no number; and where it is no number."""
+def _parsed(array: pa.Array, stiffness: bool, decimal: str, fault: Codes) -> pa.Array:
+    """Text as doubles, null where it is none; ``fault`` gets the reason, unless the cell is empty."""
     text = pc.utf8_trim_whitespace(pc.cast(array, pa.large_string()))
-    empty = pc.equal(text, "")
-    if stiffness:
-        empty = pc.or_(empty, pc.equal(pc.ascii_lower(text), "rigid"))
-    text = pc.if_else(empty, None, text)
-    wrong: NDArray[np.bool_] = np.zeros(len(text), np.bool_)
+    if decimal != ".":  # with a decimal comma 1.5 may mean 1500: it is no number
+        text = pc.replace_substring(pc.replace_substring(text, ".", "?"), decimal, ".")
+    rigid = pc.equal(pc.ascii_lower(text), "rigid") if stiffness else pa.scalar(False)
+    text = pc.if_else(pc.or_(rigid, pc.equal(text, "")), None, text)
     try:
         out = pc.cast(text, pa.float64())
     except pa.ArrowInvalid:
-        plain = pc.match_substring_regex(text, _PLAIN)
-        wrong = pc.invert(pc.fill_null(plain, True)).to_numpy(zero_copy_only=False)
-        out = pc.cast(pc.if_else(plain, text, None), pa.float64())
-    # a number of too many digits must not pass for an infinite stiffness
-    large = np.zeros(len(text), np.bool_)
+        plain = pc.fill_null(pc.match_substring_regex(text, _PLAIN), True)
+        fault[pc.invert(plain).to_numpy(zero_copy_only=False)] = _NO_NUMBER
+        text = pc.if_else(plain, text, None)
+        out = pc.cast(text, pa.float64())
     infinite = pc.fill_null(pc.is_inf(out), False)
-    if pc.any(infinite).as_py():
-        large = pc.and_(infinite, pc.match_substring_regex(text, r"\d")).to_numpy(zero_copy_only=False)
+    if pc.any(infinite).as_py():  # a number of too many digits must not pass for an infinite stiffness
+        large = pc.and_(infinite, pc.match_substring_regex(text, r"\d"))
+        fault[pc.fill_null(large, False).to_numpy(zero_copy_only=False)] = _TOO_LARGE
         out = pc.if_else(large, None, out)
-    if not (wrong.any() or large.any()):
-        return out, None
-    return out, np.where(large, _TOO_LARGE, np.where(wrong, _NO_NUMBER, 0)).astype(np.int8)
+    return pc.if_else(rigid, math.inf, out) if stiffness else out
 
 
 def _rejects(
@@ -208,26 +196,29 @@ def _rejects(
     columns: Columns,
     rows: NDArray[np.intp],
     values: dict[str, Array],
-    faults: dict[str, NDArray[np.int8]],
+    faults: dict[str, Codes],
 ) -> pa.RecordBatch:
     """What is wrong with ``rows``: the first bad input of each, in the order of the inputs."""
-    listed: list[tuple[int, str | None, str | None, str]] = []
+    listed: list[tuple[int, str, str | None, str]] = []
     named = {"omega" if name == "f" else name: name for name in columns.places}
-    given = [(field, named[field], columns.places[named[field]][0]) for field in FIELDS if field in named]
     for i in rows.tolist():
-        for field, name, column in given:
-            fault = int(faults[field][i]) if field in faults else 0
-            value = values[field][i]
-            positive = value > 0.0 if field in POSITIVE else value >= 0.0
-            if fault or not (positive and (math.isfinite(value) or field == "k")):
-                reason = _WHY[fault] if fault else f"must be {BOUNDS[field]}" + (", or rigid" if field == "k" else "")
-                listed.append((i, name, _text(batch.column(column)[i].as_py()), reason))
+        for field in filter(named.get, FIELDS):
+            reason = _reason(field, values[field][i], int(faults[field][i]))
+            if reason:
+                cell = batch.column(columns.places[named[field]][0])[i].as_py()
+                listed.append((i, named[field], None if cell is None else str(cell), reason))
                 break
     by_field: list[Any] = [list(column) for column in zip(*listed, strict=True)] or [[] for _ in REJECTS]
-    return pa.RecordBatch.from_arrays(
-        [pa.array(column, field.type) for column, field in zip(by_field, REJECTS, strict=True)], schema=REJECTS
-    )
+    arrays = [pa.array(column, field.type) for column, field in zip(by_field, REJECTS, strict=True)]
+    return pa.RecordBatch.from_arrays(arrays, schema=REJECTS)
 
 
-def _text(value: object) -> str | None:
-    return None if value is None else str(value)
+def _reason(field: str, value: float, fault: int) -> str | None:
+    """What is wrong with one value; None if it is legal."""
+    if fault:
+        return _WHY[fault]
+    if math.isnan(value):
+        return "is missing" + ("; write rigid or a number" if field == "k" else "")
+    if (value > 0.0 if field in POSITIVE else value >= 0.0) and (math.isfinite(value) or field == "k"):
+        return None
+    return f"must be {BOUNDS[field]}" + (", or rigid" if field == "k" else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,9 +27,14 @@ class Columns:
     places: dict[str, tuple[str, Scale]]
 
     @property
-    def rigid(self) -> bool:
-        """Whether every contact is rigid, by the user's option."""
-        return "k" not in self.places
+    def inputs(self) -> list[str]:
+        """The headings of the inputs."""
+        return [heading for heading, _ in self.places.values()]
+
+    @property
+    def stiffness(self) -> str | None:
+        """The heading of k; None when every contact is rigid, by the user's option."""
+        return self.places["k"][0] if "k" in self.places else None
 
 
 def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str] = ANSWERS) -> Columns:
@@ -51,8 +57,8 @@ def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str]
     Raises
     ------
     FilesError
-        A column that is there twice, would be written twice, has an unknown unit, or is missing; then a similar
-        column is named.
+        A column that is there twice, would be written twice, has an unknown unit, or is missing; then the columns that
+        were seen are listed, or a similar one is named.
 
     Examples
     --------
@@ -79,27 +85,32 @@ def find_columns(names: Sequence[str], rigid: bool = False, added: Sequence[str]
         places[name] = (column, scale)
     if {"f", "omega"} <= places.keys():
         raise FilesError("there are both f [Hz] and omega [rad/s]; leave one out")
-    if rigid and "k" in places:
-        raise FilesError(f"--rigid is given, but there is a column {places['k'][0]!r}; leave one out")
-    _check_missing(names, places, rigid)
+    if rigid:
+        for column in names:
+            if _meant(column, loosely=False) == "k":
+                raise FilesError(f"--rigid is given, but the column {column!r} looks like a stiffness; leave one out")
+    for name in _REQUIRED:
+        if name not in places and not (name == "omega" and "f" in places) and not (name == "k" and rigid):
+            raise FilesError(_advice(name, names))
     return Columns(places)
 
 
-def _check_missing(names: Sequence[str], places: dict[str, tuple[str, Scale]], rigid: bool) -> None:
-    frequency = bool({"f", "omega"} & places.keys())
-    for name in _REQUIRED:
-        if name in places or (name == "omega" and frequency):
-            continue
-        wanted = ("omega", "f") if name == "omega" else (name,)
-        alike = [column for column in names if suggestion(split_unit(column)[0], loosely=not rigid) in wanted]
-        if alike:
-            meant = suggestion(split_unit(alike[0])[0]) or name
+def _meant(column: str, loosely: bool = True) -> str | None:
+    """The input that a heading is taken for, as a whole or by its first word: ``k_N_per_mm`` for k."""
+    name = split_unit(column)[0]
+    first = re.split(r"[\W_]+", name.strip("_ "))[0]
+    return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
+
+
+def _advice(name: str, names: Sequence[str]) -> str:
+    """What to do about an input that no column holds."""
+    wanted = ("omega", "f") if name == "omega" else (name,)
+    for column in names:
+        meant = _meant(column)
+        if meant and meant in wanted:
             unit = SI[meant][0]
-            remedy = f"{alike[0]!r} is similar: rename that column to {meant} [{unit}] (or another unit in brackets)"
-            raise FilesError(f"there is no column {name}; {remedy}")
-        if name == "k":
-            if not rigid:
-                raise FilesError("there is no column k [N/m]; give --rigid if all contacts are rigid")
-        else:
-            hint = "omega [rad/s] or f [Hz]" if name == "omega" else f"{name} [{SI[name][0]}]"
-            raise FilesError(f"there is no column {hint}; there are {', '.join(map(repr, names))}")
+            remedy = f"rename that column to {meant} [{unit}] (or another unit in brackets)"
+            return f"there is no column {name}; {column!r} is similar: {remedy}"
+    missing = "omega [rad/s] or f [Hz]" if name == "omega" else f"{name} [{SI[name][0]}]"
+    rigid = "; rename the one that holds it, or give --rigid if all contacts are rigid" if name == "k" else ""
+    return f"there is no column {missing}; there are {', '.join(map(repr, names))}{rigid}"

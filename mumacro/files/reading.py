@@ -1,493 +1,261 @@
-"""The three formats: which columns there are, of which type, and the blocks from a place on."""
+"""The three formats: which columns there are, and blocks of records from a place on.
+
+Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else stays text.
+"""
 
 from __future__ import annotations
 
+import csv
+import gzip
 import io
 import json
 import math
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute
 import pyarrow.csv
 import pyarrow.dataset
-import pyarrow.json
-import pyarrow.parquet
+from numpy.typing import NDArray
 
-from mumacro.files.blocks import (
-    Block,
-    Fault,
-    Place,
-    Records,
-    decoding_fault,
-    header_of,
-    one_line,
-    records_of,
-    shorten,
-)
 from mumacro.files.columns import Columns, FilesError
-from mumacro.inputs import NAMES, split_unit
+from mumacro.files.records import Place, Records, opened, records_of
+from mumacro.inputs import split_unit, suggestion
 
-__all__ = ["FORMATS", "Source", "format_of", "open_source"]
+__all__ = ["SEPARATORS", "Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "one_line"]
 
-FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
-ROWS = 262_144  # of a Parquet batch
-BYTES = 8 * 2**20  # of a text block
-_PACKED = (".csv.gz", ".ndjson.gz", ".jsonl.gz")
-
-
-def format_of(path: Path) -> tuple[str, bool] | None:
-    """The format by a name's ending, and whether it is compressed; None for another ending."""
-    name = path.name.lower()
-    packed = name.endswith(_PACKED)
-    found = FORMATS.get(Path(name.removesuffix(".gz")).suffix if packed else Path(name).suffix)
-    return None if found is None else (found, packed)
+#: what may stand between the cells of CSV, by the word for it
+SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
+ROWS = 262_144  # of a block of Parquet
+_SHOWN = 500  # characters of a bad record that are listed
+_SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
-class Source(ABC):
-    """Files of one format, one after the other.
+class Fault(NamedTuple):
+    """A record without a result: its number in its file (from 1), input, value, reason."""
 
-    Attributes
-    ----------
-    names : list of str
-        The headings.
-    schema : pyarrow.Schema
-        The columns of the blocks.
-    cells_are_text : bool
-        Inputs are read as text, since any cell may hold no number.
+    row: int
+    field: str | None
+    value: str | None
+    reason: str
+
+
+class Block(NamedTuple):
+    """Some records in order: those that could be read, and what is wrong with the others.
+
+    ``rows`` are their numbers in the file, from 1; ``place`` is what follows, ``share`` how much of the file is read;
+    ``lines`` are the records themselves, where there are any.
     """
 
-    names: list[str]
-    schema: pa.Schema
-    cells_are_text = False
-
-    def __init__(self, files: Sequence[Path]) -> None:
-        self.files = list(files)
-        self.sizes = [max(path.stat().st_size, 1) for path in files]
-
-    @abstractmethod
-    def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:
-        """Fix :attr:`schema`, now that the inputs are known; ``verbatim``: the records come out as they are."""
-
-    @abstractmethod
-    def blocks(self, place: Place) -> Iterator[Block]:
-        """The blocks of the file at ``place`` from there on."""
-
-    def share(self, place: Place, part: float) -> float:
-        """How much of all files lies before ``part`` of the file at ``place``."""
-        return (sum(self.sizes[: place.file]) + part * self.sizes[place.file]) / sum(self.sizes)
-
-    def done(self, place: Place) -> float:
-        """How much of all files lies before ``place``."""
-        if place.file >= len(self.files):
-            return 1.0
-        packed = 3.0 if self.files[place.file].suffix == ".gz" else 1.0  # a guess, for the progress bar only
-        return self.share(place, min(place.at / (packed * self.sizes[place.file]), 1.0))
+    batch: pa.RecordBatch
+    rows: NDArray[np.int64]
+    place: Place
+    share: float
+    lines: pa.Array | None = None
+    faults: Sequence[Fault] = ()
 
 
-def open_source(files: Sequence[Path], kind: str, folder: Path | None) -> Source:
-    """The cases of files of one format; ``folder`` is where they were found, if that was all that was named."""
-    if kind == "parquet":
-        return ParquetSource(files, folder)
-    return CsvSource(files) if kind == "csv" else NdjsonSource(files)
+def one_line(error: Any) -> str:
+    """The message of an exception without line ends."""
+    return " ".join(str(error).split())
 
 
-class ParquetSource(Source):
-    """Parquet; folders named ``key=value`` give columns, as in Hive."""
+class ParquetSource:
+    """Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
 
     def __init__(self, files: Sequence[Path], folder: Path | None) -> None:
-        super().__init__(files)
-        self.constants: list[dict[str, Any]] = [{} for _ in files]
-        self.counts: list[int] = []
-        schemas = []
-        for path in files:
-            try:
-                with pa.parquet.ParquetFile(path) as file:
-                    schemas.append(file.schema_arrow)
-                    self.counts.append(file.metadata.num_rows)
-            except (pa.ArrowException, OSError) as error:
-                raise FilesError(f"{path}: not a readable Parquet file ({one_line(error)})") from None
-        self.schema = schemas[0]
-        for path, schema in zip(files, schemas, strict=True):
-            try:
-                self.schema = pa.unify_schemas([self.schema, schema.remove_metadata()], promote_options="permissive")
-            except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
-                raise FilesError(f"{path}: its columns do not fit those of {files[0]}: {one_line(error)}") from None
-        if folder is not None:
-            self._read_folder_names(folder)
-        self.names = self.schema.names
-
-    def _read_folder_names(self, folder: Path) -> None:
-        hive = pa.dataset.partitioning(flavor="hive")
-        names = [str(path) for path in self.files]
-        found = pa.dataset.dataset(names, format="parquet", partitioning=hive, partition_base_dir=str(folder))
-        keys = {str(Path(f.path)): pa.dataset.get_partition_keys(f.partition_expression) for f in found.get_fragments()}
-        self.constants = [keys[str(path)] for path in self.files]
-        for name in sorted({name for entry in self.constants for name in entry} - set(self.schema.names)):
-            self.schema = self.schema.append(found.schema.field(name))
-
-    def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:  # noqa: ARG002
-        """Fix the size of a batch; the schema is known."""
-        self.rows = max(1, min(ROWS, part_rows))
-
-    def done(self, place: Place) -> float:
-        """How much of all files lies before ``place``."""
-        if place.file >= len(self.files):
-            return 1.0
-        return self.share(place, place.at / max(self.counts[place.file], 1))
-
-    def blocks(self, place: Place) -> Iterator[Block]:
-        """The blocks of a file from a place on."""
-        path = self.files[place.file]
-        before = 0
-        with pa.parquet.ParquetFile(path, pre_buffer=False) as file:
-            try:
-                # Group by group: batches then begin at the same rows from wherever a run continues.
-                for i in range(file.num_row_groups):
-                    rows = file.metadata.row_group(i).num_rows
-                    if before + rows <= place.at:
-                        before += rows
-                        continue
-                    for batch in file.iter_batches(self.rows, row_groups=[i]):
-                        before += batch.num_rows
-                        if before > place.at:
-                            yield self._block(batch, place.file, before)
-            except (pa.ArrowException, OSError) as error:
-                raise FilesError(f"{path}: damaged after row {before} ({one_line(error)})") from None
-
-    def _block(self, batch: pa.RecordBatch, file: int, end: int) -> Block:
-        first = end - batch.num_rows
-        arrays = []
-        for field in self.schema:
-            if field.name in batch.schema.names:
-                column = batch.column(field.name)
-                arrays.append(column if column.type == field.type else column.cast(field.type))
-            else:
-                value = self.constants[file].get(field.name)
-                arrays.append(pa.repeat(pa.scalar(value, field.type), batch.num_rows))
-        whole = pa.RecordBatch.from_arrays(arrays, schema=self.schema)
-        return Block(whole, np.arange(first + 1, end + 1), Place(file, end, end))
-
-
-class _TextSource(Source):
-    """What CSV and NDJSON share.  Types are settled by one pass over all files, unless records come out verbatim."""
-
-    quotes: bool
-
-    def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:
-        """Fix the schema, now that the inputs are known."""
-        self.columns, self.verbatim = columns, verbatim
-        self.inputs = [column for column, _ in columns.places.values()]
-        self.bytes = max(2**14, min(BYTES, 64 * part_rows))
-        self.schema = pa.schema([]) if verbatim else self._types()
-
-    def _types(self) -> pa.Schema:
-        found: pa.Schema | None = None
-        for i, path in enumerate(self.files):
-            for records in records_of(path, self.start(i), self.bytes, self.quotes):
-                schema = self.inferred(path, records)
-                try:
-                    found = schema if found is None else self.joined(found, schema)
-                except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
-                    last = records.place.rows
-                    raise FilesError(f"{path}: up to row {last}: columns of mixed types: {one_line(error)}") from None
-        fields = sorted(
-            found or pa.schema([]), key=lambda f: self.names.index(f.name) if f.name in self.names else 10**6
-        )
-        return pa.schema([pa.field(f.name, pa.string()) if pa.types.is_null(f.type) else f for f in fields])
-
-    def blocks(self, place: Place) -> Iterator[Block]:
-        """The blocks of a file from a place on."""
-        path = self.files[place.file]
-        place = place if place.at else self.start(place.file)
-        for records in records_of(path, place, self.bytes, self.quotes):
-            yield self.block(path, records)
-
-    @abstractmethod
-    def start(self, file: int) -> Place:
-        """Where the first record of a file begins."""
-
-    @abstractmethod
-    def inferred(self, path: Path, records: Records) -> pa.Schema:
-        """The types that these records would have by themselves."""
-
-    @abstractmethod
-    def joined(self, one: pa.Schema, other: pa.Schema) -> pa.Schema:
-        """Types that hold both."""
-
-    @abstractmethod
-    def block(self, path: Path, records: Records) -> Block:
-        """These records, read."""
-
-
-class CsvSource(_TextSource):
-    """RFC 4180 with a header, in UTF-8."""
-
-    quotes = True
-    cells_are_text = True
-
-    def __init__(self, files: Sequence[Path]) -> None:
-        super().__init__(files)
-        heads = [header_of(path) for path in files]
-        self.names, self.starts = heads[0][0], [start for _, start in heads]
-        for path, (names, _) in zip(files, heads, strict=True):
-            if names != self.names:
-                raise FilesError(f"{path}: its header differs from that of {files[0]}")
-
-    def start(self, file: int) -> Place:
-        """Where the first record of a file begins."""
-        return Place(file, self.starts[file], 0)
-
-    def _read(
-        self, path: Path, records: Records, include: list[str] | None, types: dict[str, pa.DataType]
-    ) -> tuple[pa.RecordBatch, dict[int, str]]:
-        """Cells of the records that have as many as the header, and what is wrong with the others by index."""
-        wrong: dict[int, str] = {}
-
-        def note(row: Any) -> str:
-            wrong[row.number - 1] = f"has {row.actual_columns} cells, the header has {row.expected_columns}"
-            return "skip"
-
-        data = b"\n".join(records.texts)
+        names = [str(path) for path in files]
+        hive = pa.dataset.partitioning(flavor="hive") if folder else None
+        options = {"format": "parquet", "partitioning": hive, "partition_base_dir": str(folder) if folder else None}
         try:
-            table = pa.csv.read_csv(
-                io.BytesIO(data),
-                read_options=pa.csv.ReadOptions(
-                    column_names=self.names, use_threads=False, block_size=max(len(data) + 1, 1024)
-                ),
-                parse_options=pa.csv.ParseOptions(newlines_in_values=True, invalid_row_handler=note),
-                convert_options=pa.csv.ConvertOptions(
-                    include_columns=include, column_types=types, strings_can_be_null=False,
-                    null_values=["", "NA", "N/A", "NaN", "nan", "null", "NULL", "None"],
-                ),
-            )  # fmt: skip
-        except pa.ArrowInvalid as error:
-            raise decoding_fault(path, records, error) from None
-        if any(pa.types.is_binary(field.type) for field in table.schema):  # what pyarrow takes for no text
-            raise decoding_fault(path, records, ValueError("not in UTF-8"))
-        batches = table.combine_chunks().to_batches()
-        empty = pa.RecordBatch.from_arrays([pa.array([], f.type) for f in table.schema], schema=table.schema)
-        return (batches[0] if batches else empty), wrong
+            found = pa.dataset.dataset(names, **options)
+            schemas = [part.physical_schema.remove_metadata() for part in found.get_fragments()]
+            self.schema = pa.unify_schemas([found.schema, *schemas], promote_options="permissive")
+            self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
+        except (pa.ArrowException, OSError) as error:
+            raise FilesError(f"{', '.join(names)}: no Parquet, or unlike columns ({one_line(error)})") from None
 
-    def inferred(self, path: Path, records: Records) -> pa.Schema:
-        """The types that these records would have by themselves."""
-        types = dict.fromkeys(self.inputs, pa.string())
-        return self._read(path, records, None, types)[0].schema
-
-    def joined(self, one: pa.Schema, other: pa.Schema) -> pa.Schema:
-        """Types that hold both."""
-        return pa.schema([pa.field(a.name, _joined_type(a.type, b.type)) for a, b in zip(one, other, strict=True)])
-
-    def block(self, path: Path, records: Records) -> Block:
-        """These records, read."""
-        if self.verbatim:
-            batch, wrong = self._read(path, records, self.inputs, dict.fromkeys(self.inputs, pa.string()))
-        else:
-            types = {field.name: field.type for field in self.schema}
-            batch, wrong = self._read(path, records, None, types)
-        return _without(records, batch, wrong, self.verbatim)
-
-
-def _joined_type(one: pa.DataType, other: pa.DataType) -> pa.DataType:
-    """A type for cells that were taken for ``one`` in one block and for ``other`` in another."""
-    if one == other or pa.types.is_null(other):
-        return one
-    if pa.types.is_null(one):
-        return other
-    if {one, other} == {pa.int64(), pa.float64()}:
-        return pa.float64()
-    return pa.string()
-
-
-def _without(records: Records, batch: pa.RecordBatch, wrong: dict[int, str], verbatim: bool) -> Block:
-    """A block from the records that were read (``batch``) and those that were not (``wrong``, by index)."""
-    n = len(records.texts)
-    first = records.place.rows - n
-    rows, texts = np.arange(first + 1, first + n + 1), records.texts
-    faults = [Fault(first + i + 1, None, shorten(texts[i]), reason) for i, reason in sorted(wrong.items())]
-    if wrong:
-        kept = np.ones(n, np.bool_)
-        kept[list(wrong)] = False
-        rows, texts = rows[kept], [text for i, text in enumerate(texts) if i not in wrong]
-    if batch.num_rows != len(texts):  # cannot happen; no row may get the result of another
-        raise FilesError(f"rows {first + 1} to {first + n}: {len(texts)} records, but {batch.num_rows} were read")
-    lines = pa.array(texts, pa.large_binary()) if verbatim else None
-    return Block(batch, rows, records.place, lines, faults)
-
-
-class NdjsonSource(_TextSource):
-    """One JSON object a line."""
-
-    quotes = False
-
-    def __init__(self, files: Sequence[Path]) -> None:
-        super().__init__(files)
-        self.names = []
-        for path in files:
-            for records in records_of(path, Place(), 2**20, False):
-                found = dict.fromkeys(name for entry in _objects(records.texts[:1000]) for name in entry)
-                self.names += [name for name in found if name not in self.names]
-                break
-        if not self.names:
-            raise FilesError(f"{files[0]}: holds no JSON object, one a line")
-
-    def start(self, file: int) -> Place:
-        """Where the first record of a file begins."""
-        return Place(file, 0, 0)
-
-    def settle(self, columns: Columns, verbatim: bool, part_rows: int) -> None:
-        """Fix the schema, now that the inputs are known."""
-        super().settle(columns, verbatim, part_rows)
-        if verbatim:
-            self.schema = pa.schema([pa.field(name, pa.float64()) for name in self.inputs])
-
-    def inferred(self, path: Path, records: Records) -> pa.Schema:
-        """The types that these records would have by themselves."""
-        explicit = pa.schema([pa.field(name, pa.float64()) for name in self.inputs])
+    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:  # noqa: ARG002
+        """The blocks of the file at ``place`` from there on."""
+        part, row = self.parts[place.file], 0
+        scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
         try:
-            schema = _json_table(records.texts, explicit, "infer").schema
-        except (pa.ArrowInvalid, _DoubtError):
-            objects = _objects(records.texts)
-            names = dict.fromkeys(name for found in objects for name in found if name not in self.inputs)
-            fields = [pa.field(name, self._type_of(path, records, name, objects)) for name in names]
-            schema = pa.schema([*explicit, *fields])
-        for name in schema.names:
-            heading = split_unit(name)[0]
-            if heading in NAMES and name not in self.inputs:
-                raise FilesError(f"{path}: up to row {records.place.rows}: a field {name!r} that no earlier row has")
-        return schema
-
-    def _type_of(self, path: Path, records: Records, name: str, objects: list[dict[str, Any]]) -> pa.DataType:
-        try:
-            return pa.array([found.get(name) for found in objects]).type
-        except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
-            last = records.place.rows
-            raise FilesError(f"{path}: up to row {last}: {name!r} holds mixed types: {one_line(error)}") from None
-
-    def joined(self, one: pa.Schema, other: pa.Schema) -> pa.Schema:
-        """Types that hold both."""
-        # text that looks like dates in one block and not in another is text
-        for name in set(one.names) & set(other.names):
-            kinds = one.field(name).type, other.field(name).type
-            if pa.string() in kinds and any(map(pa.types.is_timestamp, kinds)):
-                one, other = (s.set(s.get_field_index(name), pa.field(name, pa.string())) for s in (one, other))
-        return pa.unify_schemas([one, other], promote_options="permissive")
-
-    def block(self, path: Path, records: Records) -> Block:
-        """These records, read."""
-        try:
-            table = _json_table(records.texts, self.schema, "ignore")
-            stiffness = next((column for name, (column, _) in self.columns.places.items() if name == "k"), None)
-            batch = table.select(self.schema.names).combine_chunks().to_batches()[0]
-            if stiffness is not None and batch.column(stiffness).null_count:
-                _check_said(records.texts, batch.column(stiffness), stiffness)
-            return _without(records, batch, {}, self.verbatim)
-        except (pa.ArrowInvalid, _DoubtError):
-            return self._by_line(path, records)
-
-    def _by_line(self, path: Path, records: Records) -> Block:
-        """The block again, line by line, so that a bad line rejects only itself."""
-        first = records.place.rows - len(records.texts)
-        objects, texts, rows, faults = [], [], [], []
-        for row, text in enumerate(records.texts, first + 1):
-            try:
-                found = _object(text)
-            except ValueError as error:
-                faults.append(Fault(row, None, shorten(text), str(error)))
-                continue
-            # a line with NaN or an infinity in it is no JSON: then it is written anew, with null for them
-            clean = re.search(rb"NaN|Infinity", text) is None or _finite(found) == found
-            fault = self._read_inputs(row, found)
-            if fault is not None:
-                faults.append(fault)
-                continue
-            objects.append(found)
-            rows.append(row)
-            texts.append(text.strip() if clean else json.dumps(_finite(found)).encode())
-        try:
-            batch = pa.RecordBatch.from_pylist(objects, schema=self.schema)
-        except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
-            raise FilesError(f"{path}: rows {first + 1} to {records.place.rows}: {one_line(error)}") from None
-        lines = pa.array(texts, pa.large_binary()) if self.verbatim else None
-        return Block(batch, np.array(rows, np.int64), records.place, lines, faults)
-
-    def _read_inputs(self, row: int, found: dict[str, Any]) -> Fault | None:
-        """The inputs of one object as doubles, or the fault of one of them."""
-        for name, (column, _) in self.columns.places.items():
-            value = found.get(column)
-            if name == "k" and (value is None or (isinstance(value, str) and value.strip().lower() in ("", "rigid"))):
-                if column not in found:
-                    return Fault(row, name, None, 'is missing; null or "rigid" for a rigid contact')
-                found[column] = None
-                continue
-            if value is None:
-                continue  # reported with all missing values
-            shown = shorten(json.dumps(value).encode())
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                return Fault(row, name, shown, "must be a number")
-            try:
-                found[column] = float(value)
-            except OverflowError:
-                found[column] = math.inf
-            if math.isinf(found[column]):  # JSON has no infinity, and a long number is no rigid contact
-                return Fault(row, name, shown, "must be finite")
-        return None
+            # group by group: blocks then begin at the same rows from wherever a run continues
+            for group in part.split_by_row_group():
+                rows = group.row_groups[0].num_rows
+                if row + rows <= place.at:
+                    row += rows
+                    continue
+                for batch in group.to_batches(
+                    self.schema, batch_size=ROWS, batch_readahead=1, fragment_scan_options=scan, use_threads=False
+                ):
+                    before, row = row, row + batch.num_rows
+                    if row > place.at:
+                        share = row / part.metadata.num_rows
+                        yield Block(batch, np.arange(before + 1, row + 1), Place(place.file, row, row), share)
+        except (pa.ArrowException, OSError) as error:
+            raise FilesError(f"{part.path}: damaged after row {row} ({one_line(error)})") from None
 
 
-class _DoubtError(Exception):
-    """The quick reader may have misread something."""
+def _where(path: Path, records: Records) -> str:
+    return f"{path}: rows {records.numbers[0]} to {records.numbers[-1]}"
 
 
-def _json_table(texts: list[bytes], schema: pa.Schema, unexpected: str) -> pa.Table:
-    """Many lines at once; _DoubtError or ArrowInvalid where a single line decides."""
-    data = b"\n".join(texts)
-    if b"NaN" in data or b"Infinity" in data:
-        raise _DoubtError
-    table = pa.json.read_json(
-        io.BytesIO(data),
-        read_options=pa.json.ReadOptions(use_threads=False, block_size=max(len(data) + 1, 1024)),
-        parse_options=pa.json.ParseOptions(explicit_schema=schema, unexpected_field_behavior=unexpected),
-    )
-    if table.num_rows != len(texts):  # two objects on a line, or one on several
-        raise _DoubtError
-    for name in table.schema.names:
-        column = table.column(name)
-        if pa.types.is_floating(column.type) and pa.compute.any(pa.compute.is_inf(column)).as_py():
-            raise _DoubtError
-    return table
+def _block(records: Records, batch: pa.RecordBatch, texts: list[bytes], wrong: dict[int, str]) -> Block:
+    """A block of the records that were read (``batch``) and those that were not (``wrong``, by index)."""
+    rows, faults = np.array(records.numbers), []
+    for i, reason in sorted(wrong.items()):
+        shown = texts[i].decode("utf-8", "replace")
+        faults.append(Fault(int(rows[i]), None, shown if len(shown) <= _SHOWN else shown[:_SHOWN] + "…", reason))
+    kept = [text for i, text in enumerate(texts) if i not in wrong] if wrong else texts
+    rows = np.delete(rows, list(wrong))
+    return Block(batch, rows, records.place, records.share, pa.array(kept, pa.large_binary()), faults)
 
 
-def _check_said(texts: list[bytes], stiffness: pa.Array, column: str) -> None:
-    """A null k must be written: a line without k is refused."""
-    said = re.compile(rb'"' + re.escape(json.dumps(column)[1:-1].encode()) + rb'"\s*:')
-    for i in np.flatnonzero(stiffness.is_null().to_numpy(zero_copy_only=False)).tolist():
-        if said.search(texts[i]) is None or texts[i].count(b"{") > 1:
-            raise _DoubtError
-
-
-def _object(text: bytes) -> dict[str, Any]:
-    """The JSON object of a line.  NaN and infinities, which JSON lacks, are let in: they are wrong as values.
+class CsvSource:
+    """RFC 4180 with a header, in UTF-8; any separator and decimal sign.
 
     Raises
     ------
-    ValueError
-        No JSON, no object, or a key that is there twice.
+    FilesError
+        No header, headers that differ, another separator or decimal sign; then the options to give are named.
     """
-    try:
-        found = json.loads(text, object_pairs_hook=_without_repeats)
-    except RecursionError:
-        raise ValueError("is no JSON: too deep") from None
-    except ValueError as error:
-        raise ValueError(str(error) if str(error).startswith("repeats") else f"is no JSON: {error}") from None
-    if not isinstance(found, dict):
-        raise ValueError("is no JSON object")
-    return found
+
+    def __init__(self, files: Sequence[Path], sep: str, decimal: str) -> None:
+        self.files, self.sep = files, sep
+        heads = [self._header(path, sep, decimal) for path in files]
+        self.head, self.starts = heads[0].rstrip(b"\r\n"), [len(head) for head in heads]
+        names = [self._cells(head) for head in heads]
+        self.schema = pa.schema([(name, pa.string()) for name in names[0]])
+        for path, found in zip(files, names, strict=True):
+            if found != names[0]:
+                raise FilesError(f"{path}: its header differs from that of {files[0]}")
+
+    def _cells(self, head: bytes) -> list[str]:
+        cells = next(csv.reader([head.decode("utf-8-sig").rstrip("\r\n")], delimiter=self.sep, strict=True), [])
+        return [cell.strip() for cell in cells]
+
+    def _header(self, path: Path, sep: str, decimal: str) -> bytes:
+        """The first line, after a look at the records behind it."""
+        try:
+            with path.open("rb") as raw:
+                stream = opened(path, raw)
+                head, sample = stream.readline(2**20), stream.read(2**16)
+            named = any(self._cells(head))
+        except (UnicodeDecodeError, csv.Error, EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise FilesError(f"{path}: line 1 is no header of a CSV file in UTF-8 ({error})") from None
+        if not named:
+            raise FilesError(f"{path}: is empty; the first line must name the columns")
+        rows = sample.decode("utf-8", "replace").splitlines()[:50]
+        found = _recognised(head.decode("utf-8-sig"), rows, sep, decimal)
+        if found != (sep, decimal):
+            word = next(word for word, known in SEPARATORS.items() if known == found[0])
+            raise FilesError(
+                f"{path}: the columns are separated by {word!r} and the decimal sign is {found[1]!r}: "
+                f"give --sep '{word}' --decimal '{found[1]}'"
+            )
+        return bytes(head)
+
+    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
+        """The blocks of the file at ``place`` from there on."""
+        path = self.files[place.file]
+        place = place if place.at else place._replace(at=self.starts[place.file])
+        names = columns.inputs if verbatim else self.schema.names
+        for records in records_of(path, place, self.sep):
+            wrong: dict[int, str] = {}
+
+            def note(row: Any, wrong: dict[int, str] = wrong) -> str:
+                wrong[row.number - 1] = f"has {row.actual_columns} cells, the header has {row.expected_columns}"
+                return "skip"
+
+            data = b"\n".join(records.texts)
+            size = max(len(data) + 1, 1024)
+            try:
+                table = pa.csv.read_csv(
+                    io.BytesIO(data),
+                    pa.csv.ReadOptions(column_names=self.schema.names, use_threads=False, block_size=size),
+                    pa.csv.ParseOptions(delimiter=self.sep, newlines_in_values=True, invalid_row_handler=note),
+                    pa.csv.ConvertOptions(include_columns=names, column_types=self.schema, strings_can_be_null=False),
+                )
+            except pa.ArrowInvalid as error:
+                raise FilesError(f"{_where(path, records)}: no CSV in UTF-8 ({one_line(error)})") from None
+            if table.num_rows + len(wrong) != len(records.texts):  # no row may get the result of another
+                raise FilesError(f"{_where(path, records)}: records end in several ways")
+            batches = table.combine_chunks().to_batches() or [pa.RecordBatch.from_pylist([], table.schema)]
+            yield _block(records, batches[0], records.texts, wrong)
+
+
+def _recognised(header: str, rows: list[str], sep: str, decimal: str) -> tuple[str, str]:
+    """The separator that gives the most names of inputs, and the decimal sign of most numbers; if unsure, as given."""
+
+    def inputs(given: str) -> list[int]:
+        names = header.replace('"', "").split(given)
+        return [i for i, name in enumerate(names) if suggestion(split_unit(name)[0], loosely=False)]
+
+    best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
+    places = inputs(best)
+    cells = [cell.strip() for row in csv.reader(rows, delimiter=best) for i, cell in enumerate(row) if i in places]
+
+    def cells_with(sign: str) -> int:
+        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
+
+    return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
+
+
+class NdjsonSource:
+    """One JSON object a line; the columns are those of the first block of every file."""
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self.files = files
+        names: dict[str, None] = {}
+        for path in files:
+            for records in records_of(path, Place()):
+                names |= dict.fromkeys(name for found, _, _ in _objects(records.texts) for name in found)
+                break
+        if not names:
+            raise FilesError(f"{files[0]}: holds no JSON object, one a line")
+        self.schema = pa.schema([(name, pa.string()) for name in names])
+
+    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
+        """The blocks of the file at ``place`` from there on."""
+        path = self.files[place.file]
+        schema = pa.schema([self.schema.field(name) for name in columns.inputs]) if verbatim else self.schema
+        for records in records_of(path, place):
+            objects, texts, wrong = [], [], {}
+            for i, (found, text, fault) in enumerate(_objects(records.texts)):
+                texts.append(text)
+                if fault is None:
+                    objects.append(found)
+                else:
+                    wrong[i] = fault
+            if not verbatim and (new := {name for found in objects for name in found} - set(schema.names)):
+                late = f"{min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
+                raise FilesError(f"{_where(path, records)}: {late}")
+            arrays = [_column([found.get(name) for found in objects], name in columns.inputs) for name in schema.names]
+            yield _block(records, pa.RecordBatch.from_arrays(arrays, schema.names), texts, wrong)
+
+
+def _objects(texts: Iterable[bytes]) -> Iterator[tuple[dict[str, Any], bytes, str | None]]:
+    """The object of each line; the line, with null for NaN and infinities, which JSON lacks; what is wrong with it."""
+    constants: list[str] = []
+    decoder = json.JSONDecoder(object_pairs_hook=_without_repeats, parse_constant=constants.append)
+    for text in texts:
+        try:
+            found = decoder.decode(text.decode("utf-8-sig"))
+            if b"\\u" in text:
+                json.dumps(found, ensure_ascii=False).encode()  # half of a surrogate pair is no text
+            fault = None if isinstance(found, dict) else "is no JSON object"
+        except RecursionError:
+            fault = "is no JSON: too deep"
+        except ValueError as error:
+            fault = str(error) if str(error).startswith("repeats") else f"is no JSON: {error}"
+        yield ({} if fault else found), (json.dumps(found).encode() if constants and not fault else text), fault
+        constants.clear()
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -498,19 +266,18 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _objects(texts: Sequence[bytes]) -> list[dict[str, Any]]:
-    """The objects of those lines that hold one."""
-    found = []
-    for text in texts:
-        with suppress(ValueError):
-            found.append(_object(text))
-    return found
+def _column(values: list[Any], is_input: bool) -> pa.Array:
+    """Values of JSON: inputs as doubles where all are numbers; else text: strings as they are, others as JSON."""
+    if is_input and {*map(type, values)} <= {float, int}:
+        with suppress(OverflowError):
+            numbers = np.array(values, np.float64)
+            if np.isfinite(numbers).all():
+                return pa.array(numbers)
+    return pa.array([_text(value) for value in values], pa.string())
 
 
-def _finite(value: Any) -> Any:
-    """``value`` with null for every NaN and infinity."""
-    if isinstance(value, dict):
-        return {name: _finite(entry) for name, entry in value.items()}
-    if isinstance(value, list):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def _text(value: Any) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    # JSON has no infinity: this is a number of too many digits, which must not pass for a rigid contact
+    return "1e999" if isinstance(value, float) and math.isinf(value) else json.dumps(value)

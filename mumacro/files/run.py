@@ -1,38 +1,32 @@
-"""A run over files of cases: parts, a note of each, resuming after a stop, one output of all parts.
+"""A run over files of cases that can be killed at any moment: the same command goes on, and gives the same bytes.
 
-While it runs, ``OUT.parts`` holds a plan (inputs, options and table), the finished parts, and a note of
-each with the place where the next one begins.  A part that has its note is never made again, and one without it is
-written again from the place that the note before it names, with the same bytes.
+While it runs, ``OUT.parts`` holds ``answers``, to which pieces are appended, and ``notes``: a line for the plan (inputs
+with checksums, options, table), then a line for each piece with its size and checksum, its rejects and the place that
+follows it, behind a checksum of the line.  Pieces that fit their notes are kept; what follows them is done again.
+``OUT.run.json`` stays: it tells what the output was made of, so that the same command finds it complete.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
-import numpy as np
-import pyarrow as pa
-
-from mumacro.files.answering import added_fields, answer_columns, numbers
-from mumacro.files.blocks import Block, Fault, Place
-from mumacro.files.columns import FilesError, find_columns
-from mumacro.files.reading import FORMATS, Source, format_of, open_source
-from mumacro.files.writing import join_parts, open_part
+from mumacro.files.columns import FilesError
+from mumacro.files.evaluation import Evaluation, stamp
+from mumacro.files.records import Place
+from mumacro.files.writing import write_parquet
 from mumacro.surrogate import Surrogate
 from mumacro.version import __version__
-from mumacro.writing import alone_in, sync_folder, write_whole
+from mumacro.writing import alone_in, put, write_whole
 
-__all__ = ["PART_ROWS", "Summary", "evaluate_files", "find_files"]
+__all__ = ["Summary", "evaluate_files"]
 
-#: rows of a part by default: joining Parquet means writing it twice, joining text means copying
-PART_ROWS = {"parquet": 10_000_000, "csv": 1_000_000, "ndjson": 1_000_000}
-ON_ERROR = ("list", "stop")
 Progress = Callable[[float, int, int], None]
 
 
@@ -48,49 +42,20 @@ class Summary:
     resumed: int
 
 
-@dataclass
-class _Note:
-    """The contents of a part, and where the next one begins."""
+class _Note(NamedTuple):
+    """What a piece leaves behind: its checksum, bytes and rows up to its end, what follows, its rejects as lines."""
 
-    place: Place
+    checksum: int = 0
+    end: int = 0
+    place: Sequence[int] | None = None
     rows: int = 0
     rejected: int = 0
+    rejects: str = ""
 
-
-def find_files(given: Sequence[str | Path]) -> tuple[list[Path], str, Path | None]:
-    """The files that paths, folders and patterns name, in order, their format, and the folder if it was one alone.
-
-    Raises
-    ------
-    FilesError
-        Nothing is there, a file has another ending, or the formats differ.
-    """
-    files: list[Path] = []
-    folder = None
-    for entry in given:
-        path = Path(entry)
-        if path.is_dir():
-            found = sorted(p for p in path.rglob("*") if p.is_file() and format_of(p) and p.name[0] not in "._")
-            folder = path if len(given) == 1 else None
-        elif path.exists() or not any(c in str(entry) for c in "*?["):
-            found = [path]
-        else:
-            base = Path(path.anchor) if path.is_absolute() else Path()
-            found = sorted(p for p in base.glob(str(path.relative_to(base))) if p.is_file())
-        if not found:
-            raise FilesError(f"{entry}: there is no file that ends in {', '.join(FORMATS)} (text also .gz)")
-        files += found
-    kinds = set()
-    for path in files:
-        if not path.is_file():
-            raise FilesError(f"{path}: no such file")
-        kind = format_of(path)
-        if kind is None:
-            raise FilesError(f"{path}: the name must end in {', '.join(FORMATS)} (text also .gz)")
-        kinds.add(kind[0])
-    if len(kinds) > 1:
-        raise FilesError(f"the files are of several formats: {', '.join(sorted(kinds))}")
-    return files, kinds.pop(), folder
+    def line(self) -> bytes:
+        """The note behind its own checksum."""
+        body = json.dumps(self).encode()
+        return b"%08x %b\n" % (zlib.crc32(body), body)
 
 
 def evaluate_files(
@@ -101,9 +66,11 @@ def evaluate_files(
     rigid: bool = False,
     include: Sequence[str] = (),
     on_error: str = "list",
+    sep: str = ",",
+    decimal: str = ".",
     force: bool = False,
-    part_rows: int | None = None,
     progress: Progress = lambda _share, _rows, _rejected: None,
+    say: Callable[[str], None] = lambda _text: None,
 ) -> Summary:
     """Evaluate every case of some files.
 
@@ -112,8 +79,8 @@ def evaluate_files(
     given : sequence of path
         Files, folders or patterns; all of one format.
     out : path
-        A file, whose ending sets the format, or a folder (that exists, or ends in ``/``) for a file a part, in the
-        format of the input.  Rows keep their order; a rejected row is not in it, but in ``OUT.rejects.csv``.
+        A file, whose ending sets the format.  Rows keep their order; a rejected row is not in it, but in
+        ``OUT.rejects.csv``.
     surrogate : Surrogate
         The table.
     rigid : bool
@@ -122,13 +89,14 @@ def evaluate_files(
         ``"gradient"`` adds d mu_macro / d input.
     on_error : str
         ``"list"`` puts rejected rows into the side file, ``"stop"`` raises at the first one.
+    sep, decimal : str
+        Between the cells of CSV, and within its numbers, read and written.
     force : bool
         Replace an output that exists, and delete the parts of another run.
-    part_rows : int, optional
-        Rows after which a part ends: what a stopped run loses at the most.  Left out: 10 million of Parquet, 1 million
-        of text.
     progress : callable
         Called with the share that is done, rows read and rows rejected.
+    say : callable
+        Called with one line about what a resumed run found.
 
     Returns
     -------
@@ -138,239 +106,168 @@ def evaluate_files(
     Raises
     ------
     FilesError
-        An input or output that cannot be used; names it, with the remedy.
+        An input or output that cannot be used, or an input that changed meanwhile; names it, with the remedy.
     BusyError
         Another run writes the same output.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> _ = (folder / "cases.csv").write_text("mu0,Fz,k,y0 [um],f [kHz],v0\\n0.3,10,rigid,2,20,0.01\\n")
+    >>> evaluate_files([folder / "cases.csv"], folder / "out.parquet", Surrogate.open()).answered
+    1
     """
-    run = _Run(given, out, surrogate, rigid, include, on_error, part_rows)
-    with alone_in(run.parts):
-        run.begin(force)
-        return run.finish(*run.answer(progress))
+    work = Evaluation(
+        given, Path(out), surrogate, rigid=rigid, include=include, on_error=on_error, sep=sep, decimal=decimal
+    )
+    return _Run(work, Path(out)).run(force, progress, say)
 
 
 class _Run:
-    def __init__(
-        self,
-        given: Sequence[str | Path],
-        out: str | Path,
-        surrogate: Surrogate,
-        rigid: bool,
-        include: Sequence[str],
-        on_error: str,
-        part_rows: int | None,
-    ) -> None:
-        files, kind, folder = find_files(given)
-        self.source: Source = open_source(files, kind, folder)
-        self.surrogate, self.include, self.on_error = surrogate, include, on_error
-        self.folder = str(out).endswith(("/", os.sep)) or Path(out).is_dir()
-        self.out = Path(out)
-        told = (kind, False) if self.folder else format_of(self.out)
-        if told is None:
-            raise FilesError(f"{out}: the name must end in {', '.join(FORMATS)} (text also .gz), or in / for a folder")
-        self.kind, self.packed = told
-        self.part_rows = part_rows or PART_ROWS[self.kind]
-        if not self.out.parent.is_dir():
-            raise FilesError(f"{self.out.parent}: no such folder")
-        if self.out.resolve() in {path.resolve() for path in files}:
-            raise FilesError(f"{out}: is an input")
-        self.added = added_fields(include)
-        names = [field.name for field in self.added]
-        try:
-            self.columns = find_columns(self.source.names, rigid, names)
-        except FilesError as error:
-            raise FilesError(f"{files[0]}: {error}") from None
-        verbatim = kind == self.kind and kind != "parquet"
-        self.source.settle(self.columns, verbatim, self.part_rows)
-        self.verbatim = verbatim
-        given_fields = [] if verbatim else [self._out_field(field) for field in self.source.schema]
-        self.schema = pa.schema([*given_fields, *self.added], self.source.schema.metadata)
-        headings = [*(self.source.names if verbatim else self.schema.names), *(names if verbatim else [])]
-        self.header = _csv_line(headings) if self.kind == "csv" else b""
-        self.suffix = "".join([f".{self.kind}", ".gz" if self.packed else ""])
-        self.parts = self.out.with_name(self.out.name + ".parts")
-        self.rejects = self.out.with_name(self.out.name + ".rejects.csv")
-        self.plan = {
+    def __init__(self, work: Evaluation, out: Path) -> None:
+        self.work, self.out = work, out
+        if not out.parent.is_dir():
+            raise FilesError(f"{out.parent}: no such folder")
+        if out.is_dir():
+            raise FilesError(f"{out}: is a folder; give the name of a file")
+        self.parts, self.rejects, self.record = (
+            out.with_name(out.name + ending) for ending in (".parts", ".rejects.csv", ".run.json")
+        )
+        self.answers, self.notes, self.made = (self.parts / name for name in ("answers", "notes", "made"))
+        for target in (out, self.rejects, self.record, self.answers, self.notes, self.made):
+            if target.exists() and any(target.samefile(path) for path in work.files):
+                raise FilesError(f"{target}: is an input, and would be overwritten; give another -o")
+        self.plan: dict[str, Any] = {
             "version": __version__,
-            "files": [[str(path.resolve()), path.stat().st_size, path.stat().st_mtime_ns] for path in files],
-            "columns": {name: [column, *scale] for name, (column, scale) in self.columns.places.items()},
-            "options": [self.kind, self.packed, list(include), on_error, self.part_rows],
-            "table": surrogate.checksum,
+            "table": work.surrogate.checksum,
+            "inputs": [[path.name, checksum] for path, checksum in zip(work.files, work.checksums, strict=True)],
+            "options": [vars(work.output), list(work.include), work.on_error, [*work.columns.places.items()]],
         }
+        self.first = json.dumps(self.plan).encode() + b"\n"
 
-    def _out_field(self, field: pa.Field) -> pa.Field:
-        """Inputs that were cells of text are written as numbers; all else is unchanged."""
-        inputs = {column for column, _ in self.columns.places.values()}
-        return field.with_type(pa.float64()) if self.source.cells_are_text and field.name in inputs else field
+    def run(self, force: bool, progress: Progress, say: Callable[[str], None]) -> Summary:
+        """Find what is done, do what is left, and put it into place."""
+        with alone_in(self.parts):
+            complete = None if force else self._complete()
+            if complete:
+                self._clear()
+                say(f"{self.out}: is complete already; nothing is left to do")
+                return complete
+            note = self._begin(force, say)
+            resumed = note.rows
+            try:
+                note = self._go_on(note, progress)
+            except FilesError:  # an input must be changed before this run can end
+                self._clear()
+                raise
+            self._finish(note)
+            return self._summary(note.rows, note.rejected, resumed)
 
-    # --- begin --------------------------------------------------------------------------------------
+    def _summary(self, rows: int, rejected: int, resumed: int) -> Summary:
+        rejects = self.rejects if rejected else None
+        return Summary(rows, rows - rejected, rejected, self.out, rejects, resumed)
 
-    def begin(self, force: bool) -> None:
-        """Take over the parts of an earlier run of the same command, or make a folder for them."""
-        plan = json.dumps(self.plan).encode()
-        kept = self.parts / "plan.json"
-        if not (kept.is_file() and kept.read_bytes() == plan):
-            if not force and any(path.name[0] != "." for path in self.parts.iterdir()):
-                raise FilesError(
-                    f"{self.parts}: has parts of another run (input, options or table differ); --force deletes them"
-                )
-            if not force:
-                self._check_free()
-            self._clear()
-            write_whole(kept, plan)
+    def _record(self, rows: int, rejected: int) -> bytes:
+        written = [self.out, *([self.rejects] if rejected else [])]
+        record = {"rows": rows, "rejected": rejected, "files": [stamp(path)[:2] for path in written], "plan": self.plan}
+        return json.dumps(record, indent=1).encode()
 
-    def _clear(self) -> None:
-        """Empty the folder of parts.  In this order a stopped run can resume: last note, parts, plan.json."""
-        found = sorted(self.parts.iterdir(), reverse=True)
-        for path in sorted(found, key=lambda path: (path.name == "plan.json", path.suffix != ".json")):
-            path.unlink()
+    def _complete(self) -> Summary | None:
+        """The summary of an earlier run of the same command, if its files are as it left them."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            text = self.record.read_bytes()
+            rows, rejected = (json.loads(text)[name] for name in ("rows", "rejected"))
+            if text == self._record(rows, rejected):
+                return self._summary(rows, rejected, rows)
+        return None
 
-    def _check_free(self) -> None:
-        taken = [*self.out.glob("part-*")] if self.folder else [self.out] * self.out.exists()
-        taken += [self.rejects] * self.rejects.exists()
-        if taken:
-            raise FilesError(f"{taken[0]}: exists already; --force replaces it")
+    def _begin(self, force: bool, say: Callable[[str], None]) -> _Note:
+        """Keep what is sound of an earlier run of the same command, or make a new beginning."""
+        found = b""
+        if self.notes.exists():
+            with self.notes.open("rb") as notes:
+                found = notes.readline()
+        if found == self.first:
+            return self._kept(say)
+        if found and not force:
+            differ = "its plan cannot be read"
+            with suppress(ValueError, AttributeError):
+                plan, old = json.loads(self.first), json.loads(found)
+                differ = ", ".join(name for name in plan if old.get(name) != plan[name]) + " differ"
+            raise FilesError(f"{self.parts}: has parts of another run ({differ}); --force deletes them")
+        for path in (self.out, self.rejects):
+            if path.exists() and not force:
+                raise FilesError(f"{path}: exists already; --force replaces it")
+        self._clear()
+        self.answers.touch()
+        write_whole(self.notes, self.first)
+        return _Note()
 
-    # --- answer -------------------------------------------------------------------------------------
-
-    def answer(self, progress: Progress) -> tuple[list[_Note], int]:
-        """Make every part that is not there; return the notes, and how many rows were there already."""
-        notes: list[_Note] = []
-        place, rows, rejected = Place(), 0, 0
-        while (note := self._noted(len(notes))) is not None:
-            notes.append(note)
-            place, rows, rejected = note.place, rows + note.rows, rejected + note.rejected
-        resumed = rows
-        blocks = self._blocks(place)
-        while place.file < len(self.source.files):
-            note = self._make_part(len(notes), place, blocks, partial(_added, progress, rows, rejected))
-            notes.append(note)
-            place, rows, rejected = note.place, rows + note.rows, rejected + note.rejected
-        progress(1.0, rows, rejected)
-        return notes, resumed
-
-    def _blocks(self, place: Place) -> Iterator[tuple[Block, bool]]:
-        """All blocks from ``place`` on, of this file and those after it, and whether one is the last."""
-        held = None
-        for file in range(place.file, len(self.source.files)):
-            for block in self.source.blocks(place if file == place.file else Place(file)):
-                if held is not None:
-                    yield held, False
-                held = block
-        if held is not None:
-            yield held, True
-
-    def _path(self, number: int, suffix: str) -> Path:
-        return self.parts / f"part-{number:05d}{suffix}"
-
-    def _noted(self, number: int) -> _Note | None:
-        try:
-            found = json.loads(self._path(number, ".json").read_text("utf-8"))
-        except FileNotFoundError:
-            return None
-        return _Note(Place(*found["place"]), found["rows"], found["rejected"])
-
-    def _make_part(self, number: int, place: Place, blocks: Iterator[tuple[Block, bool]], progress: Progress) -> _Note:
-        header = self.header if self.folder else b""
-        part = open_part(self._path(number, self.suffix), self.kind, self.packed, self.schema, header)
-        note = _Note(place)
-        rejects = io.StringIO(newline="")
-        try:
-            last = True
-            for block, last in blocks:  # noqa: B007 (also after the loop)
-                batch, faults = self._answered(block)
-                note.place, note.rows = block.place, note.rows + batch.num_rows + len(faults)
-                note.rejected += len(faults)
-                self._list(rejects, self.source.files[block.place.file], faults)
-                part.write(batch, block.lines, len(self.added))
-                progress(self.source.done(note.place), note.rows, note.rejected)
-                if note.rows >= self.part_rows:
+    def _kept(self, say: Callable[[str], None]) -> _Note:
+        last, whole = _Note(), max((note.end for note, _ in self._noted()), default=0)
+        if not self.answers.exists() and self.out.exists() and self.out.stat().st_size == whole:
+            os.replace(self.out, self.answers)  # a run that was stopped here had put it into place
+        self.answers.touch()
+        size = len(self.first)
+        with self.answers.open("rb") as answers:
+            for note, line in self._noted():
+                if zlib.crc32(answers.read(note.end - last.end)) != note.checksum:
                     break
-            if last:
-                note.place = Place(len(self.source.files))
-            part.finish()
-        except BaseException:
-            part.discard()
-            raise
-        for suffix, text in ((".rejects.csv", rejects.getvalue()), (".json", json.dumps(vars(note)))):
-            write_whole(self._path(number, suffix), text.encode())
+                last, size = note, size + len(line)
+        damaged = size < self.notes.stat().st_size
+        os.truncate(self.answers, last.end)
+        os.truncate(self.notes, size)
+        again = "; what follows them was cut or changed, and is done again" if damaged else ""
+        say(f"{self.parts}: {last.rows:,} rows are done already ({last.rejected:,} rejected){again}")
+        return last
+
+    def _noted(self) -> Iterator[tuple[_Note, bytes]]:
+        """The sound notes, and their lines."""
+        with self.notes.open("rb") as notes:
+            notes.readline()
+            for line in notes:
+                body = line[9:-1]
+                if line != b"%08x %b\n" % (zlib.crc32(body), body):
+                    return
+                yield _Note(*json.loads(body)), line
+
+    def _go_on(self, note: _Note, progress: Progress) -> _Note:
+        # nothing is brought to the disk here: after a loss of power the checksums tell what is there
+        with self.answers.open("ab", 0) as answers, self.notes.open("ab", 0) as notes:
+            for piece in self.work.pieces(Place(*note.place) if note.place else None):
+                _write(answers, piece.text)
+                end, rows, rejected = note.end + len(piece.text), note.rows + piece.rows, note.rejected + piece.rejected
+                note = _Note(zlib.crc32(piece.text), end, piece.place, rows, rejected, piece.rejects)
+                _write(notes, note.line())
+                progress(piece.share, note.rows, note.rejected)
         return note
 
-    def _answered(self, block: Block) -> tuple[pa.RecordBatch, list[Fault]]:
-        """The evaluated rows of a block (and their lines, in place), and what is wrong with the others."""
-        batch, rejects = answer_columns(block.batch, self.surrogate, self.columns, self.include)
-        faults = block.faults
-        if rejects.num_rows:
-            found = rejects.to_pydict()
-            rows = block.rows[found["row"]].tolist()
-            faults = sorted([*faults, *map(Fault, rows, found["field"], found["value"], found["reason"])])
-            kept = np.ones(batch.num_rows, np.bool_)
-            kept[found["row"]] = False
-            batch = batch.filter(pa.array(kept))
-            block.lines = None if block.lines is None else block.lines.filter(pa.array(kept))
-        if self.verbatim:
-            return batch, faults
-        columns = []
-        for field in self.schema:
-            column = batch.column(field.name)
-            if column.type != field.type:  # an input that was text
-                value, _ = numbers(column, stiffness=self._is_stiffness(field.name))
-                column = pa.array(value, mask=np.isinf(value))
-            columns.append(column)
-        return pa.RecordBatch.from_arrays(columns, schema=self.schema), faults
-
-    def _is_stiffness(self, column: str) -> bool:
-        return not self.columns.rigid and self.columns.places["k"][0] == column
-
-    def _list(self, rejects: io.StringIO, path: Path, faults: Iterable[Fault]) -> None:
-        several = len(self.source.files) > 1
-        writer = csv.writer(rejects, lineterminator="\n")
-        for fault in faults:
-            if self.on_error == "stop":
-                what = f"{fault.field} {fault.reason}" if fault.field else fault.reason
-                raise FilesError(f"{path}: row {fault.row}: {what}, got {fault.value!r}")
-            writer.writerow([*([path] if several else []), *fault])
-
-    # --- finish -------------------------------------------------------------------------------------
-
-    def finish(self, notes: list[_Note], resumed: int) -> Summary:
-        """One output of all parts; then the parts are deleted."""
-        rejected = sum(note.rejected for note in notes)
-        if rejected:
-            head = [*(["file"] if len(self.source.files) > 1 else []), *Fault._fields]
-            lists = [self._path(number, ".rejects.csv") for number in range(len(notes))]
-            join_parts(lists, self.rejects, "csv", False, self.schema, _csv_line(head))
+    def _finish(self, last: _Note) -> None:
+        """Put the files into place; a run that is stopped here does this again."""
+        if last.rejected:
+            with self.made.open("w", encoding="utf-8", newline="") as stream:
+                stream.write(self.work.rejects_head)
+                stream.writelines(note.rejects for note, _ in self._noted())
+            put(self.made, self.rejects)
         else:
             self.rejects.unlink(missing_ok=True)
-        parts = [self._path(number, self.suffix) for number in range(len(notes))]
-        if self.folder:
-            self._move(parts)
-        elif self.kind == "parquet" and len(parts) == 1:
-            if parts[0].exists():  # else a run that was stopped here moved it
-                os.replace(parts[0], self.out)
-                sync_folder(self.out.parent)
+        if self.work.output.kind == "parquet":
+            with self.answers.open("rb") as answers:
+                texts = (answers.read(note.end - answers.tell()) for note, _ in self._noted())
+                write_parquet(self.made, self.work.schema, filter(None, texts))
+            put(self.made, self.out)
         else:
-            join_parts(parts, self.out, self.kind, self.packed, self.schema, self.header)
+            put(self.answers, self.out)
+        write_whole(self.record, self._record(last.rows, last.rejected))
         self._clear()
-        rows = sum(note.rows for note in notes)
-        return Summary(rows, rows - rejected, rejected, self.out, self.rejects if rejected else None, resumed)
 
-    def _move(self, parts: Sequence[Path]) -> None:
-        self.out.mkdir(exist_ok=True)
-        names = {part.name for part in parts}
-        for left in self.out.glob("part-*"):
-            if left.name not in names:
-                left.unlink()
-        for part in parts:
-            if part.exists():  # else a run that was stopped here moved it
-                os.replace(part, self.out / part.name)
-        sync_folder(self.out)
+    def _clear(self) -> None:
+        for path in (self.answers, self.made, self.notes):
+            path.unlink(missing_ok=True)
 
 
-def _added(progress: Progress, rows: int, rejected: int, share: float, more: int, bad: int) -> None:
-    progress(share, rows + more, rejected + bad)
-
-
-def _csv_line(cells: Sequence[str]) -> bytes:
-    text = io.StringIO(newline="")
-    csv.writer(text, lineterminator="\n").writerow(cells)
-    return text.getvalue().encode()
+def _write(stream: Any, text: bytes | memoryview) -> None:
+    rest = memoryview(text)
+    while rest:
+        rest = rest[stream.write(rest) :]

@@ -8,6 +8,9 @@
 MU_INLINE double mu_min(double a, double b) { return b < a ? b : a; }
 MU_INLINE double mu_max(double a, double b) { return b > a ? b : a; }
 
+/* The whole part of x, of any x: beyond 1e9 that is 1e9, and NaN counts as the lowest. */
+MU_INLINE int32_t mu_whole_of(double x) { return (int32_t)mu_min(mu_max(-1e9, x), 1e9); }
+
 /* ln x of normal x > 0; off by at most 4e-16 of the larger of 1 and |ln x|.
  *
  * The exponent times ln 2, plus the interpolant of ln m at 22 Chebyshev points of 1 <= m < 2, in powers of 2 m - 3. */

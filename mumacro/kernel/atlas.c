@@ -43,7 +43,7 @@ enum { MU_BORDER_LOW, MU_BORDER_MID, MU_BORDER_HIGH, MU_PIECES };
 #define MU_SLOPE "mu_ratio y_tilde/v_tilde"
 #define MU_LAYER "(mu_ratio - outer) y_tilde/v_tilde, outer = 1/AGM(1, sqrt(1 + y_tilde^2/v_tilde^2))"
 
-static const mumacro_chart MU_CHART[MU_CHARTS] = {
+MU_LISTED mumacro_chart MU_CHART[MU_CHARTS] = {
     {"continuous_low", MU_CONTINUOUS, {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT}, {"v_squared_share", 0.0, 1.0},
      "(1 - mu_ratio) 4 (1 + v_tilde^2)/y_tilde^2", MU_ROUNDING, 0.0},
     {"continuous_mid_1", MU_CONTINUOUS, {"ln_y", MU_LN_Y_CONT, MU_LN_Y_MID}, {"ln_rho", 0.0, MU_LN_RHO_MAX},
@@ -70,7 +70,7 @@ static const mumacro_chart MU_CHART[MU_CHARTS] = {
      MU_LAYER ", minus (2/pi) ln(v_tilde/sqrt(y_tilde))", 0.0, 0.0},
 };
 
-static const mumacro_piece MU_PIECE[MU_PIECES] = {
+MU_LISTED mumacro_piece MU_PIECE[MU_PIECES] = {
     {"low", {"y_squared", 0.0, MU_Y_CONT *MU_Y_CONT}, "2 v_tilde_crit / y_tilde^2"},
     {"mid", {"ln_y", MU_LN_Y_CONT, MU_LN_Y_TAIL}, "v_tilde_crit / sqrt(y_tilde)"},
     {"high", {"inverse_y", 0.0, 1.0 / MU_Y_TAIL}, "v_tilde_crit / sqrt(y_tilde)"},

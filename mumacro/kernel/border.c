@@ -6,6 +6,9 @@
 
 enum { MU_PIECE_FIRST, MU_PIECE_OFFSET, MU_PIECE_STEP, MU_PIECE_ERROR, MU_PIECE_COLUMNS };
 
+/* How far v~crit may be off, relative, with the last digits of v~ and y~. */
+MU_INLINE double mu_border_error(const mumacro_data *data) { return data->pieces[MU_PIECE_ERROR] + MU_ROUNDING; }
+
 /* What a node's value is multiplied by to give v~crit. */
 static double mu_border_scale(int piece, double y) { return piece == MU_BORDER_LOW ? 0.5 * y * y : sqrt(y); }
 
@@ -15,17 +18,22 @@ typedef struct {
 } mu_border_cells;
 
 /* The cells of both pieces up to MU_Y_TAIL; 0 < y <= MU_Y_TAIL. */
-MU_INLINE mu_border_cells mu_border_cell(const double *pieces, mu_lanes y) {
-    const double *low = pieces, *mid = pieces + MU_PIECE_COLUMNS;
+MU_INLINE mu_border_cells mu_border_cell(const mumacro_data *data, mu_lanes y) {
+    const double *low = data->pieces, *mid = low + MU_PIECE_COLUMNS;
     const mu_lanes ln_y = mu_log(y), squared = y * y;
     const mu_mask small = MU_WHERE(y <= MU_Y_CONT);
-    const mu_lanes x = mu_select(small, mu_fma(squared, mu_all(low[MU_PIECE_STEP]), mu_all(low[MU_PIECE_OFFSET])),
-                                 mu_fma(ln_y, mu_all(mid[MU_PIECE_STEP]), mu_all(mid[MU_PIECE_OFFSET])));
+    mu_lanes x = mu_select(small, mu_fma(squared, mu_all(low[MU_PIECE_STEP]), mu_all(low[MU_PIECE_OFFSET])),
+                     mu_fma(ln_y, mu_all(mid[MU_PIECE_STEP]), mu_all(mid[MU_PIECE_OFFSET])));
     const mu_lanes first = mu_select(small, mu_all(low[MU_PIECE_FIRST]), mu_all(mid[MU_PIECE_FIRST]));
+    const mu_lanes last = mu_all((double)(data->border_cells - 1));
+    mu_lanes whole, cell;
     mu_border_cells out;
-    const mu_whole cell = MU_AS(mu_whole, x);
-    out.cell = cell + MU_AS(mu_whole, first);
-    out.u = 2.0 * (x - MU_AS(mu_lanes, cell)) - 1.0;
+    /* no table makes it read elsewhere, and NaN is cell 0 */
+    x = mu_select(MU_WHERE(x > -1.0) & MU_WHERE(x < 1e9), x, mu_all(0.0));
+    whole = MU_AS(mu_lanes, MU_AS(mu_whole, x));
+    cell = mu_select(MU_WHERE(whole + first > 0.0), whole + first, mu_all(0.0));
+    out.cell = MU_AS(mu_whole, mu_select(MU_WHERE(cell < last), cell, last));
+    out.u = 2.0 * (x - whole) - 1.0;
     out.scale = mu_select(small, 0.5 * squared, mu_all(1.0));
     out.ln_y = ln_y;
     return out;
@@ -58,13 +66,13 @@ static double mu_border(const mumacro_data *data, double y, double *slope, doubl
     if (y > MU_Y_TAIL) {
         const double *piece = data->pieces + MU_BORDER_HIGH * MU_PIECE_COLUMNS;
         const double x = mu_fma1(1.0 / y, piece[MU_PIECE_STEP], piece[MU_PIECE_OFFSET]);
-        const int whole = (int)x;
-        cell = data->border + 8 * ((int)piece[MU_PIECE_FIRST] + whole);
+        const double whole = (double)mu_whole_of(x), last = (double)(data->border_cells - 1);
+        cell = data->border + 8 * (int64_t)mu_min(mu_max(0.0, piece[MU_PIECE_FIRST] + whole), last);
         u = 2.0 * (x - whole) - 1.0;
         scale = mu_border_scale(MU_BORDER_HIGH, y);
         if (ln_y) *ln_y = mu_log1(y);
     } else {
-        const mu_border_cells found = mu_border_cell(data->pieces, mu_all(y));
+        const mu_border_cells found = mu_border_cell(data, mu_all(y));
         cell = data->border + 8 * mu_first_cell(found.cell);
         u = mu_first(found.u);
         scale = mu_first(found.scale);

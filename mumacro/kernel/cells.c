@@ -6,15 +6,15 @@ typedef struct {
     double u, w;
 } mu_spot;
 
-MU_INLINE mu_spot mu_find(const double *block, int64_t cells, double a, double b) {
+MU_INLINE mu_spot mu_find(const double *block, int64_t first, int64_t cells, double a, double b) {
     const double x = mu_fma1(a, block[MU_STEP_A], block[MU_OFFSET_A]);
     const double z = mu_fma1(b, block[MU_STEP_B], block[MU_OFFSET_B]);
     /* an offset's rounding may leave a coordinate at the near end below zero: truncation keeps it in the first cell */
-    const double i = (double)(int32_t)x, j = (double)(int32_t)z;
-    const int64_t cell = (int32_t)(block[MU_FIRST] + i * block[MU_CELLS_B] + j);
+    const double i = (double)mu_whole_of(x), j = (double)mu_whole_of(z);
+    const double cell = block[MU_FIRST] + i * block[MU_CELLS_B] + j - (double)first, last = (double)(cells - 1);
     mu_spot out;
     /* no table and no input makes it read elsewhere */
-    out.cell = cell < 0 ? 0 : cell < cells ? cell : cells - 1;
+    out.cell = (int32_t)mu_min(mu_max(0.0, cell), last);
     out.u = 2.0 * (x - i) - 1.0;
     out.w = 2.0 * (z - j) - 1.0;
     return out;
@@ -71,4 +71,16 @@ MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
         out.q_b = mu_fma1(out.q_b, u, d[i]);
     }
     return out;
+}
+
+/* (d/dw at w - d/dw at 1) / (w - 1) of the polynomial at u: a polynomial again, so nothing cancels next to w = 1. */
+static double mu_cell_bend(const double *cell, double u, double w) {
+    double sum = 0.0, quotient = 0.0;
+    for (int k = 0; k < 6; ++k) { /* the power 7 - k of w */
+        double row = 0.0;
+        for (int i = 0; i < 8; ++i) row = mu_fma1(row, u, cell[8 * k + i]);
+        quotient += (7 - k) * row;
+        sum = mu_fma1(sum, w, quotient);
+    }
+    return sum;
 }

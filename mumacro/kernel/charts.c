@@ -47,7 +47,7 @@ MU_INLINE mu_places mu_place_common(mu_lanes v, mu_lanes y, mu_lanes crit, mu_la
     const mu_lanes sigma = mu_select(half, root, MU_SQRT2 - root);
     const mu_lanes beyond = mu_select(small, 1.0 - share, mu_log(rho));
     /* -1 where true: what is counted is subtracted */
-    const mu_mask of_regime = mu_select_whole(sliding, mu_all_whole(0), MU_S_LOW - ~lowest - ~small);
+    const mu_mask of_regime = mu_select_whole(sliding, mu_all_whole(0), mu_all_whole(MU_S_LOW) - ~lowest - ~small);
     const mu_mask block = of_regime - ~small - MU_WHERE(y > MU_Y_MID) - MU_WHERE(y > MU_Y_HIGH);
     const mu_mask near = small | MU_WHERE(rho <= MU_RHO_MAX);
     const mu_mask off_corner = ~small | lowest | MU_WHERE(sigma >= MU_SIGMA_CUT) | sliding;

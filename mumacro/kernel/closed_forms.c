@@ -67,7 +67,7 @@ static double mu_fast_ratio(const double *cells, double v, double y, double *bou
     double first, rest, correction;
     if (t < MU_OUTER_MAX) {
         const double x = mu_first(mu_log(mu_all(t))) * (MU_OUTER_CELLS / MU_OUTER_LOG_MAX);
-        const int cell = x < MU_OUTER_CELLS - 1 ? (int)x : MU_OUTER_CELLS - 1;
+        const int cell = (int)mu_min(mu_max(0.0, x), MU_OUTER_CELLS - 1.0);
         const double u = 2.0 * (x - cell) - 1.0, *row = cells + 16 * cell;
         first = row[0];
         rest = row[8];

@@ -94,7 +94,7 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
         const mu_slopes at = known ? *known : mu_slopes_at(data, MU_MU_RATIO, found->v, found->y);
         const double both = at.along_v + at.along_y, errors = at.bound_v + at.bound_y;
         slope[0] = found->mu - both;
-        error[0] = found->bound + errors;
+        error[0] = (found->source < MU_CHARTS ? mu_min(found->bound, at.bound) : found->bound) + errors;
         slope[1] = -mu0 * both / in->Fz;
         error[1] = mu0 * errors / in->Fz;
         slope[2] = mu0 * both / in->k;
@@ -139,8 +139,9 @@ MU_INLINE void mu_pass_groups(int n, double in[6][MU_CHUNK], double *v, double *
     }
 }
 
-/* Rows of answers to cases, see library.h. */
+/* Rows of answers to cases, and the numbers of one answer, which begin alike, see library.h. */
 enum { MU_ROW_MACRO, MU_ROW_RATIO, MU_ROW_BOUND, MU_ROW_V, MU_ROW_Y, MU_ROW_SLOPES, MU_ROWS = MU_ROW_SLOPES + 12 };
+enum { MU_ONE_LENGTH = MU_ROW_SLOPES, MU_ONE_SOURCE, MU_ONE_SLOPES, MU_ONE_WITH_SLOPES = MU_ONE_SLOPES + 12 };
 
 /* Up to MU_CHUNK cases; in: the six inputs, filled up to whole lanes. */
 static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_CHUNK], int rows, double *out,
@@ -200,7 +201,7 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
 static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
                      double *out, int64_t stride, int8_t *source) {
     for (int64_t start = 0; start < n; start += MU_CHUNK) {
-        const int few = (int)(n - start < MU_CHUNK ? n - start : MU_CHUNK);
+        const int few = mu_few(n - start);
         const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;
         double in[6][MU_CHUNK];
         for (int i = 0; i < 6; ++i) {
@@ -227,9 +228,9 @@ static void mu_one(const mumacro_data *data, double mu0, double Fz, double k, do
     int8_t source;
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < MU_LANES; ++j) in[i][j] = six[i];
-    mu_chunk_of_cases(data, 1, in, numbers > 7 ? MU_ROWS : MU_ROW_SLOPES, rows, 1, &source);
-    memcpy(out, rows, 5 * sizeof *out);
-    out[5] = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
-    out[6] = source;
-    if (numbers > 7) memcpy(out + 7, rows + MU_ROW_SLOPES, 12 * sizeof *out);
+    mu_chunk_of_cases(data, 1, in, numbers > MU_ONE_SLOPES ? MU_ROWS : MU_ROW_SLOPES, rows, 1, &source);
+    memcpy(out, rows, MU_ROW_SLOPES * sizeof *out);
+    out[MU_ONE_LENGTH] = source < 0 ? NAN : mu_length_scale(mu0, Fz, k);
+    out[MU_ONE_SOURCE] = source;
+    if (numbers > MU_ONE_SLOPES) memcpy(out + MU_ONE_SLOPES, rows + MU_ROW_SLOPES, 12 * sizeof *out);
 }

@@ -7,7 +7,12 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "library.h"
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || defined _M_FP_FAST
+#error "mumacro needs infinities and NaN: compile without -ffast-math, -ffinite-math-only and /fp:fast"
+#endif
+
+#include "data.h"
+#include "records.h"
 #include "lanes.h"
 #include "arithmetic.c"
 #include "closed_forms.c"

@@ -1,8 +1,19 @@
 /* The shared object's functions for one instruction level; compiled once for each. */
 #include "kernel.c"
+#include "library.h"
 
 static void mu_borders(const mumacro_data *data, int64_t n, const double *y, double *crit) {
     for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_at(data, y[i]);
+}
+
+static void mu_places_of(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block, double *a,
+                         double *b) {
+    for (int64_t i = 0; i < n; ++i) {
+        const mu_place at = mu_locate(data, v[i], y[i]);
+        block[i] = (int8_t)at.block;
+        a[i] = at.a;
+        b[i] = at.b;
+    }
 }
 
 static void mu_border_scales(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells) {
@@ -58,6 +69,6 @@ static const mumacro_atlas MU_ATLAS = {
 
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
-    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio, mu_one,
-    mu_borders, mu_forms, mu_border_scales, mu_cell_shares, mu_roots, mu_outers,
+    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio_alone, mu_one,
+    mu_borders, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares, mu_roots, mu_outers,
 };

@@ -1,36 +1,11 @@
-/* What the shared object offers.  mumacro/library.py reads this file too: declarations only, no macros. */
+/* What the shared object offers.  mumacro/library.py reads this file, data.h and records.h too: declarations only, no
+ * macros. */
 #ifndef MU_LIBRARY_H
 #define MU_LIBRARY_H
 #include <stdint.h>
 
-/* One coordinate of a chart or of a piece of the border: its name and its range in a table file. */
-typedef struct {
-    const char *name;
-    double low, high;
-} mumacro_axis;
-
-/* One block: what its nodes hold for mu~; what the bound of mu~ allows for rounding, absolute and per factor. */
-typedef struct {
-    const char *name;
-    int regime;
-    mumacro_axis a, b;
-    const char *tabulated;
-    double floor, rounding;
-} mumacro_chart;
-
-/* One piece of v~crit(y~). */
-typedef struct {
-    const char *name;
-    mumacro_axis axis;
-    const char *tabulated;
-} mumacro_piece;
-
-/* One quantity: its name; its variable in a block of a table file; its meaning; whether it is more than zero in
- * continuous sliding; whether it is smooth in v~ at the border (else it has a square root or a jump there). */
-typedef struct {
-    const char *name, *variable, *meaning;
-    int while_sliding, smooth_at_border;
-} mumacro_quantity;
+#include "data.h"
+#include "records.h"
 
 /* Where blocks meet, and other constants of the atlas (charts.c). */
 typedef struct {
@@ -42,23 +17,6 @@ typedef struct {
     const char *const *source_name, *const *regime_name;
     const signed char *regime_of_source;
 } mumacro_atlas;
-
-/* The cells of one quantity: polynomials (cells, 8, 8), powers of b's coordinate along rows, of a's along columns, both
- * from 7 down to 0; errors of the tabulated q (sources + 1, 2): relative to the factor, absolute; errors in every cell
- * (cells, 3): of q, of its derivatives along a and along b, the largest where these have their share of it. */
-typedef struct {
-    int64_t cells;
-    const double *polynomials, *errors, *slope_errors;
-} mumacro_cells;
-
-/* A table as evaluation reads it.  border: polynomials (.., 8) of v~crit; pieces (3, 4): first cell, offset, step,
- * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused: step *
- * coordinate + offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the two terms
- * of large speed, in cells of ln(1 + y~^2/v~^2). */
-typedef struct {
-    const double *border, *pieces, *blocks, *outer;
-    mumacro_cells quantities[8];
-} mumacro_data;
 
 /* The evaluation for one instruction level.  Arrays are float64 and contiguous; nothing is read or written beyond n.  A
  * single point is an array of one.  Illegal points give NaN and the source -1. */
@@ -83,6 +41,9 @@ typedef struct {
                 int numbers, double *out);
     /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
+    /* blocks of points with 0 < v~, y~ < infinity, and their coordinates, as evaluation counts them; tail_fast has none */
+    void (*places)(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block, double *a,
+                   double *b);
     /* for the builder: base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
     void (*forms)(int quantity, int block, int64_t n, const double *v, const double *y, const double *eta, double *base,
                   double *factor);

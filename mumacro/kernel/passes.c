@@ -3,7 +3,10 @@
  * values.  What the passes do not handle (the corner, closed forms, zero and extreme inputs) is marked and answered one
  * by one.  A single point is a chunk of one, so it has the same bits as in any array. */
 
-enum { MU_CHUNK = 256 }; /* the scratch of the passes stays in the fastest cache */
+#define MU_CHUNK 256 /* the scratch of the passes stays in the fastest cache */
+
+/* How many of n points go into one chunk. */
+MU_INLINE int mu_few(int64_t n) { return n < MU_CHUNK ? (int)n : MU_CHUNK; }
 
 typedef struct {
     double v[MU_CHUNK], y[MU_CHUNK]; /* 1 where a point is not common */
@@ -35,7 +38,7 @@ MU_INLINE void mu_pass_borders(const mumacro_data *data, int n, const double *v,
         common = mu_is_common(speed, amplitude);
         speed = mu_select(common, speed, mu_all(1.0));
         amplitude = mu_select(common, amplitude, mu_all(1.0));
-        found = mu_border_cell(data->pieces, amplitude);
+        found = mu_border_cell(data, amplitude);
         mu_store(c->v + i, speed);
         mu_store(c->y + i, amplitude);
         mu_store(c->ln_y + i, found.ln_y);
@@ -58,7 +61,7 @@ MU_INLINE int mu_pass_places(int n, mu_chunk *c) {
             mu_place_common(mu_load(c->v + i), mu_load(c->y + i), mu_load(c->crit + i), mu_load(c->ln_y + i));
         memcpy(&known, c->block + i, sizeof known);
         block = mu_select_whole(MU_WHERE(known == 0), found.block, known);
-        left |= MU_WHERE(block >= MU_FAST) | MU_WHERE(block == MU_CORNER);
+        left |= MU_WHERE(block >= mu_all_whole(MU_FAST)) | MU_WHERE(block == mu_all_whole(MU_CORNER));
         mu_store(c->a + i, found.a);
         mu_store(c->b + i, found.b);
         mu_store(c->base + i, found.base);
@@ -77,7 +80,7 @@ MU_INLINE int mu_pass_places(int n, mu_chunk *c) {
 MU_INLINE void mu_pass_values(const mumacro_data *data, int n, mu_chunk *c, double *value) {
     const mumacro_cells *cells = &data->quantities[MU_MU_RATIO];
     for (int i = 0; i < n; ++i) {
-        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[i]), cells->cells, c->a[i], c->b[i]);
+        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[i]), 0, cells->cells, c->a[i], c->b[i]);
         c->cell[i] = (int32_t)spot.cell;
         c->a[i] = spot.u;
         c->b[i] = spot.w;
@@ -157,7 +160,7 @@ static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, co
 static void mu_values(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *value,
                       double *bound, int8_t *source) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
-        const int few = (int)(n - i < MU_CHUNK ? n - i : MU_CHUNK);
+        const int few = mu_few(n - i);
         double *error = bound ? bound + i : NULL;
         int8_t *from = source ? source + i : NULL;
         if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, value + i, error, from);
@@ -165,7 +168,7 @@ static void mu_values(const mumacro_data *data, int quantity, int64_t n, const d
     }
 }
 
-static double mu_ratio(const mumacro_data *data, double v, double y) {
+static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
     double mu;
     mu_chunk_of_ratios(data, 1, &v, &y, &mu, NULL, NULL);
     return mu;
@@ -185,7 +188,7 @@ MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const m
 static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
                                 double *out, int64_t stride) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
-        const int few = (int)(n - i < MU_CHUNK ? n - i : MU_CHUNK);
+        const int few = mu_few(n - i);
         mu_chunk c;
         mu_pass_borders(data, few, v + i, y + i, &c);
         mu_pass_places(few, &c);

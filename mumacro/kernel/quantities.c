@@ -38,6 +38,7 @@ typedef struct {
 
 typedef struct {
     double value, along_v, along_y, bound_v, bound_y; /* slopes along ln v~ and ln y~ */
+    double bound; /* of the value, by the errors of its cell; in blocks only */
 } mu_slopes;
 
 typedef struct {

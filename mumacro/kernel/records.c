@@ -70,6 +70,7 @@ static mu_slopes mu_ratio_fast_slopes(const mumacro_data *data, double v, double
     mu_slopes out;
     double bound;
     out.value = mu_fast_ratio(data->outer, v, y, &bound);
+    out.bound = HUGE_VAL;
     out.along_y = outer.first_slope + (outer.second_slope + 0.5 * outer.bend) / speed / speed;
     out.along_v = -(v / speed) * (v / speed) *
                   (out.along_y + (2.0 * outer.second + outer.first_slope) / speed / speed);
@@ -92,6 +93,7 @@ static mu_slopes mu_power_fast_slopes(const mumacro_data *data, double v, double
     mu_slopes out;
     (void)data;
     out.value = power.both;
+    out.bound = HUGE_VAL;
     out.along_v = power.both_v;
     out.along_y = power.both_y;
     out.bound_v = (2.0 * MU_POWER_ROUNDING + 8.0 * MU_NEXT_ORDER * small * small * small * small) * power.both +
@@ -106,7 +108,7 @@ static mu_answer mu_stick_fast(const mumacro_data *data, double v, double y) {
 }
 
 static mu_slopes mu_stick_fast_slopes(const mumacro_data *data, double v, double y) {
-    const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0};
+    const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     (void)data, (void)v, (void)y;
     return none;
 }
@@ -145,7 +147,7 @@ static double mu_power_slack(const mumacro_data *data, const mu_place *at, doubl
 /* What the stick fraction may be off by because v~crit is known to some digits only:
  * |sqrt(x) - sqrt(x - d)| <= d / sqrt(max(x, d)) below the border; above it, sqrt(d - distance) within d of it. */
 static double mu_edge_uncertainty(const mumacro_data *data, const mu_place *at) {
-    const double inside = 1.0 - at->v / at->crit, off = data->pieces[MU_PIECE_ERROR] + MU_ROUNDING;
+    const double inside = 1.0 - at->v / at->crit, off = mu_border_error(data);
     const double slope = mu_min(MU_EDGE_LOW, MU_EDGE_HIGH / sqrt(at->y));
     if (inside > 0.0) return slope * off / sqrt(mu_max(inside, off));
     return off + inside > 0.0 ? slope * sqrt(off + inside) : 0.0;

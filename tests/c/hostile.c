@@ -1,4 +1,5 @@
 /* Every combination of hostile values as the six inputs and as v~, y~, under sanitizers; prints what was answered. */
+#include <math.h>
 #include <stdio.h>
 
 #include "mumacro.h"

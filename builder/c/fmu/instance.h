@@ -145,7 +145,7 @@ EXPORT Status FMI(Reset)(ME) {
 static Instance *instantiate(String name, String token, Logger logger, void *environment) {
     Instance *m;
     if (name == NULL) name = "";
-    if (token == NULL || strcmp(token, MUMACRO_CHECKSUM) != 0) {
+    if (token == NULL || strcmp(token, mumacro_checksum()) != 0) {
         say(logger, environment, name, ERROR, "this token (2.0: guid) is that of another FMU");
         return NULL;
     }

@@ -29,7 +29,7 @@ from mumacro.inputs import FIELDS, UNITS
 from mumacro.table import Table
 from mumacro.version import __version__
 
-from ..header import header_text
+from ..source import header_text
 
 __all__ = ["CompilerError", "write_fmu2", "write_fmu3"]
 

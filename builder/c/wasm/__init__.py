@@ -1,7 +1,7 @@
 """``--format wasm``: a table as a WebAssembly module for a web page, made of the C header.
 
-It is compiled by zig or, where that is not installed, by clang with wasm-ld; it needs no C library.  ``log`` and
-``exp`` are JavaScript's.  Exported are ``memory`` and the functions of ``module.c``.
+It is compiled by zig or, where that is not installed, by clang with wasm-ld; it needs no C library and imports nothing.
+Exported are ``memory`` and the functions of ``module.c``.
 """
 
 from __future__ import annotations
@@ -14,18 +14,17 @@ import tempfile
 from pathlib import Path
 from typing import BinaryIO
 
-from mumacro import charts
 from mumacro.errors import MumacroError
 from mumacro.table import Table
 
-from ..header import header_text, texts
+from ..source import header_text
 
 __all__ = ["WasmError", "compiler", "write_wasm"]
 
 _HERE = Path(__file__).parent
 _OPTIONS = (
-    "-O2", "-std=c99", "-ffreestanding", "-nostdlib", "-fno-math-errno", "-ffp-contract=off", "-mbulk-memory",
-    "-isystem", str(_HERE / "include"), "-Wl,--no-entry", "-Wl,--strip-all",
+    "-Oz", "-std=c99", "-ffreestanding", "-nostdlib", "-fno-math-errno", "-ffp-contract=off", "-mbulk-memory",
+    "-isystem", str(_HERE / "include"), "-Wl,--no-entry", "-Wl,--strip-all", "-Wl,-z,stack-size=262144",
 )  # fmt: skip
 
 
@@ -52,11 +51,10 @@ def write_wasm(table: Table, out: BinaryIO) -> None:
     command = compiler()
     if command is None:
         raise WasmError("WebAssembly needs zig (pip install ziglang), or clang with lld; neither is installed")
-    source = (header_text(table), texts("regime_names", charts.REGIMES), (_HERE / "module.c").read_text("ascii"))
     with tempfile.TemporaryDirectory(prefix="mumacro-") as name:
         folder = Path(name)
-        (folder / "module.c").write_text("\n".join(source), "ascii")
-        words = [*command, *_OPTIONS, "module.c", "-o", "mumacro.wasm"]
+        (folder / "mumacro.h").write_text(header_text(table), "ascii")
+        words = [*command, *_OPTIONS, str(_HERE / "module.c"), "-I.", "-o", "mumacro.wasm"]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         if done.returncode != 0:
             raise WasmError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")

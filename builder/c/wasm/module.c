@@ -1,4 +1,6 @@
 /* What a web page calls: everything about one case as an array of doubles, and texts. */
+#include "mumacro.h"
+
 #define EXPORT(name) __attribute__((export_name(#name)))
 
 static double found[18];
@@ -17,8 +19,8 @@ EXPORT(evaluate) double *evaluate(double mu0, double Fz, double k, double y0, do
     return found;
 }
 
-EXPORT(tolerance) double tolerance(void) { return MUMACRO_TOLERANCE; }
-EXPORT(checksum) const char *checksum(void) { return MUMACRO_CHECKSUM; }
+EXPORT(tolerance) double tolerance(void) { return mumacro_tolerance(); }
+EXPORT(checksum) const char *checksum(void) { return mumacro_checksum(); }
 EXPORT(error_text) const char *error_text(int error) { return mumacro_error_text(error); }
 EXPORT(source_name) const char *source_name(int source) { return mumacro_source_name(source); }
-EXPORT(regime_name) const char *regime_name(int regime) { return regime < 0 ? "illegal" : regime_names[regime]; }
+EXPORT(regime_name) const char *regime_name(int regime) { return mumacro_regime_name(regime); }

@@ -7,7 +7,7 @@ const SLIDES = "continuous";
 const finite = (value) => (Number.isFinite(value) ? value : null);
 
 const bytes = await (await fetch("static/page/mumacro.wasm")).arrayBuffer();
-const { instance: { exports: table } } = await WebAssembly.instantiate(bytes, { Math });
+const { instance: { exports: table } } = await WebAssembly.instantiate(bytes);
 
 /** A text of the module. */
 function text(at) {

@@ -1,0 +1,32 @@
+/* A table as evaluation reads it: arrays of doubles, prepared by mumacro/cells.py. */
+#ifndef MU_DATA_H
+#define MU_DATA_H
+#include <stdint.h>
+
+/* The cells of one quantity, from cell `first` of the blocks' count on: what comes before is zero and not stored.
+ * polynomials (cells, 8, 8): powers of b's coordinate along rows, of a's along columns, both from 7 down to 0;
+ * errors of the tabulated quantity (sources + 1, 2): relative to the factor, absolute; errors in every cell (cells, 3):
+ * of q, of its derivatives along a and along b, the largest where these have their share of it. */
+typedef struct {
+    int64_t first, cells;
+    const double *polynomials, *errors, *slope_errors;
+} mumacro_cells;
+
+/* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, 4): first cell, offset, step,
+ * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused: step *
+ * coordinate + offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the two terms
+ * of large speed, in cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of them is
+ * read. */
+typedef struct {
+    int64_t border_cells;
+    const double *border, *pieces, *blocks, *outer;
+    mumacro_cells quantities[8];
+} mumacro_data;
+
+/* A table as the export writes it: mumacro_table. */
+typedef struct {
+    mumacro_data data;
+    double tolerance;
+    const char *checksum, *version;
+} mumacro_export;
+#endif

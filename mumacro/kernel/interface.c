@@ -1,0 +1,147 @@
+/* The functions of mumacro.h, of the table mumacro_table. */
+
+static const mumacro_data *const MU_TABLE = &mumacro_table.data;
+
+/* A table may hold fewer quantities than there are. */
+static int mu_is_held(int quantity) {
+    return quantity >= 0 && quantity < MU_QUANTITIES && MU_TABLE->quantities[quantity].cells > 0;
+}
+
+/* Value of a quantity at a point, and its bound; NaN where the table does not hold it. */
+static double mu_held_value(int quantity, double v, double y, double *bound) {
+    double value = NAN;
+    *bound = NAN;
+    if (mu_is_held(quantity)) mu_values(MU_TABLE, quantity, 1, &v, &y, &value, bound, NULL);
+    return value;
+}
+
+MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
+                                 mumacro_answer *out) {
+    const mu_inputs in = {mu0, Fz, k, y0, omega, v0};
+    double found[MU_ONE_WITH_SLOPES];
+    if (out == NULL) return MUMACRO_NO_OUTPUT;
+    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, MU_ONE_WITH_SLOPES, found);
+    out->mu_macro = found[MU_ROW_MACRO];
+    out->mu_ratio = found[MU_ROW_RATIO];
+    out->error_bound = found[MU_ROW_BOUND];
+    out->v_tilde = found[MU_ROW_V];
+    out->y_tilde = found[MU_ROW_Y];
+    out->source = (int)found[MU_ONE_SOURCE];
+    out->regime = out->source < 0 ? -1 : MU_REGIME_OF_SOURCE[out->source];
+    memcpy(out->gradient, found + MU_ONE_SLOPES, sizeof out->gradient);
+    memcpy(out->gradient_bound, found + MU_ONE_SLOPES + 6, sizeof out->gradient_bound);
+    return mu_first_bad(&in);
+}
+
+/* Where nothing oscillates there is no border and no power: 0.  Rigid contact has its border at 0. */
+static void mu_cycle_of(const mu_inputs *in, mumacro_cycle *out) {
+    double v, y, length, unit;
+    mu_groups(in, &v, &y);
+    out->stick_fraction = mu_held_value(MU_STICK, v, y, &out->stick_fraction_bound);
+    if (in->y0 == 0.0 || in->omega == 0.0) {
+        out->v0_crit = out->power = out->power_bound = 0.0;
+        return;
+    }
+    if (in->k == HUGE_VAL) {
+        out->v0_crit = 0.0;
+        return;
+    }
+    /* an amplitude that underflows no longer tells whether such a contact sticks */
+    if (y == 0.0 && v < HUGE_VAL) out->stick_fraction_bound = 1.0;
+    if (v == HUGE_VAL || y == HUGE_VAL) return;
+    length = mu_length_scale(in->mu0, in->Fz, in->k);
+    unit = in->mu0 * in->Fz * (length * in->omega);
+    out->v0_crit = length * mu_border_at(MU_TABLE, y) * in->omega;
+    out->power = unit * mu_held_value(MU_POWER, v, y, &out->power_bound);
+    out->power_bound *= unit;
+}
+
+MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y0, double omega, double v0,
+                                       mumacro_cycle *out) {
+    const mumacro_cycle nothing = {NAN, NAN, NAN, NAN, NAN};
+    const mu_inputs in = {mu0, Fz, k, y0, omega, v0};
+    const int error = mu_first_bad(&in);
+    if (out == NULL) return MUMACRO_NO_OUTPUT;
+    *out = nothing;
+    if (!error) mu_cycle_of(&in, out);
+    return error;
+}
+
+MUMACRO_API double mumacro_mu_macro(double mu0, double Fz, double k, double y0, double omega, double v0) {
+    double found[MU_ONE_SLOPES];
+    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, MU_ONE_SLOPES, found);
+    return found[MU_ROW_MACRO];
+}
+
+MUMACRO_API void mumacro_mu_macros(int64_t n, const double *mu0, const double *Fz, const double *k, const double *y0,
+                                   const double *omega, const double *v0, double *mu_macro, double *bound) {
+    static const int64_t strides[6] = {1, 1, 1, 1, 1, 1};
+    for (int64_t i = 0; i < n; i += MU_CHUNK) {
+        const double *const columns[6] = {mu0 + i, Fz + i, k + i, y0 + i, omega + i, v0 + i};
+        const int few = mu_few(n - i);
+        double rows[MU_ROW_V * MU_CHUNK];
+        int8_t source[MU_CHUNK];
+        mu_cases(MU_TABLE, few, columns, strides, MU_ROW_V, rows, MU_CHUNK, source);
+        memcpy(mu_macro + i, rows + MU_ROW_MACRO * MU_CHUNK, (size_t)few * sizeof *rows);
+        if (bound) memcpy(bound + i, rows + MU_ROW_BOUND * MU_CHUNK, (size_t)few * sizeof *rows);
+    }
+}
+
+MUMACRO_API int mumacro_evaluate_point(int quantity, double v_tilde, double y_tilde, mumacro_point *out) {
+    const mumacro_point nothing = {NAN, NAN, NAN, NAN, NAN, NAN, -1};
+    double slopes[5];
+    int8_t source;
+    if (out == NULL) return MUMACRO_NO_OUTPUT;
+    *out = nothing;
+    if (!mu_is_held(quantity)) return MUMACRO_NO_QUANTITY;
+    mu_values(MU_TABLE, quantity, 1, &v_tilde, &y_tilde, &out->value, &out->bound, &source);
+    mu_slopes_of_points(MU_TABLE, quantity, 1, &v_tilde, &y_tilde, slopes, 1);
+    out->slope_v = slopes[1];
+    out->slope_y = slopes[2];
+    out->slope_v_bound = slopes[3];
+    out->slope_y_bound = slopes[4];
+    out->source = source;
+    return source >= 0 ? 0 : v_tilde >= 0.0 ? 2 : 1;
+}
+
+MUMACRO_API int mumacro_values(int quantity, int64_t n, const double *v_tilde, const double *y_tilde, double *value,
+                               double *bound) {
+    if (!mu_is_held(quantity)) return MUMACRO_NO_QUANTITY;
+    mu_values(MU_TABLE, quantity, n, v_tilde, y_tilde, value, bound, NULL);
+    return 0;
+}
+
+MUMACRO_API double mumacro_mu_ratio(double v_tilde, double y_tilde) { return mu_ratio_alone(MU_TABLE, v_tilde, y_tilde); }
+
+MUMACRO_API double mumacro_power(double v_tilde, double y_tilde) {
+    double bound;
+    return mu_held_value(MU_POWER, v_tilde, y_tilde, &bound);
+}
+
+MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde) {
+    double bound;
+    return mu_held_value(MU_STICK, v_tilde, y_tilde, &bound);
+}
+
+MUMACRO_API double mumacro_v_tilde_crit(double y_tilde) { return mu_border_at(MU_TABLE, y_tilde); }
+
+MUMACRO_API const char *mumacro_source_name(int source) {
+    return source < 0 || source >= MU_SOURCES ? "illegal" : MU_SOURCE_NAME[source];
+}
+
+MUMACRO_API const char *mumacro_regime_name(int regime) {
+    return regime < 0 || regime >= MU_REGIMES ? "illegal" : MU_REGIME_NAME[regime];
+}
+
+MUMACRO_API const char *mumacro_error_text(int error) {
+    static const char *const texts[9] = {
+        "there is no such quantity",     "there is no place for the answer", "",
+        "mu0 must be finite and > 0",    "Fz must be finite and > 0",        "k must be finite and > 0, or infinite",
+        "y0 must be finite and >= 0",    "omega must be finite and >= 0",    "v0 must be finite and >= 0",
+    };
+    return error < MUMACRO_NO_QUANTITY || error > 6 ? "there is no such error" : texts[error - MUMACRO_NO_QUANTITY];
+}
+
+MUMACRO_API double mumacro_tolerance(void) { return mumacro_table.tolerance; }
+MUMACRO_API const char *mumacro_checksum(void) { return mumacro_table.checksum; }
+MUMACRO_API const char *mumacro_version(void) { return mumacro_table.version; }

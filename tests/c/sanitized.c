@@ -1,0 +1,181 @@
+/* Every entry of the kernel under sanitizers: random, nasty and illegal inputs, with a real table and with tables of
+ * nonsense.  Arrays are allocated to the last number, so that one too many is seen.  Prints how much was asked. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#define MUMACRO_LEVEL base
+#include "level.c"
+
+extern const mumacro_export mumacro_table;
+
+static const double nasty[] = {
+    -1.0, -0.0, 0.0, 5e-324, 1e-310, 1e-160, 1.0, 1e160, 1.7976931348623157e308, HUGE_VAL, -HUGE_VAL, NAN,
+};
+enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000 };
+
+static uint64_t state = 88172645463325252u;
+
+/* xorshift64, in [0, 1). */
+static double drawn(void) {
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return (double)(state >> 11) * 0x1p-53;
+}
+
+static double scaled(double low, double high) { return pow(10.0, low + (high - low) * drawn()); }
+
+/* A number of any size and kind. */
+static double anything(void) {
+    const double way = drawn(), sign = drawn() < 0.5 ? -1.0 : 1.0;
+    if (way < 0.1) return nasty[(int)(drawn() * NASTY)];
+    if (way < 0.5) return sign * scaled(-2.0, 6.0);
+    return way < 0.6 ? sign * scaled(-320.0, 308.0) : sign * drawn() * 20.0;
+}
+
+static double *numbers(size_t n) {
+    double *made = (double *)malloc(n * sizeof *made);
+    if (made == NULL) exit(2);
+    return made;
+}
+
+static double *nonsense(size_t n) {
+    double *made = numbers(n);
+    for (size_t i = 0; i < n; ++i) made[i] = anything();
+    return made;
+}
+
+static void wrong(const char *what) {
+    printf("wrong: %s\n", what);
+    exit(1);
+}
+
+/* Points v, y through every function of points, in an array of n and alone. */
+static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, const double *v,
+                       const double *y) {
+    double *value = numbers((size_t)n), *bound = numbers((size_t)n), *again = numbers((size_t)n);
+    double *rows = numbers(5 * (size_t)n);
+    int8_t *source = (int8_t *)malloc((size_t)n);
+    for (int quantity = 0; quantity < 3; ++quantity) {
+        kernel->values(data, quantity, n, v, y, value, bound, source);
+        kernel->values(data, quantity, n, v, y, again, NULL, NULL);
+        if (memcmp(value, again, (size_t)n * sizeof *value)) wrong("values without bounds");
+        kernel->values(data, quantity, n, v, y, again, NULL, source);
+        kernel->values(data, quantity, n, v, y, again, bound, NULL);
+        kernel->slopes(data, quantity, n, v, y, rows, n);
+        for (int64_t i = 0; i < n; ++i)
+            if (source[i] < -1 || source[i] >= MU_SOURCES) wrong("a source that there is not");
+    }
+    kernel->values(data, 0, n, v, y, value, bound, source);
+    for (int64_t i = 0; i < n; ++i) {
+        const double alone = kernel->ratio(data, v[i], y[i]);
+        if (memcmp(&alone, value + i, sizeof alone)) wrong("a point alone");
+    }
+    kernel->border(data, n, y, bound);
+    free(value), free(bound), free(again), free(rows), free(source);
+}
+
+/* n cases through every function of cases; where column i is single, all have its first number. */
+static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double *const *columns,
+                      int single) {
+    const size_t size = (size_t)n;
+    double *rows[3] = {numbers(3 * size), numbers(5 * size), numbers(17 * size)};
+    int8_t *source = (int8_t *)malloc(size);
+    int64_t strides[6];
+    for (int i = 0; i < 6; ++i) strides[i] = i == single ? 0 : 1;
+    kernel->cases(data, n, (const double *const *)columns, strides, 3, rows[0], n, source);
+    kernel->cases(data, n, (const double *const *)columns, strides, 5, rows[1], n, source);
+    kernel->cases(data, n, (const double *const *)columns, strides, 17, rows[2], n, source);
+    for (int64_t i = 0; i < n; ++i) {
+        double x[6], *found = numbers(i % 2 ? 19 : 7);
+        for (int j = 0; j < 6; ++j) x[j] = columns[j][i * strides[j]];
+        kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2 ? 19 : 7, found);
+        for (int way = 0; way < 3; ++way)
+            if (memcmp(found, rows[way] + i, sizeof *found)) wrong("a case alone");
+        free(found);
+    }
+    free(rows[0]), free(rows[1]), free(rows[2]), free(source);
+}
+
+/* What the builder calls. */
+static void ask_builder(const mumacro_kernel *kernel, int64_t n, const double *v, const double *y) {
+    double *one = numbers((size_t)n), *two = numbers((size_t)n), *rows = numbers(5 * (size_t)n);
+    for (int quantity = 0; quantity < 3; ++quantity)
+        for (int block = 0; block < MU_CHARTS; ++block) kernel->forms(quantity, block, n, v, y, y, one, two);
+    for (int piece = 0; piece < MU_PIECES; ++piece) kernel->border_scales(piece, n, y, one, two);
+    kernel->normal_form_root(n, v, y, one);
+    kernel->outer_expansion(n, v, rows);
+    kernel->cell_shares(n, v, one, two);
+    free(one), free(two), free(rows);
+}
+
+static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, double (*number)(int),
+                    int single) {
+    double *columns[6];
+    for (int i = 0; i < 6; ++i) columns[i] = numbers(i == single ? 1 : (size_t)n);
+    for (int64_t j = 0; j < n; ++j)
+        for (int i = 0; i < 6; ++i) columns[i][i == single ? 0 : j] = number(i);
+    ask_cases(kernel, data, n, columns, single);
+    if (single < 0) ask_points(kernel, data, n, columns[5], columns[3]);
+    if (single < 0) ask_builder(kernel, n, columns[5], columns[3]);
+    for (int i = 0; i < 6; ++i) free(columns[i]);
+}
+
+/* Inputs whose groups fall into every block. */
+static double ordinary(int input) {
+    static const double low[6] = {-1.0, -1.0, 3.0, -9.0, 1.0, -7.0}, high[6] = {0.3, 4.0, 9.0, -2.0, 6.0, 2.0};
+    return drawn() < 0.02 ? anything() : scaled(low[input], high[input]);
+}
+
+/* Every combination of nasty numbers, one after the other. */
+static double combined(int input) {
+    static uint64_t code, rest;
+    if (input == 0) rest = (code += 7); /* 7 and 12 share no divisor */
+    else rest /= NASTY;
+    return nasty[rest % NASTY];
+}
+
+static double any(int input) { return (void)input, anything(); }
+
+static void ask_nonsense(const mumacro_kernel *kernel) {
+    mumacro_data data;
+    double *held[13];
+    int n = 0;
+    memset(&data, 0, sizeof data);
+    data.border_cells = 1 + (int)(drawn() * 30);
+    data.border = held[n++] = nonsense(8 * (size_t)data.border_cells);
+    data.pieces = held[n++] = nonsense(MU_PIECES * MU_PIECE_COLUMNS);
+    data.blocks = held[n++] = nonsense((MU_SOURCES + 1) * MU_BLOCK_COLUMNS);
+    data.outer = held[n++] = nonsense(MU_OUTER_CELLS * 16);
+    for (int i = 0; i < 3; ++i) {
+        mumacro_cells *cells = &data.quantities[i];
+        cells->first = (int64_t)(drawn() * 20.0);
+        cells->cells = 1 + (int)(drawn() * 20.0);
+        cells->polynomials = held[n++] = nonsense(64 * (size_t)cells->cells);
+        cells->errors = held[n++] = nonsense((MU_SOURCES + 1) * 2);
+        cells->slope_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
+    }
+    ask_all(kernel, &data, 61, ordinary, -1);
+    ask_all(kernel, &data, 19, any, -1);
+    while (n) free(held[--n]);
+}
+
+int main(int count, char **words) {
+    static const int64_t lengths[] = {0, 1, 7, 8, 255, 256, 257, LONGEST};
+    const mumacro_kernel *kernel = &mumacro_kernel_base;
+    const long random = count > 1 ? atol(words[1]) : 300000, hostile = count > 2 ? atol(words[2]) : 172800;
+    const long tables = count > 3 ? atol(words[3]) : 1000;
+    long asked = 0, combinations = 0;
+    for (int i = 0; asked < random; ++i) {
+        const int64_t n = lengths[i % 8];
+        ask_all(kernel, &mumacro_table.data, n, ordinary, i % 7 - 1);
+        asked += (long)n;
+    }
+    while (combinations < hostile) {
+        ask_all(kernel, &mumacro_table.data, LONGEST, combined, -1);
+        combinations += LONGEST;
+    }
+    for (long i = 0; i < tables; ++i) ask_nonsense(kernel);
+    printf("random %ld nasty %ld tables %ld lanes %d\n", asked, combinations, tables, MU_LANES);
+    return 0;
+}
