@@ -65,7 +65,7 @@ def many_nodes(table: Table) -> None:
 
 def many_cells(table: Table) -> None:
     for block in table.blocks:
-        block.cells = (1000, 1000)
+        block.cells, block.cell_errors = (1000, 1000), {}
 
 
 def huge_numbers(table: Table) -> None:

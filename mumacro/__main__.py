@@ -65,10 +65,11 @@ REGIME_WORDS = {
 }
 
 
-def _add_table(parser: OneLineParser) -> None:
-    text = (
-        "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest bundled table"
-    )
+def _add_table(parser: OneLineParser, words: str | None = None) -> None:
+    """The options of all commands that answer, after the inputs, if there are any, explained by ``words``."""
+    if words is not None:
+        parser.add_argument("words", nargs="+", metavar="name=value", help=words)
+    text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -91,10 +92,9 @@ def _lines(rows: Iterable[Sequence[str]]) -> str:
 
 def _one_case(words: Sequence[str]) -> str:
     parser = OneLineParser(prog="mumacro", description=OVERVIEW + INPUTS)
-    parser.add_argument("words", nargs="+", metavar="name=value", help="the six inputs, quoted together or apart")
+    _add_table(parser, "the six inputs, quoted together or apart")
     parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
-    _add_table(parser)
     chosen = parser.parse_intermixed_args(words)
     case = read_case(chosen.words)
     surrogate = open_table(chosen.table)
@@ -122,14 +122,13 @@ def _law(words: Sequence[str]) -> str:
         description="mu_macro over a range of one input, with the static value and the border of continuous sliding.",
         epilog=f"{INPUTS}\nexample:\n  {LAW}",
     )
-    parser.add_argument("words", nargs="+", metavar="name=value", help="the other five inputs")
+    _add_table(parser, "the other five inputs")
     parser.add_argument("--along", choices=NAMES, default="v0", help="the swept input; default: v0")
     parser.add_argument("--from", dest="start", required=True, help="first value, in its SI unit or with a unit")
     parser.add_argument("--to", dest="stop", required=True, help="last value, in its SI unit or with a unit")
     parser.add_argument("--points", type=int, default=25, help="number of values; default: 25")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
     parser.add_argument("--approximations", action="store_true", help="also print the approximations of the article")
-    _add_table(parser)
     chosen = parser.parse_intermixed_args(words)
     along, (inner, scale), unit = chosen.along, _inner(chosen.along), SI[chosen.along][0]
     case = read_case(chosen.words, along)
@@ -165,12 +164,11 @@ def _solve_for(words: Sequence[str]) -> str:
         epilog=f"{INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {SOLVE_FOR}",
     )
     parser.add_argument("unknown", choices=NAMES, help="the unknown input")
-    parser.add_argument("words", nargs="+", metavar="name=value", help="the other five inputs")
+    _add_table(parser, "the other five inputs")
     parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
-    _add_table(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, (inner, scale), unit = chosen.unknown, _inner(chosen.unknown), SI[chosen.unknown][0]
     case = read_case(chosen.words, unknown)

@@ -310,9 +310,9 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
     assert isinstance(found, frames.DataFrame)
     assert found.npartitions == 3
     pd.testing.assert_frame_equal(found.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0))
-    with pytest.raises(InputError, match="^v0 must be given once"):
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(lazy, Fz=10.0, v0=0.01)
-    with pytest.raises(InputError, match="^Fz must be given"):
+    with pytest.raises(InputError, match=r"^Fz must be given"):
         table.evaluate(lazy)
     with pytest.raises(InputError, match=r"^v0 must be a Dask array: .to_dask_array"):
         table.evaluate(**{**CASE, "v0": lazy["v0"]})

@@ -5,6 +5,7 @@ The inputs of one call come from one of these libraries, with plain numbers and 
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -94,7 +95,8 @@ def evaluate_labelled(
     def certain(v: Any, y: Any) -> Any:
         return apply(lambda *both: [table._certain(*both)], {"v_tilde": v, "y_tilde": y}, ["regime_certain"])[0]
 
-    answer: Answer[Any] = Answer(*(found[name] for name in names[:4]), look_up=look_up)
+    mu_macro, mu_ratio, bound, code = (found[name] for name in names[:4])
+    answer = Answer(mu_macro, mu_ratio, bound, code, look_up=look_up)
     if groups or gradient:
         answer._groups, answer._certain = (found["v_tilde"], found["y_tilde"], found["length_scale"]), certain
     if gradient:
@@ -103,7 +105,8 @@ def evaluate_labelled(
     if kinds[""] not in ("pandas", "xarray"):
         return answer
     columns = {name: getattr(answer, name) for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source")}
-    return _whole(kinds[""], columns)
+    whole = importlib.import_module(kinds[""])
+    return whole.DataFrame(columns) if library == "pandas" else whole.Dataset(columns)
 
 
 def _parts(table: Surrogate, cases: Any, options: dict[str, Any]) -> Any:
@@ -112,17 +115,6 @@ def _parts(table: Surrogate, cases: Any, options: dict[str, Any]) -> Any:
 
     empty = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in cases.dtypes.items()})
     return cases.map_partitions(table.evaluate, meta=table.evaluate(empty, **options), **options)
-
-
-def _whole(library: str, columns: dict[str, Any]) -> Any:
-    """A DataFrame or a Dataset."""
-    if library == "pandas":
-        import pandas as pd
-
-        return pd.DataFrame(columns)
-    import xarray as xr
-
-    return xr.Dataset(columns)
 
 
 # --- a function of arrays, applied to labelled objects: one result for each name --------------------------
