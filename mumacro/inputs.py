@@ -279,7 +279,8 @@ def _rigid_as_infinity(value: Any) -> Any:
         return value
     try:
         texts = np.asarray(value, dtype=object)
-        return np.array([math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]).reshape(texts.shape)
+        read = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
+        return np.array(read).reshape(texts.shape)
     except ValueError:  # lists of several lengths
         return value
 
