@@ -162,6 +162,16 @@ def block_rows(blocks: Sequence[Block]) -> Array:
     return rows
 
 
+@functools.cache
+def _older() -> Array:
+    """What the errors of slopes of an older table are multiplied by to stand for those of cells (3,).
+
+    They hold for q and its derivatives together, anywhere in a block; of a cell's errors derivatives have a share.
+    """
+    least = min(share.min() for share in kernels[-1].cell_shares(np.linspace(-1.0, 1.0, 201)))
+    return np.array([1.0, 1.0 / least, 1.0 / least])
+
+
 def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
     """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors in every cell."""
     name, errors = charts.QUANTITY_NAMES[quantity], np.zeros((len(charts.SOURCES) + 1, 2))
@@ -176,8 +186,7 @@ def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array
         error[0] = value
         if quantity == charts.MU:
             error += chart.rounding, chart.floor
-        # an older table's errors of slopes hold for q and both derivatives together, over the whole block
-        in_cells.append(block.cell_errors.get(name, np.full((cells, 3), max(of_slopes))))
+        in_cells.append(block.cell_errors.get(name, np.full((cells, 3), max(of_slopes)) * _older()))
     return _joined(patches), errors, np.concatenate(in_cells)
 
 

@@ -172,7 +172,7 @@ def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float]
     w, out, orbit, res = workspace()
     for vi, yi in zip(v, y, strict=True):
         assert solve_raw(vi, yi, yi - 1.0, w, out, orbit, res) == OK
-        mu, deficit, regime, stick, power, path, _ = res
+        mu, deficit, stick, power, regime, path, _ = res
         assert 0.0 <= mu <= 1.0
         assert 0.0 <= deficit <= 1.0
         assert mu + deficit == close(1.0, abs=1e-15)

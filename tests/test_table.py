@@ -281,7 +281,7 @@ def test_a_table_without_names_of_quantities_and_errors_of_cells_opens(tmp_path:
             np.testing.assert_array_equal(ours, theirs)
         ours, theirs = (np.array(table.slopes(v, y, name, bounds=True)) for table in (opened, sound))
         np.testing.assert_array_equal(ours[:3], theirs[:3])
-        # a bound that holds for a whole block is the larger one, but for the share that a derivative has in its cell
+        # a bound that holds for a whole block is the larger one
         assert np.all(ours[3:] >= theirs[3:])
 
 
