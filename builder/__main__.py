@@ -2,185 +2,197 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
+from argparse import ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
 
-from mumacro import InputError, MumacroError, Surrogate
+from mumacro import InputError, Surrogate
+from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
 from mumacro.extras import missing
 from mumacro.processors import processors
 from mumacro.writing import alone_in
 
-try:
-    import typer
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from .assemble import ABS_TO_REL, MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
-    from .export import FORMATS, export_table
-    from .figures import FiguresError, draw_figures
-    from .steady import solve as solve_one
-    from .sweep import SolveError, Sweep
-    from .verify import uncovered
-    from .verify import verify as verify_table
-except ModuleNotFoundError as error:
-    raise SystemExit(f"python -m builder: {missing('builder', error)}") from None
-
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
+__all__ = ["main"]
 
 
-def _fail(message: str, code: int = 1) -> typer.Exit:
-    print(f"error: {message}", file=sys.stderr)
-    return typer.Exit(code)
-
-
-def _json(value: object) -> str:
-    """JSON without NaN: what is not defined is null."""
-
-    def clean(item: Any) -> Any:
-        if isinstance(item, dict):
-            return {key: clean(entry) for key, entry in item.items()}
-        return None if isinstance(item, float) and not math.isfinite(item) else item
-
-    return json.dumps(clean(value), indent=2)
-
-
-@app.command()
-def build(
-    out: Annotated[Path, typer.Option(help="The netCDF file to write.")],
-    tolerance: Annotated[
-        float, typer.Option(help="Largest absolute error of mu_macro/mu0; the relative one may be 10 times it.")
-    ] = 1e-8,
-    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = processors(),
-) -> None:
-    """Build a table; a killed build resumes from OUT.checkpoint and gives the same data."""
-    if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
-        raise typer.BadParameter(
-            f"must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}", param_hint="--tolerance"
-        )
-    if not out.parent.is_dir():
-        raise typer.BadParameter(f"folder {str(out.parent)!r} does not exist", param_hint="--out")
-    if out.is_dir():
-        raise typer.BadParameter(f"{str(out)!r} is a folder", param_hint="--out")
-    console = Console(stderr=True)
+@contextmanager
+def _bar(stages: int) -> Iterator[Callable[[str, bool], None]]:
+    """A bar on stderr; nothing where rich is not installed."""
+    try:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    except ModuleNotFoundError:
+        yield lambda _text, _done: None
+        return
     columns = (TextColumn("{task.description:<32}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("border", total=stages)
+        yield lambda text, done: bar.update(task, description=text, advance=1 if done else 0)
+
+
+def _place(out: Path, folder: bool = False) -> None:
+    """Refuse a place for a result whose folder is missing, or a folder in place of a file."""
+    if not out.parent.is_dir():
+        raise UsageError(f"--out {out}: folder {str(out.parent)!r} does not exist")
+    if out.is_dir() and not folder:
+        raise UsageError(f"--out {out} is a folder")
+
+
+def _build(chosen: Namespace) -> str:
+    from .assemble import MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
+    from .sweep import SolveError, Sweep
+
+    out, tolerance = chosen.out, chosen.tolerance
+    if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
+        raise UsageError(f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}")
+    _place(out)
+    checkpoint = out.with_name(out.name + ".checkpoint")
     try:
-        checkpoint = out.with_name(out.name + ".checkpoint")
-        with (
-            alone_in(checkpoint),
-            Sweep(workers, checkpoint) as sweep,
-            Progress(*columns, console=console) as bar,
-        ):
-            task = bar.add_task("border", total=stages())
-
-            def progress(text: str, done: bool) -> None:
-                bar.update(task, description=text, advance=1 if done else 0)
-
+        with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep, _bar(stages()) as progress:
             surrogate = build_table(out, tolerance, sweep, progress)
-            solves = sweep.n_solves
-    except (MumacroError, BuildError, SolveError) as error:
-        raise _fail(str(error)) from error
-    except OSError as error:
-        raise _fail(f"{error.filename or out}: {error.strerror or error}") from error
-    print(
-        _json(
-            {
-                "table": str(out),
-                "tolerance": tolerance,
-                "verified_max_abs_error": surrogate.max_abs_error,
-                "verified_max_rel_error": surrogate.max_rel_error,
-                "n_solves": solves,
-                "bytes": out.stat().st_size,
-                "content_sha256": surrogate.checksum,
-            }
-        )
-    )
+    except (BuildError, SolveError) as error:
+        raise ImpossibleError(str(error)) from error
+    return as_json({
+        "table": str(out), "tolerance": tolerance, "verified_max_abs_error": surrogate.max_abs_error,
+        "verified_max_rel_error": surrogate.max_rel_error, "n_solves": sweep.n_solves, "bytes": out.stat().st_size,
+        "content_sha256": surrogate.checksum,
+    })  # fmt: skip
 
 
-@app.command()
-def solve(
-    v: Annotated[float, typer.Option("--v", help="Dimensionless speed v~, from 1e-60 to 1e10.")],
-    y: Annotated[float, typer.Option("--y", help="Dimensionless amplitude y~, from 1e-15 to 1e14.")],
-) -> None:
-    """Solve the full model once and print the steady cycle as JSON."""
+def _solve(chosen: Namespace) -> int:
+    from .steady import solve
+
     try:
-        steady = solve_one(v, y)
+        steady = solve(chosen.v, chosen.y)
     except InputError as error:
         option = {"v_tilde": "--v", "y_tilde": "--y"}[error.field]
-        raise typer.BadParameter(f"must be {error.bound}, got {error.value!r}", param_hint=option) from None
-    print(_json({"v_tilde": v, "y_tilde": y, **asdict(steady)}))
-    if not steady.ok:
-        raise typer.Exit(1)
+        raise UsageError(f"{option} must be {error.bound}, got {error.value!r}") from None
+    print(as_json({"v_tilde": chosen.v, "y_tilde": chosen.y, **asdict(steady)}))
+    return 0 if steady.ok else 1
 
 
-@app.command()
-def verify(
-    table: Annotated[Path, typer.Argument(help="A table file.")],
-    points: Annotated[int, typer.Option(min=100, max=10_000_000, help="Fresh solves to compare with.")] = 20_000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the drawn points.")] = 1,
-    workers: Annotated[int, typer.Option(min=1, max=1024, help="Threads on this machine.")] = processors(),
-) -> None:
-    """Compare a table with fresh solves; exit code 1 when it misses its own tolerance."""
+def _verify(chosen: Namespace) -> int:
+    from .assemble import ABS_TO_REL
+    from .sweep import SolveError, Sweep
+    from .verify import uncovered, verify
+
+    surrogate = Surrogate.open(chosen.table)
     try:
-        surrogate = Surrogate.open(table)
-        with Sweep(workers) as sweep:
-            report = verify_table(surrogate, sweep, points, seed)
-    except (MumacroError, SolveError, OSError) as error:
-        raise _fail(str(error)) from error
+        with Sweep(chosen.workers) as sweep:
+            report = verify(surrogate, sweep, chosen.points, chosen.seed)
+    except SolveError as error:
+        raise ImpossibleError(str(error)) from error
     report["tolerance"] = surrogate.tolerance
     report["holds"] = (
         report["max_abs_error"] <= surrogate.tolerance
         and report["max_rel_error"] <= ABS_TO_REL * surrogate.tolerance
         and not any(uncovered(report).values())
     )
-    print(_json(report))
+    print(as_json(report))
     if not report["holds"]:
-        raise _fail(f"{table} misses its tolerance of {surrogate.tolerance:g} or a bound")
+        raise ImpossibleError(f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound")
+    return 0
 
 
-@app.command()
-def export(
-    table: Annotated[Path, typer.Argument(help="A table file.")],
-    kind: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="The file to write, for c also a folder; left out: the table's name with another suffix."),
-    ] = None,
-) -> None:
-    """Write the table for other tools; print what was written as JSON."""
+def _export(chosen: Namespace) -> str:
+    which, kind, out = chosen.path or chosen.table, chosen.format, chosen.out
+    if kind == "c":  # which needs no further package
+        from .c.source import DEFAULT_TOLERANCE, write_c
+
+        surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
+        written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
+        return as_json({"table": str(surrogate.path), "format": kind, "out": written})
+    from .export import FORMATS, export_table
+
     if kind not in FORMATS:
-        raise typer.BadParameter(f"must be one of {', '.join(FORMATS)}, got {kind!r}", param_hint="--format")
-    target = Path(FORMATS[kind][0].format(table.stem)) if out is None else out
-    if target.is_dir() and kind != "c":
-        raise typer.BadParameter(f"{str(target)!r} is a folder", param_hint="--out")
-    try:
-        found = export_table(table, kind, target)
-    except (MumacroError, OSError) as error:
-        raise _fail(str(error)) from error
-    shape = list(found.mu_ratio.shape)
-    print(_json({"table": str(table), "format": kind, "out": str(target), "shape": shape}))
+        raise UsageError(f"--format must be one of {', '.join(FORMATS)}, got {kind!r}")
+    path = open_table(which).path
+    out = out or Path(FORMATS[kind][0].format(path.stem))
+    if out.is_dir():
+        raise UsageError(f"--out {out} is a folder")
+    shape = export_table(path, kind, out).mu_ratio.shape
+    return as_json({"table": str(path), "format": kind, "out": str(out), "shape": shape})
 
 
-@app.command()
-def figures(
-    out: Annotated[Path, typer.Option(help="The folder to write to.")],
-    table: Annotated[Path | None, typer.Option(help="The table that lines come from; left out: the tightest.")] = None,
-) -> None:
-    """Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG; print what was written as JSON."""
-    if not out.is_dir():
-        raise typer.BadParameter(f"folder {str(out)!r} does not exist", param_hint="--out")
+def _figures(chosen: Namespace) -> str:
+    from .figures import FiguresError, draw_figures
+
+    _place(chosen.out, folder=True)
+    surrogate = Surrogate.open(chosen.table)
+    chosen.out.mkdir(exist_ok=True)
     try:
-        surrogate = Surrogate.open(table)
-        written = draw_figures(surrogate, out)
+        written = draw_figures(surrogate, chosen.out)
     except FiguresError as error:
-        raise _fail(str(error), 2) from error
-    except (MumacroError, OSError) as error:
-        raise _fail(str(error)) from error
-    print(_json({"table": str(surrogate.path), "figures": [str(path) for path in written]}))
+        raise UsageError(str(error)) from error
+    return as_json({"table": str(surrogate.path), "figures": list(map(str, written))})
+
+
+def _whole(low: int, high: float = math.inf) -> Callable[[str], int]:
+    """The type of an argument: a whole number within bounds."""
+
+    def number(text: str) -> int:
+        if text.isdecimal() and low <= int(text) <= high:
+            return int(text)
+        raise ArgumentTypeError(f"must be a whole number from {low} to {high}, got {text!r}")
+
+    return number
+
+
+def _parser(prog: str) -> OneLineParser:
+    text = "exit codes: 0 done, 1 no result or a tolerance missed, 2 wrong arguments"
+    parser = OneLineParser(prog=prog, description="Build, verify, query and export tables offline.", epilog=text)
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def command(run: Callable[[Namespace], int | str], text: str) -> OneLineParser:
+        name = run.__name__.strip("_")
+        made = commands.add_parser(name, help=text, description=text)
+        made.set_defaults(run=run, title=made.prog)
+        return made
+
+    def add_workers(made: OneLineParser) -> None:
+        made.add_argument("--workers", type=_whole(1, 1024), default=processors(), help="threads; default: %(default)s")
+
+    one = command(_build, "Build a table; a killed build resumes from OUT.checkpoint and gives the same data.")
+    one.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
+    text = "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: %(default)s"
+    one.add_argument("--tolerance", type=float, default=1e-8, help=text)
+    add_workers(one)
+    one = command(_solve, "Solve the full model once and print the steady cycle as JSON.")
+    one.add_argument("--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10")
+    one.add_argument("--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14")
+    one = command(_verify, "Compare a table with fresh solves; exit code 1 when it misses its own tolerance.")
+    one.add_argument("table", type=Path, help="a table file")
+    text = "fresh solves to compare with; default: %(default)s"
+    one.add_argument("--points", type=_whole(100, 10_000_000), default=20_000, help=text)
+    one.add_argument("--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s")
+    add_workers(one)
+    one = command(_export, "Write a table for other tools; print what was written as JSON.")
+    one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
+    text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"
+    one.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
+    one.add_argument("--format", required=True, help="c, csv, fmu, fmu3, mat, modelica, parquet or wasm")
+    text = "the file to write; for c a header .h or a folder for three files; default: here, by the name of the table"
+    one.add_argument("--out", type=Path, help=text)
+    one = command(_figures, "Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG.")
+    one.add_argument("--out", type=Path, required=True, help="the folder to write to; it is made where it is missing")
+    one.add_argument("--table", type=Path, help="the table that lines come from; default: the tightest")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None, prog: str = "python -m builder") -> int:
+    """Run the command; return the exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    chosen = _parser(prog).parse_args(words or ["--help"])
+    try:
+        return run(chosen.title, chosen.run, chosen)
+    except ModuleNotFoundError as error:
+        print(f"{chosen.title}: {missing('builder', error)}", file=sys.stderr)
+        return 1
 
 
 if __name__ == "__main__":
-    app()
+    sys.exit(main())

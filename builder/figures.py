@@ -25,6 +25,8 @@ __all__ = ["FIGURES", "FiguresError", "draw_figures"]
 Array = NDArray[np.float64]
 INK, SOFT, RED, BLUE, GREEN = "#1f2328", "#8c959f", "#c1272d", "#1f6fb4", "#2c8a57"
 SIZE, DPI = (7.2, 4.6), 110
+STYLE: dict[Any, Any] = {"font.size": 11, "axes.edgecolor": INK, "legend.framealpha": 0.9, "legend.fontsize": 10}
+V, Y, MU = r"$\tilde v_0 = v_0/(l_0\omega)$", r"$\tilde y_0 = y_0/l_0$", r"$\tilde\mu_\mathrm{macro}$"
 
 
 class FiguresError(RuntimeError):
@@ -45,14 +47,13 @@ def _regions(s: Surrogate, axes: Any) -> None:
     axes.fill_between(y, 0.0, crit, color="#f6e7df", lw=0)
     axes.plot(y, crit, color=INK, lw=3.0, label="border, exact")
     v = np.linspace(0.0, 2.5, 201)
-    axes.plot(
-        np.hypot(1.0, v), v, color=SOFT, lw=1.6, ls="--", label=r"(20) as an equality, $\tilde y = \sqrt{1+\tilde v^2}$"
-    )
+    equality = r"(20) as an equality, $\tilde y = \sqrt{1+\tilde v^2}$"
+    axes.plot(np.hypot(1.0, v), v, color=SOFT, lw=1.6, ls="--", label=equality)
     axes.text(1.75, 2.1, "continuous sliding", ha="right", fontsize=13)
     axes.text(4.1, 0.6, "stick and slip", ha="center", fontsize=13)
     axes.text(0.45, 0.75, "small angles", ha="center", color="#59636e")
     axes.text(3.6, 1.6, "large angles", ha="center", color="#59636e")
-    _plane(axes, 5.0, 2.5, "lower right")
+    _frame(axes, (5.0, Y), (2.5, V))
 
 
 def _small_border(_: Surrogate, axes: Any) -> None:
@@ -62,7 +63,7 @@ def _small_border(_: Surrogate, axes: Any) -> None:
     axes.plot(y, closed_forms.border_24(y), color=BLUE, lw=2.0, label="(24)")
     axes.plot(y, closed_forms.border_23(y), color=GREEN, lw=1.4, ls="--", label="(23), of which (24) is an expansion")
     axes.plot(dots, _solved(dots)[0], "o", color=INK, ms=5, label="exact, solved")
-    _plane(axes, 1.02, 0.4, "upper left")
+    _frame(axes, (1.02, Y), (0.4, V), "upper left")
 
 
 def _whole_border(_: Surrogate, axes: Any) -> None:
@@ -82,7 +83,7 @@ def _whole_border(_: Surrogate, axes: Any) -> None:
     inset.set_xlabel(r"$\tilde y$", fontsize=9, labelpad=1)
     inset.set_title("formula over exact, less 1 [%]", fontsize=9, pad=3)
     inset.tick_params(labelsize=8)
-    _plane(axes, 10.2, 1.7, "upper left")
+    _frame(axes, (10.2, Y), (1.7, V), "upper left")
 
 
 def _surface(s: Surrogate, axes: Any) -> None:
@@ -100,7 +101,7 @@ def _surface(s: Surrogate, axes: Any) -> None:
     axes.plot(y, s.v_tilde_crit(y), color=RED, lw=3.0, label="border")
     bar = axes.figure.colorbar(shown, ax=axes, pad=0.02, ticks=np.linspace(0.0, 1.0, 11))
     bar.set_label(r"$\tilde\mu = \mu_\mathrm{macro}/\mu_0$")
-    _plane(axes, 2.0, 1.5, "upper left")
+    _frame(axes, (2.0, Y), (1.5, V), "upper left")
 
 
 def _cuts(s: Surrogate, axes: Any) -> None:
@@ -115,23 +116,10 @@ def _cuts(s: Surrogate, axes: Any) -> None:
         axes.text(2.02, float(s.mu_ratio(2.0, y)), label, va="center", fontsize=10, color=INK)
     at, top = _solved(amplitudes[1:])
     axes.plot(at, top, "o", color=RED, ms=5, label=r"border: $\tilde\mu(\tilde v_\mathrm{crit})$, solved")
-    axes.plot(
-        np.zeros(11),
-        closed_forms.static_limit(amplitudes[:11]),
-        "s",
-        color=GREEN,
-        ms=5.5,
-        clip_on=False,
-        label="static value (16)",
-    )
+    static = closed_forms.static_limit(amplitudes[:11])
+    axes.plot(np.zeros(11), static, "s", color=GREEN, ms=5.5, clip_on=False, label="static value (16)")
     axes.plot([], [], color=INK, lw=2.8, label=r"$\tilde y = 1$")
-    axes.set(
-        xlim=(0.0, 2.0),
-        ylim=(0.0, 1.03),
-        xlabel=r"$\tilde v_0 = v_0/(l_0\omega)$",
-        ylabel=r"$\tilde\mu_\mathrm{macro}$",
-    )
-    axes.legend(loc="lower right")
+    _frame(axes, (2.0, V), (1.03, MU))
 
 
 def _master_curve(s: Surrogate, axes: Any) -> None:
@@ -144,19 +132,12 @@ def _master_curve(s: Surrogate, axes: Any) -> None:
         axes.plot(x, rise, color=BLUE, lw=1.0, label=None if y > 0.15 else r"exact, $\tilde y$ = 0.1, 0.2, ..., 0.9")
     axes.text(0.3, float(np.interp(0.3, x, rise)) + 0.01, r"$\tilde y$ = 0.9", ha="right", va="bottom", fontsize=10)
     inside = np.linspace(0.0, 1.0, 201)
-    axes.plot(
-        inside,
-        closed_forms.master_curve_limit(inside),
-        color=INK,
-        lw=2.2,
-        ls=(0, (4, 2)),
-        label=r"$N_0$, the limit $\tilde y \to 0$",
-    )
+    limit = closed_forms.master_curve_limit(inside)
+    axes.plot(inside, limit, color=INK, lw=2.2, ls=(0, (4, 2)), label=r"$N_0$, the limit $\tilde y \to 0$")
     crosses = np.linspace(0.0, 1.0, 21)
     axes.plot(crosses, closed_forms.master_curve(crosses), "x", color=RED, ms=7, mew=1.6, label="(28)")
-    axes.set(xlim=(0.0, 2.0), ylim=(0.0, 1.12), xlabel=r"$\tilde v_0/\tilde v_{0,\mathrm{crit}}$")
-    axes.set_ylabel(r"$(\tilde\mu - \tilde\mu_\mathrm{static})/(\tilde\mu_\mathrm{crit} - \tilde\mu_\mathrm{static})$")
-    axes.legend(loc="lower right")
+    share = r"$(\tilde\mu - \tilde\mu_\mathrm{static})/(\tilde\mu_\mathrm{crit} - \tilde\mu_\mathrm{static})$"
+    _frame(axes, (2.0, r"$\tilde v_0/\tilde v_{0,\mathrm{crit}}$"), (1.12, share))
 
 
 def _large_amplitudes(s: Surrogate, axes: Any) -> None:
@@ -181,13 +162,7 @@ def _large_amplitudes(s: Surrogate, axes: Any) -> None:
         label = r"$\tilde y$ = 0.8" if y == 0.8 else f"{y:g}"
         axes.text(where, float(s.mu_ratio(where * y, y)) + 0.012, label, fontsize=10, ha="center", va="bottom")
     axes.text(0.75, float(s.mu_ratio(60.0, 80.0)) - 0.045, "80", fontsize=10)
-    axes.set(
-        xlim=(0.0, 2.0),
-        ylim=(0.0, 1.03),
-        xlabel=r"$\tilde v_0/\tilde y_0 = v_0/(\omega y_0)$",
-        ylabel=r"$\tilde\mu_\mathrm{macro}$",
-    )
-    axes.legend(loc="lower right")
+    _frame(axes, (2.0, r"$\tilde v_0/\tilde y_0 = v_0/(\omega y_0)$"), (1.03, MU))
 
 
 def _dimensional_law(s: Surrogate, axes: Any) -> None:
@@ -206,34 +181,20 @@ def _dimensional_law(s: Surrogate, axes: Any) -> None:
             axes.plot([0.0], [law.mu_static[0]], "s", color=INK, ms=6, clip_on=False)
             at = float(border_speeds(s, law, case)["eq_24"][0])
             axes.plot([at], [paper["critical"][0]], "x", color=RED, ms=8, mew=2.0, label="(39), (40)")
-            axes.annotate(
-                "border",
-                (mark.value, mark.mu_macro),
-                (0.045, 0.402),
-                arrowprops={"arrowstyle": "-", "color": SOFT},
-            )
-            axes.annotate(
-                "static value (38)",
-                (0.0, law.mu_static[0]),
-                (0.018, 0.345),
-                arrowprops={"arrowstyle": "-", "color": SOFT},
-            )
+            line = {"arrowstyle": "-", "color": SOFT}
+            axes.annotate("border", (mark.value, mark.mu_macro), (0.045, 0.402), arrowprops=line)
+            axes.annotate("static value (38)", (0.0, law.mu_static[0]), (0.018, 0.345), arrowprops=line)
         else:
             axes.plot(v0, paper["rigid"], color=RED, lw=1.6, ls=":", label="(37)")
     axes.axhline(0.5, color=SOFT, lw=0.9)
     axes.text(0.249, 0.504, r"$\mu_0$", ha="right", va="bottom")
-    axes.set(
-        xlim=(0.0, 0.25),
-        ylim=(0.0, 0.53),
-        xlabel=r"$v_0$ [m/s]   ($l_0$ = 1 $\mu$m, $\omega$ = 2$\pi$ 20 kHz)",
-        ylabel=r"$\mu_\mathrm{macro}$",
-    )
-    axes.legend(loc="lower right")
+    speed = r"$v_0$ [m/s]   ($l_0$ = 1 $\mu$m, $\omega$ = 2$\pi$ 20 kHz)"
+    _frame(axes, (0.25, speed), (0.53, r"$\mu_\mathrm{macro}$"))
 
 
-def _plane(axes: Any, y_max: float, v_max: float, legend: str) -> None:
-    axes.set(xlim=(0.0, y_max), ylim=(0.0, v_max))
-    axes.set(xlabel=r"$\tilde y_0 = y_0/l_0$", ylabel=r"$\tilde v_0 = v_0/(l_0\omega)$")
+def _frame(axes: Any, x: tuple[float, str], y: tuple[float, str], legend: str = "lower right") -> None:
+    """Axes from 0, ``x`` and ``y`` their ends and names, and the legend."""
+    axes.set(xlim=(0.0, x[0]), ylim=(0.0, y[0]), xlabel=x[1], ylabel=y[1])
     axes.legend(loc=legend)
 
 
@@ -278,14 +239,7 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
     except ImportError as error:
         raise FiguresError(f"figures need the extra 'figures' (matplotlib): {error}") from error
     written = []
-    style: dict[Any, Any] = {
-        "font.size": 11,
-        "axes.edgecolor": INK,
-        "legend.frameon": True,
-        "legend.framealpha": 0.9,
-        "legend.fontsize": 10,
-    }
-    with rc_context(style):
+    with rc_context(STYLE):
         for name, draw in FIGURES.items():
             figure = Figure(figsize=SIZE, layout="constrained")
             FigureCanvasAgg(figure)

@@ -7,7 +7,7 @@ for the sliding that it causes in the contact, mu0 Fz l0 omega p(v~, y~), and fo
 m omega^3 y0^2 / (2 Q).  At low frequency the contact takes more, at high frequency the shaker itself does: the optimum
 lies between.
 
-The component, with exact gradients from the table, is the library's: mumacro.interop.openmdao.Friction.
+The component, with exact gradients from the table, is that of openmdao_component.py.
 """
 
 import sys
@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import openmdao.api as om
+from openmdao_component import Friction
 
 from mumacro import Surrogate
 from mumacro.inputs import UNITS
-from mumacro.interop.openmdao import Friction
 
 TABLE = Path(__file__).resolve().parent.parent / "tables" / "mumacro-1e-10.nc"
 TARGET = 0.15

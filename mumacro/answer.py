@@ -62,7 +62,7 @@ class Answer(Generic[Number]):
         source_code: Any,
         groups: tuple[Number, Number, Number] | None = None,
         certain: Callable[[Any, Any], Any] | None = None,
-        look_up: Callable[[Any, Any], Any] | None = None,
+        look_up: Callable[[str, Any, Any], Any] | None = None,
     ) -> None:
         self.mu_macro = mu_macro
         self.mu_ratio = mu_ratio
@@ -93,22 +93,22 @@ class Answer(Generic[Number]):
         """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde."""
         return self._group(2, "length_scale")
 
-    def _by_source(self, table: Any) -> Any:
+    def _by_source(self, name: str, table: Any) -> Any:
         """``table`` (sources + 1,) looked up at the source code; its last entry is that of -1."""
         if self._look_up is not None and not isinstance(self.source_code, int):
-            return self._look_up(table, self.source_code)
+            return self._look_up(name, table, self.source_code)
         return table[self.source_code]
 
     @property
     def regime_code(self) -> Any:
         """Index into :data:`mumacro.REGIMES`: int, or ndarray of int8; -1 for an illegal case."""
-        codes = self._by_source(_REGIME_CODES)
+        codes = self._by_source("regime_code", _REGIME_CODES)
         return int(codes) if isinstance(self.source_code, int) else codes
 
     @property
     def regime(self) -> Any:
         """``"continuous"``, ``"stick_slip"`` or ``"static"`` (v0 = 0): str, or ndarray of shared str."""
-        return self._by_source(_REGIME_NAMES[_REGIME_CODES])
+        return self._by_source("regime", _REGIME_NAMES[_REGIME_CODES])
 
     @property
     def regime_certain(self) -> Any:
@@ -120,7 +120,7 @@ class Answer(Generic[Number]):
     @property
     def source(self) -> Any:
         """Name of the block or closed form that gave the value: str, or ndarray of shared str, made on request."""
-        return self._by_source(_SOURCE_NAMES)
+        return self._by_source("source", _SOURCE_NAMES)
 
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]

@@ -8,19 +8,7 @@ _OURS = ("mumacro", "builder", "service")
 
 
 def missing(extra: str, error: ImportError) -> str:
-    """State in one line what to install.
-
-    Parameters
-    ----------
-    extra : str
-        The extra of the distribution that holds the package, e.g. ``"service"``; empty for the library itself.
-    error : ImportError
-        What the import raised.
-
-    Returns
-    -------
-    str
-        The line.
+    """What to install, in one line, where an import raised ``error``; ``extra`` is empty for the library itself.
 
     Raises
     ------

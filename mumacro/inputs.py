@@ -27,6 +27,7 @@ __all__ = [
     "GAP",
     "MOST_HZ",
     "NAMES",
+    "PER_UNIT",
     "POSITIVE",
     "RAD_PER_CYCLE",
     "RIGID",
@@ -61,6 +62,7 @@ SI = {
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}
+PER_UNIT = {"mu0": "-", "Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}  # of a slope along each
 POSITIVE = ("mu0", "Fz", "k")
 BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in FIELDS}
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
@@ -192,21 +194,23 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
 
 
 def read_number(name: str, text: str) -> float:
-    """The value of an input from text, in SI; ``rigid`` is an infinite stiffness.
+    """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an infinite stiffness.
 
     Raises
     ------
     ValueError
-        The text is not a plain number; the message states what to write.
+        The text is no number, or in no known unit; the message states what to write.
 
     Examples
     --------
     >>> read_number("y0", "2e-6")
     2e-06
-    >>> read_number("y0", "2um")
+    >>> read_number("k", "1 N/um")
+    1000000.0
+    >>> read_number("y0", "2 N")
     Traceback (most recent call last):
     ...
-    ValueError: y0=2um: give metres, 2e-6
+    ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
     """
     words = SI[name][1]
     text = text.strip()
@@ -217,12 +221,12 @@ def read_number(name: str, text: str) -> float:
     with_unit = _WITH_UNIT.fullmatch(text)
     scale = scale_of(name, with_unit[2].strip(" []()")) if with_unit else None
     if with_unit and scale:
-        value = re.sub(r"e([+-])0*", r"e\1", f"{scale.si(float(with_unit[1])):.15g}").replace("e+", "e")
-        raise ValueError(f"{name}={text}: give {words}, {value}")
+        return scale.si(float(with_unit[1]))
     if _PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
+    units = ", ".join([unit for unit in UNITS_OF[name] if unit][:4])
     hint = ", or rigid" if name == "k" else ""
-    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6{hint}")
+    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {units}, ...{hint}")
 
 
 # --- columns --------------------------------------------------------------------------------------------
@@ -240,13 +244,14 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
         An input is missing, given twice, or not a real number.
     """
     converted: dict[str, Array] = {}
-    if (given.get("omega") is None) == (given.get("f") is None):
-        both = given.get("omega") is not None
-        raise InputError(
-            "omega", given.get("omega"), "given or f [Hz] in its place, " + ("not both" if both else "one of them")
-        )
     for name in FIELDS:
-        source = "f" if name == "omega" and given.get("omega") is None else name
+        source = name
+        if name == "omega":
+            both = given.get("omega") is not None
+            if both == (given.get("f") is not None):
+                told = "not both" if both else "one of them"
+                raise InputError("omega", given.get("omega"), f"given or f [Hz] in its place, {told}")
+            source = "omega" if both else "f"
         if source not in given:
             hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
             raise InputError(name, None, f"given{hint}")
@@ -272,8 +277,12 @@ def _rigid_as_infinity(value: Any) -> Any:
         return math.inf if is_rigid(value) else value
     if not isinstance(value, (list, tuple)) and getattr(getattr(value, "dtype", None), "kind", "") not in ("O", "U"):
         return value
-    texts = np.asarray(value, dtype=object)
-    return np.array([math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]).reshape(texts.shape)
+    try:
+        texts = np.asarray(value, dtype=object)
+        read = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
+        return np.array(read).reshape(texts.shape)
+    except ValueError:  # lists of several lengths
+        return value
 
 
 def real(name: str, value: Any) -> Array:
@@ -307,7 +316,9 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
             field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
-            raise InputError(field, float(told.ravel()[i]), BOUNDS[name], i if values.ndim else None)
+            value = float(told.ravel()[i])
+            bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
+            raise InputError(field, value, bound, i if values.ndim else None)
 
 
 def _bad(name: str, values: Array) -> NDArray[np.bool_]:

@@ -67,6 +67,16 @@ EQUATIONS = {
     32: "critical", 35: "rigid", 37: "rigid", 38: "static", 39: "eq_24", 40: "critical",
 }  # fmt: skip
 _CORNER_REACH, _CORNER_TOP = 0.5, 0.7
+#: column of BORDERS -> formula, smallest and largest y~
+_FORMULAS = {
+    "eq_23": (closed_forms.border_23, 0.0, 1.0),
+    "eq_24": (closed_forms.border_24, 0.0, 1.0),
+    "eq_26": (closed_forms.border_26, 1.0, math.inf),
+    "eq_27": (closed_forms.border_27, 0.0, math.inf),
+    "small_amplitude": (closed_forms.border_small_amplitude, 0.0, 1.0),
+    "large_amplitude": (closed_forms.border_large_amplitude, 1.0, math.inf),
+    "blend": (closed_forms.border_blend, 0.0, math.inf),
+}
 
 
 @dataclass(frozen=True)
@@ -156,13 +166,15 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     ([0.2238, 0.24, 0.2957], 0.07105)
     """
     known = checked_case(case, along)
-    full: dict[str, Any] = {"k": None, **known, along: values}
-    answer = surrogate.evaluate(**full, groups=True)
-    mu0 = np.broadcast_to(np.asarray(full["mu0"], dtype=np.float64), values.shape)
-    at_rest = (np.asarray(full["y0"]) == 0.0) | (np.asarray(full["omega"]) == 0.0)
-    static = np.where(at_rest, mu0, mu0 * closed_forms.static_limit(answer.y_tilde))
-    crossings = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]))
-    return Law(along, values, answer, static, crossings)
+    inputs: dict[str, Any] = {**known, along: values}
+    at_rest = surrogate.evaluate({**inputs, "v0": 0.0})
+    return Law(
+        along,
+        values,
+        surrogate.evaluate(**inputs, groups=True),
+        np.broadcast_to(at_rest.mu_macro, values.shape),
+        border_crossings(surrogate, along, known, float(values[0]), float(values[-1])),
+    )
 
 
 def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
@@ -170,58 +182,36 @@ def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | No
 
     ``case`` has the other five inputs, as in :func:`friction_law`.
     """
-    full: dict[str, Any] = {"k": None, **checked_case(case, law.along), law.along: law.values}
-    mu0 = np.asarray(full["mu0"], dtype=np.float64)
-    v, y = (np.asarray(x, dtype=np.float64) for x in (law.answer.v_tilde, law.answer.y_tilde))
-    elastic = np.isfinite(y) & np.isfinite(v)
-    v_safe, y_safe = np.where(elastic, v, 1.0), np.where(elastic, y, 0.0)
+    inputs: dict[str, Any] = {**checked_case(case, law.along), law.along: law.values}
+    mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
+    elastic = np.isfinite(v) & np.isfinite(y)  # rigid contact has no finite v~ and y~; eq. (37) is then the result
     low, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
-    y_low = np.minimum(y_safe, 1.0)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        ratio = np.where(v_safe > 0.0, y_safe / v_safe, np.inf)
-        rigid = np.where(np.isfinite(ratio), closed_forms.outer(np.where(np.isfinite(ratio), ratio, 0.0)), 0.0)
-        small = closed_forms.small_amplitude(np.minimum(v_safe, 1e150), y_low)
-    # rigid contact has no finite v~ and y~; eq. (37) is then the result itself
-    rigid = np.where(elastic, rigid, np.asarray(law.answer.mu_ratio))
-    near = elastic & (np.abs(y_safe - 1.0) <= _CORNER_REACH) & (v_safe > 0.0) & (v_safe < 1.0)
-    corner = np.full(v.shape, np.nan)
-    corner[near] = closed_forms.corner_root(v_safe[near], y_safe[near] - 1.0)
-    creep = _creep(surrogate, law, full)
-    critical, border = closed_forms.critical(y_low), surrogate.v_tilde_crit(y_low)
-    fit = closed_forms.master_curve(_share(v_safe, closed_forms.border_27(y_low)))
-    limit = closed_forms.master_curve_limit(_share(v_safe, border))
-    top = surrogate.mu_ratio(border, y_low)
-    static = closed_forms.static_limit(y_low)
-    return {
-        "static": law.mu_static.copy(),
-        "creep": np.where(creep <= mu0, creep, np.nan),
-        "master_curve": np.where(low, mu0 * (static + (critical - static) * fit), np.nan),
-        "master_curve_limit": np.where(low & (v_safe <= border), mu0 * (static + (top - static) * limit), np.nan),
-        "critical": np.where(low, mu0 * critical, np.nan),
-        "small_amplitude": np.where(low & slides, mu0 * small, np.nan),
-        "continuous": np.where(slides, mu0 * closed_forms.continuous(v_safe, y_safe), np.nan),
-        "rigid": mu0 * rigid,
-        "corner": np.where(corner <= _CORNER_TOP, mu0 * corner, np.nan),
-    }
-
-
-def _share(v: Array, border: Array) -> Array:
-    """v~/v~crit [-]; without oscillation there is no border, and every speed but 0 is infinitely far above it."""
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        out: Array = np.where(v > 0.0, v / border, 0.0)
-    return out
-
-
-def _creep(surrogate: Surrogate, law: Law, full: Mapping[str, Any]) -> Array:
-    """The tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)."""
-    at_rest = surrogate.evaluate(
-        mu0=full["mu0"], Fz=full["Fz"], k=full["k"], y0=full["y0"], omega=full["omega"],
-        v0=np.zeros_like(law.values), gradient=True,
-    )  # fmt: skip
-    slope = np.asarray((at_rest.gradient or {})["v0"])
-    with np.errstate(invalid="ignore", over="ignore"):
-        out: Array = law.mu_static + slope * np.asarray(full["v0"], dtype=np.float64)
-    return out
+    near = elastic & (np.abs(y - 1.0) <= _CORNER_REACH) & (v > 0.0) & (v < 1.0)
+    # the tangent of mu_macro(v0) at v0 = 0; not finite where it is vertical (y~ = 1, rigid contact)
+    at_rest = surrogate.evaluate({**inputs, "v0": np.zeros(law.values.shape)}, gradient=True)
+    with np.errstate(all="ignore"):
+        creep = law.mu_static + at_rest.gradient["v0"] * inputs["v0"]
+        border, fit_border = surrogate.v_tilde_crit(y), closed_forms.border_27(y)
+        # without oscillation there is no border, and every speed but 0 is infinitely far above it
+        share, fit_share = (np.where(v > 0.0, v / at, 0.0) for at in (border, fit_border))
+        static, critical, top = closed_forms.static_limit(y), closed_forms.critical(y), surrogate.mu_ratio(border, y)
+        rigid = np.where(elastic, closed_forms.outer(np.where(v > 0.0, y / v, math.inf)), law.answer.mu_ratio)
+        corner = closed_forms.corner_root(v, y - 1.0)
+        found = {
+            "static": (law.mu_static, True),
+            "creep": (creep, creep <= mu0),
+            "master_curve": (mu0 * (static + (critical - static) * closed_forms.master_curve(fit_share)), low),
+            "master_curve_limit": (
+                mu0 * (static + (top - static) * closed_forms.master_curve_limit(share)),
+                low & (v <= border),
+            ),
+            "critical": (mu0 * critical, low),
+            "small_amplitude": (mu0 * closed_forms.small_amplitude(v, y), low & slides),
+            "continuous": (mu0 * closed_forms.continuous(v, y), slides),
+            "rigid": (mu0 * rigid, True),
+            "corner": (mu0 * corner, near & (corner <= _CORNER_TOP)),
+        }
+    return {name: np.where(given, column, np.nan) for name, (column, given) in found.items()}
 
 
 def borders(y: Array) -> dict[str, Array]:
@@ -233,17 +223,11 @@ def borders(y: Array) -> dict[str, Array]:
     >>> found["eq_24"].round(4).tolist(), found["eq_26"].round(4).tolist()
     ([0.1124, nan], [nan, 0.6667])
     """
-    low, high = np.minimum(y, 1.0), np.maximum(y, 1.0)
-    small, large = y <= 1.0, y >= 1.0
-    return {
-        "eq_23": np.where(small, closed_forms.border_23(low), np.nan),
-        "eq_24": np.where(small, closed_forms.border_24(low), np.nan),
-        "eq_26": np.where(large, closed_forms.border_26(high), np.nan),
-        "eq_27": closed_forms.border_27(y),
-        "small_amplitude": np.where(small, closed_forms.border_small_amplitude(low), np.nan),
-        "large_amplitude": np.where(large, closed_forms.border_large_amplitude(high), np.nan),
-        "blend": closed_forms.border_blend(y),
-    }
+    with np.errstate(over="ignore", invalid="ignore"):
+        return {
+            name: np.where((y >= least) & (y <= most), formula(y), np.nan)
+            for name, (formula, least, most) in _FORMULAS.items()
+        }
 
 
 def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
@@ -252,14 +236,10 @@ def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | Non
     NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid contact and without
     oscillation, which never stick.
     """
-    full: dict[str, Any] = {"k": None, **checked_case(case, law.along), law.along: law.values}
-    y = np.broadcast_to(np.asarray(law.answer.y_tilde, dtype=np.float64), law.values.shape)
-    omega = np.asarray(full["omega"], dtype=np.float64)
-    rigid = np.isinf(np.asarray(math.inf if full["k"] is None else full["k"], dtype=np.float64))
-    never = np.broadcast_to((np.asarray(full["y0"]) == 0.0) | (omega == 0.0) | rigid, y.shape)
-    usable = np.isfinite(y) & ~never
-    y_safe = np.where(usable, y, 1.0)
-    with np.errstate(over="ignore", invalid="ignore"):
-        unit = np.where(usable, np.asarray(law.answer.length_scale) * omega, np.nan)
-        found = {"exact": surrogate.v_tilde_crit(y_safe), **borders(y_safe)}
+    inputs: dict[str, Any] = {**checked_case(case, law.along), law.along: law.values}
+    y, omega = law.answer.y_tilde, inputs["omega"]
+    never = (inputs["y0"] == 0.0) | (omega == 0.0) | np.isinf(inputs["k"])
+    with np.errstate(all="ignore"):
+        unit = np.where(np.isfinite(y), law.answer.length_scale * omega, np.nan)
+        found = {"exact": surrogate.v_tilde_crit(y), **borders(y)}
         return {name: np.where(never, 0.0, unit * column) for name, column in found.items()}

@@ -109,32 +109,23 @@ def settling(
     """
     if not 0.0 < remaining < 1.0:
         raise InputError("remaining", remaining, "> 0 and < 1")
-    given: dict[str, Any] = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
-    answer = surrogate.evaluate(**given, groups=True)
-    shape = np.shape(answer.mu_ratio)
-    friction, frequency, speed, amplitude = (
-        np.broadcast_to(np.asarray(x, dtype=np.float64), shape) for x in (mu0, omega, v0, y0)
-    )
-    v, y, l0, mu = (
-        np.asarray(x, dtype=np.float64) for x in (answer.v_tilde, answer.y_tilde, answer.length_scale, answer.mu_ratio)
-    )
+    answer = surrogate.evaluate({"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}, groups=True)
+    friction, amplitude, frequency, speed = (np.asarray(x, dtype=np.float64) for x in (mu0, y0, omega, v0))
+    v, y, l0 = answer.v_tilde, answer.y_tilde, answer.length_scale
     still = (amplitude == 0.0) | (frequency == 0.0)  # no oscillation: dragged only, mu~ = 1
     inside = np.isfinite(v) & np.isfinite(y) & ~still
     power, power_bound = surrogate.power_with_bound(np.where(inside, v, 1.0), np.where(inside, y, 0.0))
-    bound = power_bound
     decay = math.log(1.0 / remaining)
-    with np.errstate(over="ignore", under="ignore", divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         # slip speed of the foot in units of l0 omega; infinite for rigid contact and beyond double range
-        rate = np.where(inside, v * mu + power, np.where(still & (speed > 0.0), speed / l0 / frequency, np.inf))
-        rate = np.where(still & (speed == 0.0), 0.0, rate)
-        rate = np.where(np.isnan(mu), np.nan, rate)  # an illegal case of an array
-        off = np.where(inside, (v * np.asarray(answer.error_bound) / friction + bound) / rate, 0.0)
+        dragged = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
+        rate = np.where(inside, v * answer.mu_ratio + power, np.where(still, dragged, np.inf))
+        rate = np.where(np.isnan(answer.mu_ratio), np.nan, rate)  # an illegal case of an array
+        off = np.where(inside, (v * answer.error_bound / friction + power_bound) / rate, 0.0)
         slip_path = 2.0 * math.pi * rate
         periods = decay / slip_path
-        time = np.where(still & ~np.isnan(mu), l0 * (decay / speed), decay / rate / frequency)
-        error = np.where(off >= 1.0, np.inf, periods * off / (1.0 - off))
-        # 0 / 0 in both: rigid contact at rest does not slip
-        time = np.where(rate == 0.0, np.inf, time)
-        error = np.where(rate == 0.0, np.inf, error)
+        # nothing slips at rate 0, rigid contact at rest included
+        time = np.where(rate == 0.0, np.inf, np.where(still, l0 * (decay / speed), decay / rate / frequency))
+        error = np.where((rate == 0.0) | (off >= 1.0), np.inf, periods * off / (1.0 - off))
     found = (periods, 2.0 * periods, time, slip_path, error)
-    return Settling(*(x if shape else float(x) for x in found))
+    return Settling(*(x if np.ndim(answer.mu_ratio) else float(x) for x in found))

@@ -592,16 +592,20 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
 
 
 def _picked(cases: Any) -> dict[str, Any]:
-    """The inputs among the columns of a mapping, DataFrame or Dataset."""
+    """The inputs among the columns of a mapping, a data frame, an Arrow table or a Dataset."""
     try:
-        cases.keys()  # which a list or a string does not have
-        # coordinates of a Dataset are inputs, too, although they are not keys
-        picked = {name: cases[name] for name in (*FIELDS, "f") if name in cases}
+        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
+        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
+        picked = {name: cases[name] for name in (*FIELDS, "f") if name in there}
     except (AttributeError, TypeError, KeyError) as error:
+        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(
-            "cases", type(cases).__name__, "a mapping, DataFrame or Dataset with the inputs by name"
-        ) from error
-    return picked
+            "cases", kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
+            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
+        ) from error  # fmt: skip
+    # columns that are neither arrays nor labelled, such as those of Arrow and Polars
+    return {name: np.asarray(x) if hasattr(type(x), "__arrow_c_stream__") and not _labels(x) else x
+            for name, x in picked.items()}  # fmt: skip
 
 
 _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
@@ -609,8 +613,11 @@ _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
 
 def _labelled(inputs: Mapping[str, Any], cases: Any) -> bool:
     """Whether labels or chunks are to be kept."""
-    kinds = {*map(type, inputs.values()), type(cases)} - _PLAIN
-    return any(kind.__module__.partition(".")[0] in ("pandas", "xarray", "dask") for kind in kinds)
+    return any(_labels(x) for x in (cases, *inputs.values()) if type(x) not in _PLAIN)
+
+
+def _labels(x: Any) -> bool:
+    return type(x).__module__.partition(".")[0] in ("pandas", "xarray", "dask")
 
 
 def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:

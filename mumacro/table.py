@@ -18,7 +18,6 @@ import hashlib
 import json
 import tempfile
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -197,10 +196,10 @@ def _fill(root: Any, table: Table) -> None:
         extra = {"ancillary_variables": "error_estimate"} if name == "mu_ratio" else {}
         _put(root, name, getattr(table, name), long_name, axes, **extra)
     border = root.createGroup("border")
-    for (name, axis, quantity), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
+    for (name, axis, tabulated), piece in zip(charts.BORDER_PIECES, table.border, strict=True):
         group = border.createGroup(name)
         _put(group, axis.name, piece.nodes, charts.COORDINATES[axis.name])
-        _put(group, "value", piece.values, quantity, (axis.name,))
+        _put(group, "value", piece.values, tabulated, (axis.name,))
         group.setncatts({"cells": np.int32(piece.cells), "max_rel_error": piece.max_rel_error,
                          "range": np.array([axis.low, axis.high])})  # fmt: skip
     # inside the border, which they are fitted to: with a second group at the root the CF checker looks for "time"
@@ -264,145 +263,123 @@ def _image(table: Table) -> bytes:
 # --- reading --------------------------------------------------------------------------------------------
 
 
-class _Reader:
-    """One file; every error names it."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def refuse(self, reason: str) -> TableError:
-        return TableError(self.path, reason)
-
-    def array(self, group: hdf5.Group, name: str, shape: tuple[int, ...] | None = None) -> Array:
-        values = group.array(name, MOST_NUMBERS)
-        if not np.all(np.isfinite(values)):
-            raise self.refuse(f"variable {name!r} in {group.path} holds non-finite values")
-        if shape is not None and values.shape != shape:
-            raise self.refuse(f"{group.path}: the shape of {name!r} is {values.shape}, not {shape}")
-        return values
-
-    def numbers(self, group: hdf5.Group, name: str, count: int) -> Array:
-        values = np.atleast_1d(np.asarray(group.attribute(name)))
-        if values.dtype.kind not in "fi" or values.shape != (count,) or not np.all(np.isfinite(values)):
-            raise self.refuse(f"attribute {name!r} of {group.path} is not {count} finite numbers")
-        return values.astype(np.float64)
-
-    def nodes(self, group: hdf5.Group, axis: charts.Axis) -> Array:
-        """The nodes of an axis, which must be those of the running atlas."""
-        found = self.array(group, axis.name)
-        if found.ndim != 1 or not 2 <= found.size <= MOST_NODES:
-            raise self.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
-        # the cosine's last digit differs between mathematical libraries
-        off = np.abs(found - nodes(found.size, axis.low, axis.high))
-        if np.any(off > 1e-15 * max(abs(axis.low), abs(axis.high))):
-            raise self.refuse(f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart")
-        return found
-
-    def cells(self, group: hdf5.Group, count: int) -> tuple[int, ...]:
-        cells = self.numbers(group, "cells", count)
-        if not np.all((cells >= 1) & (cells <= MOST_CELLS) & (cells == np.round(cells))):
-            raise self.refuse(f"{group.path}: cells must be whole numbers from 1 to {MOST_CELLS}")
-        if np.prod(cells) > MOST_PATCHES:
-            raise self.refuse(f"{group.path}: has more than {MOST_PATCHES} cells")
-        return tuple(int(n) for n in cells)
-
-    def errors(self, group: hdf5.Group, *names: str, count: int = 1) -> list[Array]:
-        found = [self.numbers(group, name, count) for name in names]
-        if any(np.any(error < 0.0) for error in found):
-            raise self.refuse(f"{group.path}: an error is negative")
-        return found
-
-    def cell_errors(self, group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
-        """The errors in every cell, which older tables have for whole blocks only."""
-        if not group.has_variable("cell_errors"):
-            return
-        last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
-        found = self.array(group, "cell_errors", (len(names), int(last[-1]), 3))
-        if np.any(found < 0.0):
-            raise self.refuse(f"{group.path}: an error in 'cell_errors' is negative")
-        for name, errors in zip(names, found, strict=True):
-            for block, part in zip(blocks, np.split(errors, last[:-1]), strict=True):
-                if name in block.nodes:
-                    block.cell_errors[name] = part
-
-    def same(self, group: hdf5.Group, name: str, wanted: object) -> None:
-        found = group.attribute(name)
-        if not np.array_equal(found, np.asarray(wanted)):
-            raise self.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {wanted!r}")
-
-    def attributes(self, root: hdf5.Group) -> dict[str, Any]:
-        """Those of the root: what the program uses of them is of the right kind."""
-        if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
-            raise self.refuse("not a mumacro table: format_version, tolerance or content_sha256 is missing")
-        version = root.attribute("format_version")
-        if not np.array_equal(version, FORMAT_VERSION):
-            raise self.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
-        found = root.attributes()
-        for name in ("tolerance", *(key for key in found if key.startswith("verified_max_"))):
-            if not self.numbers(root, name, 1)[0] > 0.0:
-                raise self.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
-        if not isinstance(found["content_sha256"], str):
-            raise self.refuse("attribute 'content_sha256' is no text")
-        _options(found, self.refuse)
-        return found
+def _nodes(group: hdf5.Group, axis: charts.Axis) -> Array:
+    """The nodes of an axis, which must be those of the running atlas."""
+    found = group.array(axis.name, MOST_NUMBERS)
+    if found.ndim != 1 or not 2 <= found.size <= MOST_NODES:
+        raise group.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
+    # the cosine's last digit differs between mathematical libraries
+    off = np.abs(found - nodes(found.size, axis.low, axis.high))
+    if np.any(off > 1e-15 * max(abs(axis.low), abs(axis.high))):
+        raise group.refuse(f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart")
+    return found
 
 
-def _options(attributes: dict[str, Any], refuse: Callable[[str], Exception]) -> Any:
-    """What the table was built with, parsed."""
+def _cells(group: hdf5.Group, count: int) -> list[int]:
+    cells = group.numbers("cells", count)
+    if not np.all((cells >= 1) & (cells <= MOST_CELLS) & (cells == np.round(cells))):
+        raise group.refuse(f"{group.path}: cells must be whole numbers from 1 to {MOST_CELLS}")
+    if np.prod(cells) > MOST_PATCHES:
+        raise group.refuse(f"{group.path}: has more than {MOST_PATCHES} cells")
+    return [int(n) for n in cells]
+
+
+def _errors(group: hdf5.Group, name: str, found: Array) -> Array:
+    if np.any(found < 0.0):
+        raise group.refuse(f"{group.path}: an error in {name!r} is negative")
+    return found
+
+
+def _error(group: hdf5.Group, name: str) -> float:
+    return float(_errors(group, name, group.numbers(name, 1))[0])
+
+
+def _check_same(group: hdf5.Group, name: str, wanted: object) -> None:
+    found = group.attribute(name)
+    if not np.array_equal(found, np.asarray(wanted)):
+        raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {wanted!r}")
+
+
+def _attributes(root: hdf5.Group) -> dict[str, Any]:
+    """Those of the root: what the program uses of them is of the right kind."""
+    if not all(map(root.has, ("format_version", "content_sha256", "tolerance"))):
+        raise root.refuse("not a mumacro table: format_version, tolerance or content_sha256 is missing")
+    version = root.attribute("format_version")
+    if not np.array_equal(version, FORMAT_VERSION):
+        raise root.refuse(f"format version {version}, this program reads {FORMAT_VERSION}")
+    found = root.attributes()
+    for name in ("tolerance", *(key for key in found if key.startswith("verified_max_"))):
+        if not root.numbers(name, 1)[0] > 0.0:
+            raise root.refuse(f"attribute {name!r} must be > 0, got {found[name]!r}")
+    if not isinstance(found["content_sha256"], str):
+        raise root.refuse("attribute 'content_sha256' is no text")
     try:
-        return json.loads(attributes.get("builder_options", "{}"))
+        json.loads(found.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
-        raise refuse(f"attribute 'builder_options' is no JSON ({error})") from None
-
-
-def _read(root: hdf5.Group, reader: _Reader) -> Table:
-    attributes = reader.attributes(root)
-    border_group = root.group("border")
-    blocks_group = border_group.group("blocks")
-    strange = sorted(set(blocks_group.groups()) - set(charts.NAMES))
-    if strange:
-        raise reader.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
-    names = _names(attributes)
+        raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
+    names = _names(found)
     if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= _NAMED.keys():
-        raise reader.refuse(f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}")
-    quantities = [_NAMED[name] for name in names]
-    border, blocks = [], []
-    for name, axis, _ in charts.BORDER_PIECES:
-        group = border_group.group(name)
-        reader.same(group, "range", [axis.low, axis.high])
-        at = reader.nodes(group, axis)
-        (error,) = reader.errors(group, "max_rel_error")
-        (cells,) = reader.cells(group, 1)
-        border.append(BorderPiece(at, reader.array(group, "value", at.shape), cells, float(error[0])))
-    for chart in charts.CHARTS:
-        group = blocks_group.group(chart.name)
-        for name, wanted in _geometry(chart).items():
-            reader.same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
-        a, b = reader.nodes(group, chart.a), reader.nodes(group, chart.b)
-        shape = (a.size, b.size)
-        largest = reader.errors(group, "verified_max_abs_error", "verified_max_rel_error")
-        found = {q.name: reader.array(group, q.variable, shape) for q in quantities if chart.holds(q)}
-        na, nb = reader.cells(group, 2)
-        block = Block(a, b, (na, nb), found)
-        block.max_abs_error, block.max_rel_error = (error.item() for error in largest)
-        (errors,) = reader.errors(group, "errors", count=3 * len(quantities))
-        block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))
-        blocks.append(block)
-    reader.cell_errors(blocks_group, blocks, names)
+        raise root.refuse(f"attribute 'quantities' is {names}, this program knows {', '.join(_NAMED)}")
+    return found
+
+
+def _border_piece(group: hdf5.Group, axis: charts.Axis) -> BorderPiece:
+    _check_same(group, "range", [axis.low, axis.high])
+    at = _nodes(group, axis)
+    (cells,) = _cells(group, 1)
+    return BorderPiece(at, group.array("value", MOST_NUMBERS, at.shape), cells, _error(group, "max_rel_error"))
+
+
+def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
+    for name, wanted in _geometry(chart).items():
+        _check_same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
+    a, b = _nodes(group, chart.a), _nodes(group, chart.b)
+    quantities = [_NAMED[name] for name in names if chart.holds(_NAMED[name])]
+    found = {one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities}
+    na, nb = _cells(group, 2)
+    block = Block(a, b, (na, nb), found)
+    block.max_abs_error, block.max_rel_error = (_error(group, f"verified_max_{kind}_error") for kind in ("abs", "rel"))
+    errors = _errors(group, "errors", group.numbers("errors", 3 * len(names)))
+    block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))
+    return block
+
+
+def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
+    """The errors in every cell, which older tables have for whole blocks only."""
+    if not group.holds("cell_errors"):
+        return
+    last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
+    found = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
+    for name, errors in zip(names, _errors(group, "cell_errors", found), strict=True):
+        for block, part in zip(blocks, np.split(errors, last[:-1]), strict=True):
+            if name in block.nodes:
+                block.cell_errors[name] = part
+
+
+def _read(root: hdf5.Group) -> Table:
+    attributes = _attributes(root)
+    names = _names(attributes)
+    below_border = root.group("border")
+    below_blocks = below_border.group("blocks")
+    strange = sorted(set(below_blocks.groups()) - set(charts.NAMES))
+    if strange:
+        raise root.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
+    border = [_border_piece(below_border.group(name), axis) for name, axis, _ in charts.BORDER_PIECES]
+    blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in charts.CHARTS]
+    _add_cell_errors(below_blocks, blocks, names)
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
-        plain[name] = reader.array(root, name, tuple(plain[axis].size for axis in axes) if axes else None)
+        shape = tuple(plain[axis].size for axis in axes) if axes else None
+        plain[name] = root.array(name, MOST_NUMBERS, shape)
         if not axes and plain[name].ndim != 1:
-            raise reader.refuse(f"variable {name!r} in / is no axis")
+            raise root.refuse(f"variable {name!r} in / is no axis")
     return Table(border=border, blocks=blocks, attributes=attributes, **plain)
 
 
 def parse_table(image: bytes, path: str | Path) -> Table:
     """Read and check the bytes of a table file; ``path`` names it in errors.  See :func:`read_table`."""
-    path = Path(path)
-    reader = _Reader(path)
     try:
-        table = _read(hdf5.open_image(image, reader.refuse), reader)
+        table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
         digest = _digest(table)
     except TableError:
         raise
@@ -446,9 +423,7 @@ def read_image(path: str | Path) -> bytes:
 
 def json_attributes(table: Table) -> dict[str, object]:
     """Root attributes as plain Python scalars and strings; ``builder_options`` parsed."""
-    out: dict[str, object] = {}
-    for key, value in table.attributes.items():
-        out[key] = value.item() if isinstance(value, np.generic) else value
+    out = {key: value.item() if isinstance(value, np.generic) else value for key, value in table.attributes.items()}
     if "builder_options" in out:
-        out["builder_options"] = _options(table.attributes, ValueError)
+        out["builder_options"] = json.loads(out["builder_options"])
     return out

@@ -22,7 +22,7 @@ def refused(done: Any, *parts: str) -> None:
     """The command failed with a message that contains ``parts``, and without a traceback."""
     assert done.returncode not in (0, None)
     assert "Traceback" not in done.stderr + done.stdout
-    message = " ".join(done.stderr.replace("│", " ").split())
+    message = " ".join(done.stderr.split())
     for part in parts:
         assert part in message
 
@@ -101,9 +101,9 @@ def test_verify_refuses_a_damaged_table(run_builder: Run, tables_dir: Path, tmp_
         (("verify", "x.nc", "--points", "99999999"), ("--points",)),
         (("verify", "x.nc", "--seed", "-1"), ("--seed",)),
         (("verify", "x.nc", "--workers", "0"), ("--workers",)),
-        (("verify",), ("Missing argument",)),
+        (("verify",), ("required: table",)),
         (("solve", "--v", "", "--y", "1"), ("--v",)),
-        (("solve", "--v", "1", "--y", "-inf"), ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers")),
+        (("solve", "--v", "1", "--y=-inf"), ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers")),
         (("solve", "--v", "1e999", "--y", "1"), ("--v", "from 1e-60 to 1e+10", "got inf")),
         (("solve", "--v", "1e-61", "--y", "1"), ("--v", "from 1e-60 to 1e+10", "got 1e-61")),
         (("solve", "1", "2"), ()),
@@ -121,5 +121,5 @@ def test_bad_arguments_are_refused_before_any_work(
 def test_every_command_explains_itself(run_builder: Run, command: tuple[str, ...]) -> None:
     done = run_builder(*command, "--help")
     assert done.returncode == 0
-    assert "Usage" in done.stdout
+    assert "usage: " in done.stdout
     assert "Traceback" not in done.stderr

@@ -1,4 +1,4 @@
-"""Derivatives inside JAX, PyTorch and OpenMDAO: each library's own checker, limits and illegal cases."""
+"""Derivatives inside JAX and PyTorch: each library's own checker, limits and illegal cases."""
 
 import importlib
 import math
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import InputError, MumacroError, Surrogate
+from mumacro import MumacroError, Surrogate
 from mumacro.inputs import FIELDS
 from mumacro.interop.derivatives import quantities
 
@@ -75,8 +75,7 @@ def test_a_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyPat
     for name in ("jax", "torch"):
         with monkeypatch.context() as patched:
             patched.setitem(sys.modules, name, None)
-            for loaded in (f"mumacro.{name}", f"mumacro.interop.{name}"):
-                patched.delitem(sys.modules, loaded, raising=False)
+            patched.delitem(sys.modules, f"mumacro.{name}", raising=False)
             with pytest.raises(ModuleNotFoundError) as caught:
                 importlib.import_module(f"mumacro.{name}")
         assert str(caught.value).startswith(f"{name} is not installed: pip install 'mumacro[{name}]'")
@@ -250,64 +249,3 @@ def test_torch_raises_for_what_is_not_supported(torch: ModuleType, in_torch: Any
         torch.autograd.grad(slope, v)
     with pytest.raises(NotImplementedError, match="second derivatives are not tabulated"):
         torch.func.hessian(lambda a: in_torch.mu_ratio(a, 0.5))(v.detach())
-
-
-# --- OpenMDAO -------------------------------------------------------------------------------------------
-
-
-def component(table: Surrogate, **options: Any) -> Any:
-    """A problem of one component with four cases."""
-    om = pytest.importorskip("openmdao.api")
-    from mumacro.interop.openmdao import Friction
-
-    problem = om.Problem(reports=None)
-    problem.model.add_subsystem("friction", Friction(surrogate=table, vec_size=4, **options), promotes=["*"])
-    problem.setup(force_alloc_complex=False)
-    length = CASE["mu0"] * CASE["Fz"] / CASE["k"]
-    v, y = POINTS.T
-    for name, value in {**CASE, "v0": v * length * CASE["omega"], "y0": y * length}.items():
-        problem.set_val(name, value)
-    problem.run_model()
-    return problem
-
-
-def test_openmdao_checks_the_partials(table: Surrogate) -> None:
-    problem = component(table, power=True)
-    checked = problem.check_partials(out_stream=None, method="fd", form="central", step=1e-6, step_calc="rel_element")
-    (pairs,) = checked.values()
-    assert len(pairs) == 2 * 6
-    for (of, wrt), pair in pairs.items():
-        scale = float(np.abs(pair["J_fd"]).max())
-        np.testing.assert_allclose(pair["J_fwd"], pair["J_fd"], rtol=1e-5, atol=1e-7 * scale, err_msg=f"{of} {wrt}")
-    v, y = POINTS.T
-    np.testing.assert_allclose(problem.get_val("mu_macro"), CASE["mu0"] * table.mu_ratio(v, y), rtol=1e-12)
-    unit = (CASE["mu0"] * CASE["Fz"]) ** 2 / CASE["k"] * CASE["omega"]
-    np.testing.assert_allclose(problem.get_val("oscillation_power"), unit * table.power(v, y), rtol=1e-12)
-
-
-def test_openmdao_may_step_back_from_illegal_values(table: Surrogate) -> None:
-    om = pytest.importorskip("openmdao.api")
-    problem = component(table)
-    problem.set_val("y0", -1e-6)
-    with pytest.raises(om.AnalysisError, match="y0 at index 0 must be finite and >= 0, got -1e-06") as caught:
-        problem.run_model()
-    assert isinstance(caught.value.__cause__, InputError)
-    problem = component(table, power=True)
-    problem.set_val("k", math.inf)
-    with pytest.raises(om.AnalysisError, match="power of a rigid contact is not defined"):
-        problem.run_model()
-    problem = component(table)
-    problem.set_val("k", math.inf)
-    problem.run_model()
-    assert np.all(problem.get_val("mu_macro") > 0.0)
-
-
-def test_openmdao_partials_at_the_edges_are_finite(table: Surrogate) -> None:
-    problem = component(table, power=True)
-    problem.set_val("v0", [0.0, 0.01, 0.01, 0.0])
-    problem.set_val("y0", [1e-6, 0.0, 2e-6, 0.0])
-    problem.set_val("omega", [1.3e5, 1.3e5, 0.0, 1.3e5])
-    problem.run_model()
-    slopes = problem.compute_totals(of=["mu_macro", "oscillation_power"], wrt=list(FIELDS))
-    for pair, slope in slopes.items():
-        assert np.all(np.isfinite(slope)), pair

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
-    "least_power.py", "quasi_monte_carlo.py", "c",
+    "least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "c",
 }  # fmt: skip
 
 

@@ -49,11 +49,11 @@ def test_the_cycle_that_is_drawn_is_the_steady_one(surrogate, v, y) -> None:
     tau, u, sticks = steady_cycle(v, y)
     assert tau[-1] == close(2.0 * np.pi, rel=1e-14)
     assert np.hypot(*u.T).max() <= 1.0 + 1e-12
-    assert u[:, 0].mean() == close(surrogate.mu_ratio(v, y), abs=1e-3)
-    assert sticks.mean() == close(surrogate.stick_fraction(v, y), abs=2e-3)
+    assert u[:, 0].mean() == close(surrogate.mu_ratio(v, y), abs=1e-6)
+    assert sticks.mean() == close(surrogate.stick_fraction(v, y), abs=5e-4)
     # half a period later the same, mirrored
     half = tau.size // 2
-    assert np.abs(u[:half] * (1.0, -1.0) - u[half:]).max() < 2e-3
+    assert np.abs(u[:half] * (1.0, -1.0) - u[half:]).max() < 1e-6
 
 
 def test_the_example_runs() -> None:

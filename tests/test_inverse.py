@@ -168,6 +168,9 @@ def test_at_rest_the_frequency_only_matters_by_being_there(surrogate):
     case = others({**CASE, "v0": 0.0}, "omega")
     solution = solve_for(surrogate, "omega", [0.3, 0.25], case)
     assert [[root.value for root in roots] for roots in solution.roots] == [[0.0], []]
+    static = surrogate.evaluate(**CASE | {"v0": 0.0}).mu_macro
+    root = only_root(solve_for(surrogate, "omega", static, case))
+    assert (root.low, root.high) == (5e-324, 1.7976931348623157e308)
 
 
 def test_rigid_contact_is_inverted(surrogate):
@@ -184,7 +187,10 @@ def test_rigid_contact_is_inverted(surrogate):
      ("target", ("v0", -0.1, others(CASE, "v0"))), ("target", ("v0", [0.1, math.nan], others(CASE, "v0"))),
      ("mu0", ("v0", 0.1, {**others(CASE, "v0"), "mu0": 0.0})),
      ("range", ("v0", 0.1, others(CASE, "v0"), (1.0, 1.0))), ("range", ("k", 0.1, others(CASE, "k"), (0.0, 1.0))),
-     ("range", ("v0", 0.1, others(CASE, "v0"), (0.0, math.inf)))],
+     ("range", ("v0", 0.1, others(CASE, "v0"), (0.0, math.inf))),
+     ("f", ("v0", 0.1, {**others(others(CASE, "v0"), "omega"), "f": 1e308})),
+     ("f", ("omega", 0.1, {**others(CASE, "omega"), "f": 1e3})),
+     ("k", ("v0", 0.1, {**others(CASE, "v0"), "k": [1e6, 2e6]}))],
 )  # fmt: skip
 def test_a_bad_question_names_its_field(surrogate, field, arguments):
     with pytest.raises(InputError) as caught:

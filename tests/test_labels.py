@@ -277,3 +277,71 @@ def test_a_graph_is_small_and_travels_to_workers(table: Surrogate) -> None:
     found = table.evaluate(**{**CASE, "v0": v0})
     computed = found.mu_macro.compute(scheduler="processes", num_workers=2)
     np.testing.assert_array_equal(computed, table.evaluate(**{**CASE, "v0": columns()["v0"]}).mu_macro)
+
+
+# --- names and units; other tables --------------------------------------------------------------------
+
+
+def test_results_of_xarray_have_names_and_units_of_their_own(table: Surrogate) -> None:
+    v0 = xr.DataArray([0.01, 0.02], dims="t", name="v0", attrs={"units": "m/s", "long_name": "sliding speed"})
+    found = table.evaluate(**{**CASE, "v0": v0}, gradient=True)
+    names = (*VALUES, "regime", "source", "regime_code", "regime_certain")
+    arrays = {name: getattr(found, name) for name in names}
+    arrays |= {f"d_mu_macro_d_{name}": slope for name, slope in found.gradient.items()}
+    arrays |= {f"d_mu_macro_d_{name}_bound": bound for name, bound in found.gradient_bound.items()}
+    for name, array in arrays.items():
+        assert array.name == name
+        assert set(array.attrs) == {"units", "long_name"}
+        assert array.attrs["long_name"] != "sliding speed"
+    units = {name: array.attrs["units"] for name, array in arrays.items() if array.attrs["units"] != "1"}
+    per = {"Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}
+    expected = {f"d_mu_macro_d_{name}{end}": unit for name, unit in per.items() for end in ("", "_bound")}
+    assert units == {**expected, "length_scale": "m"}
+    data = table.evaluate(xr.Dataset({**CASE, "v0": v0}))
+    assert data.mu_macro.attrs == found.mu_macro.attrs
+    assert v0.attrs["units"] == "m/s"  # the input is as it was
+
+
+def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
+    frames = pytest.importorskip("dask.dataframe")
+    frame = pd.DataFrame({**columns(), "note": "x"}).drop(columns="Fz")
+    lazy = frames.from_pandas(frame, npartitions=3)
+    found = table.evaluate(lazy, Fz=10.0)
+    assert isinstance(found, frames.DataFrame)
+    assert found.npartitions == 3
+    pd.testing.assert_frame_equal(found.compute(scheduler="threads"), table.evaluate(frame, Fz=10.0))
+    with pytest.raises(InputError, match=r"^v0 must be given once"):
+        table.evaluate(lazy, Fz=10.0, v0=0.01)
+    with pytest.raises(InputError, match=r"^Fz must be given"):
+        table.evaluate(lazy)
+    with pytest.raises(InputError, match=r"^v0 must be a Dask array: .to_dask_array"):
+        table.evaluate(**{**CASE, "v0": lazy["v0"]})
+
+
+@pytest.mark.parametrize("library", ["pyarrow", "polars"])
+def test_columns_of_arrow_tables_give_arrays(table: Surrogate, library: str) -> None:
+    module = pytest.importorskip(library)
+    given = {name: values.tolist() for name, values in columns().items()}
+    given["v0"][7] = None
+    given["omega"] = [130_000] * N
+    make = module.table if library == "pyarrow" else module.DataFrame
+    expected = columns()
+    expected["v0"][7] = math.nan
+    want = table.evaluate(expected, gradient=True)
+    found = table.evaluate(make(given), gradient=True)
+    same(found, want)
+    same(table.evaluate(**{name: make(given)[name] for name in given}, gradient=True), want)
+    assert isinstance(found.mu_macro, np.ndarray)
+    words = make({**given, "k": ["rigid"] * N})
+    np.testing.assert_array_equal(table.evaluate(words).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro)
+    gap = make({"k": [None, 1e6]})["k"]
+    assert np.isnan(table.evaluate(**{**CASE, "k": gap}).mu_macro).tolist() == [True, False]
+
+
+def test_what_has_no_columns_by_name_is_refused_with_its_type_and_a_remedy(table: Surrogate) -> None:
+    pa = pytest.importorskip("pyarrow")
+    reader = pa.RecordBatchReader.from_batches(pa.schema([]), [])
+    for cases, kind in ((reader, "pyarrow.lib.RecordBatchReader"), ([1.0], "builtins.list"), ("cases", "builtins.str")):
+        with pytest.raises(InputError, match=r"Arrow table.*\{name: array\}.*read_all\(\)") as caught:
+            table.evaluate(cases)
+        assert kind in str(caught.value)

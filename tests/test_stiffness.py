@@ -66,6 +66,31 @@ def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_l
     assert same.k == close(same.k_normal, rel=1e-14)
 
 
+@pytest.mark.parametrize(("across", "along"), [(1.3, 1.0), (1.0, 1.3)])
+def test_of_two_stiffnesses_the_one_of_the_oscillation_belongs_in_the_model(surrogate, across, along) -> None:
+    """Eqs. (9) to (12) with two springs, marched: ``across`` along the sliding, ``along`` along the oscillation."""
+    v, y = (x.ravel() for x in np.meshgrid([0.2, 0.6, 2.0], [0.3, 0.8, 1.2, 3.0, 10.0], indexing="ij"))
+    steps, springs = 1000, np.array([[across], [along]])
+    path = np.sin(np.linspace(0.0, 2.0 * math.pi, steps + 1))
+    force = np.zeros((2, v.size))
+    for _ in range(15):
+        total = np.zeros(v.size)
+        for rise in np.diff(path):
+            free = force + springs * np.array([v * (2.0 * math.pi / steps), y * rise])
+            # slip along the force by as much as brings it back to 1: Newton's method for its length
+            slip = np.zeros(v.size)
+            for _ in range(3):
+                force = free / (1.0 + springs * slip)
+                excess = (force * force).sum(axis=0) - 1.0
+                slope = 2.0 * (force * force * springs / (1.0 + springs * slip)).sum(axis=0)
+                slip = np.maximum(slip + excess / slope, 0.0)
+            force = free / (1.0 + springs * slip)
+            total += force[0]
+    off = [np.abs(surrogate.mu_ratio(v * k, y * k) - total / steps).max() for k in (along, across)]
+    assert off[0] < 0.02
+    assert off[1] > 0.12
+
+
 def test_stiffness_has_its_scaling_laws() -> None:
     # lengths times 2, forces times 4: the same strains, k twice
     small = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL)
@@ -91,6 +116,8 @@ def test_springs_in_series() -> None:
         (lambda: ball_on_flat(-1.0, 1.0, STEEL, STEEL), "radius"),
         (lambda: ball_on_flat(1.0, math.inf, STEEL, STEEL), "Fz"),
         (lambda: ball_on_flat(1.0, 1.0, RIGID, RIGID), "E"),
+        (lambda: ball_on_flat(1e-300, 1e-300, STEEL, STEEL), "half_width"),
+        (lambda: cylinder_on_flat(1e-300, 1.0, 1e-300, STEEL, STEEL), "half_width"),
         (lambda: flat_punch(0.0, 1.0, STEEL, STEEL), "radius"),
         (lambda: cylinder_on_flat(1.0, 1e-6, 1e3, STEEL, STEEL), "length"),
         (lambda: in_series(1.0, -1.0), "stiffness"),

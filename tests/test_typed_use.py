@@ -15,7 +15,7 @@ import mumacro
 LEFT_OUT = {"mumacro.__main__", "mumacro._kernel"}  # the second is no module of Python
 for package in ("jax", "torch"):  # hundreds of megabytes, needed only by their own tests
     if importlib.util.find_spec(package) is None:
-        LEFT_OUT |= {f"mumacro.{package}", f"mumacro.interop.{package}"}
+        LEFT_OUT.add(f"mumacro.{package}")
 MODULES = sorted(
     {"mumacro", *(module.name for module in pkgutil.walk_packages(mumacro.__path__, "mumacro."))} - LEFT_OUT
 )

@@ -133,7 +133,7 @@ def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None
         assert errors.values.keys() == errors.cells.keys() == block.nodes.keys()
         for name in block.nodes:
             assert 0.0 < errors.values[name] <= block.errors[name][0], chart.name
-            assert np.all((errors.cells[name] > 0.0) & (errors.cells[name] <= block.cell_errors[name])), chart.name
+            assert np.all((errors.cells[name] >= 0.0) & (errors.cells[name] <= block.cell_errors[name])), chart.name
         assert errors.absolute <= sound.tolerance
         assert errors.relative <= 10.0 * sound.tolerance
     wrong = block_errors(damaged("corner", 1.0 + 1e-5), sweep, 200, seed=1)[NAMES.index("corner")]
@@ -144,16 +144,16 @@ def test_errors_of_every_block_are_found(sound: Surrogate, sweep: Sweep) -> None
 def test_report_of_power_stick_fraction_and_slopes(sound: Surrogate, sweep: Sweep) -> None:
     report = verify(sound, sweep, 1000, seed=3)
     assert report["slopes"].keys() == {*QUANTITY_NAMES}
-    slopes = [(part, "max_abs_error", 1e-2) for part in report["slopes"].values()]
-    for part, error, most in (
-        (report["power"], "max_rel_error", 1e-5), (report["stick_fraction"], "max_abs_error", 1e-5), *slopes,
-    ):  # fmt: skip
+    slopes = [(part, "max_abs_error") for part in report["slopes"].values()]
+    for part, error in ((report["power"], "max_rel_error"), (report["stick_fraction"], "max_abs_error"), *slopes):
         assert part["not_covered"] == 0
-        assert 0.0 < part[error] < most
+        assert part[error] > 0.0
         assert part[error] == max(source[error] for source in part["sources"].values())
         assert len(part["sources"]) > 8
-    for name in ("power", "stick_fraction"):
+    for name, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error")):
+        assert report[name][error] < 1e-5
         assert set(report[name]["sources"]) == set(report["sources"])
+    assert report["slopes"]["mu_ratio"]["max_abs_error"] < 1e-5
     assert set(uncovered(report)) == {*QUANTITY_NAMES, *(f"slopes of {name}" for name in QUANTITY_NAMES)}
 
 
@@ -187,7 +187,7 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
     values += 0.25 * part.errors["mu_ratio"][0] * (-1.0) ** np.arange(values.shape[1])
     wrong = Surrogate(table, TABLE)
     found = block_errors(wrong, sweep, 200, seed=1)[NAMES.index(block)]
-    assert np.all(found.cells["mu_ratio"][:, 2].max() > part.cell_errors["mu_ratio"][:, 2].max())
+    assert np.any(found.cells["mu_ratio"][:, 2] > part.cell_errors["mu_ratio"][:, 2])
     for name in part.nodes.keys() - {"mu_ratio"}:
         assert found.values[name] <= part.errors[name][0]
         assert np.all(found.cells[name] <= part.cell_errors[name])

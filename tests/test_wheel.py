@@ -176,6 +176,6 @@ def test_the_metadata_holds_the_version_of_the_library(installed):
     assert installed.run("python", "-c", program).strip() == "True"
 
 
-@pytest.mark.parametrize("module", ["mumacro.service", "mumacro.builder"])
-def test_parts_of_the_package_run_by_their_names_too(installed, module):
-    assert "is not installed: pip install" in installed.run("python", "-m", module, code=1)
+@pytest.mark.parametrize("words", [("mumacro.service",), ("mumacro.builder", "solve", "--v", "0.1", "--y", "0.5")])
+def test_parts_of_the_package_run_by_their_names_too(installed, words):
+    assert "is not installed: pip install" in installed.run("python", "-m", *words, code=1)

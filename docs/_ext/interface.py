@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 from collections.abc import Iterator
 from contextlib import redirect_stdout, suppress
@@ -20,14 +21,7 @@ COLUMNS = "100"
 def help_of(command: str) -> str:
     """What ``command --help`` prints, without starting a process."""
     words = [*command.removeprefix("python -m ").split(), "--help"]
-    if words[0] == "builder":
-        from typer.testing import CliRunner
-
-        from builder.__main__ import app
-
-        return CliRunner().invoke(app, words[1:], prog_name="python -m builder", env={"COLUMNS": COLUMNS}).output
-    from mumacro.__main__ import main
-
+    main = importlib.import_module(f"{words[0]}.__main__").main
     text = io.StringIO()
     with redirect_stdout(text), suppress(SystemExit), patch.dict("os.environ", {"COLUMNS": COLUMNS}):
         main(words[1:])

@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.charts import QUANTITY_NAMES
 from mumacro.inputs import FIELDS
-
-if TYPE_CHECKING:
-    from mumacro.answer import Answer
-    from mumacro.surrogate import Surrogate
+from mumacro.surrogate import Surrogate
 
 __all__ = ["NO_SECOND", "DifferentiableFriction", "Quantity", "quantities"]
 
@@ -29,17 +27,7 @@ NO_SECOND = "second derivatives are not tabulated: take differences of the first
 
 @dataclass(frozen=True)
 class Quantity:
-    """A function of arrays of one shape.
-
-    Attributes
-    ----------
-    inputs : tuple of str
-        Names of its arguments, in order.
-    value : callable
-        Arrays of float64 of one shape in, one of that shape out.
-    slopes : callable
-        The same in, the slopes along the inputs out, (inputs, *shape).
-    """
+    """A function of arrays of one shape: ``slopes`` are those along the inputs, (inputs, *shape)."""
 
     inputs: tuple[str, ...]
     value: Callable[..., Array]
@@ -49,66 +37,72 @@ class Quantity:
 class DifferentiableFriction:
     """What the classes for JAX and PyTorch share: the quantities by name.  Arguments broadcast together."""
 
-    def _call(self, name: str, *arguments: Any) -> Any:
+    def __init__(self, surrogate: Surrogate | None = None) -> None:
+        known = quantities(Surrogate.open() if surrogate is None else surrogate)
+        self._known = {name: self._made(quantity) for name, quantity in known.items()}
+
+    def _made(self, quantity: Quantity) -> Any:
+        return quantity
+
+    def _call(self, quantity: Any, *arguments: Any) -> Any:
         raise NotImplementedError
 
     def mu_macro(self, mu0: Any, Fz: Any, k: Any, y0: Any, omega: Any, v0: Any) -> Any:
         """mu_macro [-] from SI inputs, see :meth:`mumacro.Surrogate.evaluate`; k None or inf is rigid contact."""
-        return self._call("mu_macro", mu0, Fz, math.inf if k is None else k, y0, omega, v0)
+        return self._call(self._known["mu_macro"], mu0, Fz, math.inf if k is None else k, y0, omega, v0)
 
     def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
         """mu~ = mu_macro/mu0 [-], see :meth:`mumacro.Surrogate.mu_ratio`."""
-        return self._call("mu_ratio", v_tilde, y_tilde)
+        return self._call(self._known["mu_ratio"], v_tilde, y_tilde)
 
     def power(self, v_tilde: Any, y_tilde: Any) -> Any:
         """Mean power of the shaker [-], see :meth:`mumacro.Surrogate.power`."""
-        return self._call("power", v_tilde, y_tilde)
+        return self._call(self._known["power"], v_tilde, y_tilde)
 
     def stick_fraction(self, v_tilde: Any, y_tilde: Any) -> Any:
         """Share of the period that sticks [-], see :meth:`mumacro.Surrogate.stick_fraction`."""
-        return self._call("stick_fraction", v_tilde, y_tilde)
+        return self._call(self._known["stick_fraction"], v_tilde, y_tilde)
 
 
 def quantities(surrogate: Surrogate) -> Mapping[str, Quantity]:
     """The differentiable quantities of a table by name."""
 
-    def cases(six: tuple[Array, ...], gradient: bool = False) -> Answer[Any]:
-        answer: Answer[Any] = surrogate.evaluate(
-            dict(zip(FIELDS, map(np.atleast_1d, six), strict=True)), gradient=gradient
-        )
-        return answer
-
     def mu_macro(*six: Array) -> Array:
-        found: Array = cases(six).mu_macro
-        return found.reshape(np.shape(six[0]))
+        found: Array = surrogate.evaluate(dict(zip(FIELDS, six, strict=True))).mu_macro
+        return found
 
     def mu_macro_slopes(*six: Array) -> Array:
-        gradient = cases(six, gradient=True).gradient or {}
-        return np.stack([gradient[name] for name in FIELDS]).reshape(6, *np.shape(six[0]))
+        gradient = surrogate.evaluate(dict(zip(FIELDS, six, strict=True)), gradient=True).gradient
+        return np.stack([gradient[name] for name in FIELDS])
 
-    pointwise = {name: _of_groups(surrogate, name) for name in QUANTITY_NAMES}
-    return {"mu_macro": Quantity(FIELDS, mu_macro, mu_macro_slopes), **pointwise}
+    found = {"mu_macro": Quantity(FIELDS, _of_any_shape(mu_macro), _of_any_shape(mu_macro_slopes))}
+    for name in QUANTITY_NAMES:
+        slopes = _of_any_shape(partial(_slopes, surrogate, name))
+        found[name] = Quantity(("v_tilde", "y_tilde"), _of_any_shape(getattr(surrogate, name)), slopes)
+    return found
 
 
-def _of_groups(surrogate: Surrogate, name: str) -> Quantity:
-    """A quantity of v~ and y~; a single point, too, gives NaN where it is illegal."""
-    method = getattr(surrogate, name)
+def _of_any_shape(function: Callable[..., Array]) -> Callable[..., Array]:
+    """``function`` of arrays (n,), with or without an axis before the last in its result, for arrays of any shape.
 
-    def value(v: Array, y: Array) -> Array:
-        found: Array = method(np.atleast_1d(v), np.atleast_1d(y))
-        return found.reshape(np.shape(v))
+    A single point, too, gives NaN where it is illegal.
+    """
 
-    def slopes(v: Array, y: Array) -> Array:
-        shape, v, y = np.shape(v), np.atleast_1d(v), np.atleast_1d(y)
-        _, along_v, along_y = surrogate.slopes(v, y, name)
-        with np.errstate(all="ignore"):
-            by_speed, by_amplitude = along_v / v, np.where(y == 0.0, 0.0 * along_y, along_y / y)  # even in y~
-        rest = (v == 0.0) & ~np.isnan(along_v)
-        if rest.any():
-            by_speed[rest] = _from_rest(surrogate, name, y[rest])
-        return np.stack([by_speed, by_amplitude]).reshape(2, *shape)
+    def called(*arrays: Array) -> Array:
+        found = function(*(np.ravel(x) for x in arrays))
+        return found.reshape(*found.shape[:-1], *np.shape(arrays[0]))
 
-    return Quantity(("v_tilde", "y_tilde"), value, slopes)
+    return called
+
+
+def _slopes(surrogate: Surrogate, name: str, v: Array, y: Array) -> Array:
+    _, along_v, along_y = surrogate.slopes(v, y, name)
+    with np.errstate(all="ignore"):
+        by_speed, by_amplitude = along_v / v, np.where(y == 0.0, 0.0 * along_y, along_y / y)  # even in y~
+    rest = (v == 0.0) & ~np.isnan(along_v)
+    if rest.any():
+        by_speed[rest] = _from_rest(surrogate, name, y[rest])
+    return np.stack([by_speed, by_amplitude])
 
 
 def _from_rest(surrogate: Surrogate, name: str, y: Array) -> Array:

@@ -5,22 +5,45 @@ The inputs of one call come from one of these libraries, with plain numbers and 
 
 from __future__ import annotations
 
+import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mumacro.answer import Answer
 from mumacro.errors import InputError
-from mumacro.inputs import FIELDS
+from mumacro.inputs import FIELDS, PER_UNIT
 
 if TYPE_CHECKING:
     from mumacro.surrogate import Surrogate
 
 __all__ = ["evaluate_labelled"]
 
-_VALUES = ("mu_macro", "mu_ratio", "error_bound", "source_code")
+_GROUPS = ("v_tilde", "y_tilde", "length_scale")
+#: name -> units and long_name, as xarray and CF write them
+_ABOUT = {
+    "mu_macro": ("1", "macroscopic friction coefficient"),
+    "mu_ratio": ("1", "macroscopic over Coulomb friction coefficient"),
+    "error_bound": ("1", "bound of the absolute error of mu_macro"),
+    "source_code": ("1", "index of the block or closed form that gave the value, -1 for an illegal case"),
+    "v_tilde": ("1", "dimensionless sliding speed"),
+    "y_tilde": ("1", "dimensionless oscillation amplitude"),
+    "length_scale": ("m", "mu0 Fz / k"),
+    "regime": ("1", "continuous, stick_slip or static"),
+    "regime_code": ("1", "index of the regime, -1 for an illegal case"),
+    "regime_certain": ("1", "whether the regime is certain"),
+    "source": ("1", "block or closed form that gave the value"),
+} | {
+    f"d_mu_macro_d_{name}{end}": (PER_UNIT[name].replace("-", "1"), f"{what} of mu_macro along {name}")
+    for end, what in (("", "slope"), ("_bound", "bound of the absolute error of the slope"))
+    for name in FIELDS
+}
+_SLOPES = [name for name in _ABOUT if name.startswith("d_")]
+_KINDS = {"source_code": np.int8, "regime_code": np.int8, "regime_certain": np.bool_, "source": object,
+          "regime": object}  # fmt: skip
+Apply = Callable[[Callable[..., Any], Mapping[str, Any], Sequence[str]], list[Any]]
 
 
 def evaluate_labelled(
@@ -30,144 +53,141 @@ def evaluate_labelled(
 
     Returns
     -------
-    Answer, pandas.DataFrame or xarray.Dataset
-        An answer whose attributes are Series, DataArrays or Dask arrays; for a DataFrame or Dataset of cases one of
-        these, with the columns mu_macro, mu_ratio, regime, error_bound and source (regime and source as categories).
+    Answer, DataFrame of pandas or Dask, or xarray.Dataset
+        An answer whose attributes are Series, DataArrays or Dask arrays, by their names, for xarray with ``units`` and
+        ``long_name``; for a DataFrame or Dataset of cases one of these, with the columns mu_macro, mu_ratio, regime,
+        error_bound and source (regime and source of pandas as categories).
 
     Raises
     ------
     InputError
         Series whose indexes differ, objects of two libraries in one call, and what ``evaluate`` refuses.
     """
-    given = {name: value for name, value in inputs.items() if name != "k" or value is not None}
-    libraries = {type(x).__module__.partition(".")[0] for x in (cases, *given.values())} & {"pandas", "xarray", "dask"}
+    given = {name: math.inf if name == "k" and value is None else value for name, value in inputs.items()}
+    kinds = {name: type(value).__module__.partition(".")[0] for name, value in {"": cases, **given}.items()}
+    libraries = set(kinds.values()) & set(_APPLY)
     if "pandas" in libraries and len(libraries) > 1:
         raise InputError("inputs", sorted(libraries), "objects of one library: pandas, or xarray and Dask")
-    if "k" in inputs and inputs["k"] is None:
-        given["k"] = math.inf
-    options = {"gradient": gradient, "groups": groups or gradient, "illegal": illegal}
-    if "pandas" in libraries:
-        answer = _pandas(surrogate, given, options)
-    else:
-        answer = _lazy(surrogate, given, options, xarray="xarray" in libraries)
-    if cases is None or isinstance(cases, dict):
-        return answer
-    columns = {"mu_macro": answer.mu_macro, "mu_ratio": answer.mu_ratio, "regime": answer.regime,
-               "error_bound": answer.error_bound, "source": answer.source}  # fmt: skip
-    if "pandas" in libraries:
-        import pandas as pd
-
-        return pd.DataFrame(columns)
-    import xarray as xr
-
-    return xr.Dataset(columns)
-
-
-def _pandas(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str, Any]) -> Answer[Any]:
-    import pandas as pd
-
-    index: Any = None
-    plain = {}
+    library = next(name for name in _APPLY if name in libraries)
+    table = surrogate if library == "pandas" else surrogate.on_one_thread()  # Dask has its own threads
+    if kinds[""] == "dask":
+        beside = {name: value for name, value in inputs.items() if name not in cases.columns}
+        return _parts(table, cases, {"gradient": gradient, "groups": groups, "illegal": illegal, **beside})
     for name, value in given.items():
-        if isinstance(value, (pd.Series, pd.Index)):
-            own = value.index if isinstance(value, pd.Series) else value
-            if isinstance(value, pd.Series):
-                if index is not None and not own.equals(index):
-                    raise InputError(name, "a Series", "indexed as the other inputs are: align them first")
-                index = own
-            plain[name] = value.to_numpy()
-        else:
-            plain[name] = value
-    found = surrogate.evaluate(**plain, **options)
+        if hasattr(value, "to_dask_array"):
+            raise InputError(name, type(value).__name__, "a Dask array: .to_dask_array(lengths=True)")
+    names = ["mu_macro", "mu_ratio", "error_bound", "source_code"]
+    names += [*(_GROUPS if groups or gradient else ()), *(_SLOPES if gradient else ())]
 
-    def series(values: Any) -> Any:
-        return values if np.ndim(values) == 0 else pd.Series(values, index=index)
+    def chunk(*values: Any) -> list[Any]:
+        found = table.evaluate(dict(zip(given, values, strict=True)), gradient=gradient, groups=groups, illegal=illegal)
+        slopes = [*found.gradient.values(), *found.gradient_bound.values()] if gradient else []
+        return [getattr(found, name) for name in names if name not in _SLOPES] + slopes
 
-    def categories(table: Any, code: Any) -> Any:
-        found = table[code.to_numpy()]
-        if table.dtype == object:  # names: as categories, without the empty one of illegal cases
-            kinds = list(dict.fromkeys(name for name in table if name))
-            found = pd.Categorical(np.where(found == "", None, found), categories=kinds)
-        return pd.Series(found, index=index)
+    apply = _APPLY[library]
+    found = dict(zip(names, apply(chunk, given, names), strict=True))
 
-    return _answer([getattr(found, name) for name in _VALUES], found, series, categories)
-
-
-def _answer(
-    values: list[Any], found: Answer[Any], wrap: Callable[[Any], Any], look_up: Callable[[Any, Any], Any]
-) -> Answer[Any]:
-    mu_macro, mu_ratio, bound, source = map(wrap, values)
-    answer = Answer(mu_macro, mu_ratio, bound, source, look_up=look_up)
-    if found._groups is not None:
-        answer._groups, certain = tuple(map(wrap, found._groups)), found._certain
-        answer._certain = None if certain is None else lambda v, y: wrap(certain(np.asarray(v), np.asarray(y)))
-    for name in ("gradient", "gradient_bound"):
-        slopes = getattr(found, name)
-        setattr(answer, name, None if slopes is None else {field: wrap(slopes[field]) for field in FIELDS})
-    return answer
-
-
-def _lazy(surrogate: Surrogate, given: Mapping[str, Any], options: Mapping[str, Any], xarray: bool) -> Answer[Any]:
-    """One pass over every chunk, on one thread: Dask has its own."""
-    names = list(given)
-    counts = {"groups": 3 if options["groups"] else 0, "gradient": 12 if options["gradient"] else 0}
-    outputs = len(_VALUES) + sum(counts.values())
-    serial = surrogate.on_one_thread()
-    kinds = [np.dtype(np.int8) if name == "source_code" else np.dtype(np.float64) for name in _VALUES]
-    kinds += [np.dtype(np.float64)] * (outputs - len(_VALUES))
-
-    def chunk(*values: Any) -> tuple[Any, ...]:
-        arrays: dict[str, Any] = dict(zip(names, map(np.asarray, values), strict=True))
-        found = serial.evaluate(**arrays, **options)
-        parts = [getattr(found, name) for name in _VALUES]
-        if found._groups is not None and options["groups"]:
-            parts += found._groups
-        if found.gradient is not None and found.gradient_bound is not None:
-            parts += [*found.gradient.values(), *found.gradient_bound.values()]
-        return tuple(np.asarray(part, kind) for part, kind in zip(parts, kinds, strict=True))
+    def look_up(name: str, entries: Any, code: Any) -> Any:
+        if library == "pandas" and entries.dtype == object:
+            return _categories(entries, code, name)
+        return apply(lambda codes: [entries[codes]], {"source_code": code}, [name])[0]
 
     def certain(v: Any, y: Any) -> Any:
-        return np.asarray(serial._certain(v, y))
+        return apply(lambda *both: [table._certain(*both)], {"v_tilde": v, "y_tilde": y}, ["regime_certain"])[0]
 
-    if xarray:
-        import xarray as xr
+    mu_macro, mu_ratio, bound, code = (found[name] for name in names[:4])
+    answer = Answer(mu_macro, mu_ratio, bound, code, look_up=look_up)
+    if groups or gradient:
+        answer._groups, answer._certain = (found["v_tilde"], found["y_tilde"], found["length_scale"]), certain
+    if gradient:
+        answer.gradient = {name: found[f"d_mu_macro_d_{name}"] for name in FIELDS}
+        answer.gradient_bound = {name: found[f"d_mu_macro_d_{name}_bound"] for name in FIELDS}
+    if kinds[""] not in ("pandas", "xarray"):
+        return answer
+    columns = {name: getattr(answer, name) for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source")}
+    whole = importlib.import_module(kinds[""])
+    return whole.DataFrame(columns) if library == "pandas" else whole.Dataset(columns)
 
-        def apply(function: Any, *over: Any, kinds: list[Any]) -> Any:
-            outs: list[tuple[()]] = [()] * len(kinds)
-            return xr.apply_ufunc(function, *over, output_core_dims=outs, dask="parallelized", output_dtypes=kinds)
 
-        def look_up(table: Any, code: Any) -> Any:
-            return apply(table.__getitem__, code, kinds=[table.dtype])
-    else:
-        import dask.array
+def _parts(table: Surrogate, cases: Any, options: dict[str, Any]) -> Any:
+    """A DataFrame of Dask, part by part; one without rows is evaluated now, so that faults of its columns show."""
+    import pandas as pd
 
-        da: Any = dask.array  # of which parts have no types
+    empty = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in cases.dtypes.items()})
+    return cases.map_partitions(table.evaluate, meta=table.evaluate(empty, **options), **options)
 
-        def apply(function: Any, *over: Any, kinds: list[Any]) -> Any:
-            signature = ",".join(["()"] * len(over)) + "->" + ",".join(["()"] * len(kinds))
-            return da.apply_gufunc(function, signature, *over, output_dtypes=kinds, vectorize=False)
 
-        def look_up(table: Any, code: Any) -> Any:
-            return code.map_blocks(table.__getitem__, dtype=table.dtype)
+# --- a function of arrays, applied to labelled objects: one result for each name --------------------------
 
+
+def _kinds(names: Sequence[str]) -> list[Any]:
+    return [_KINDS.get(name, np.float64) for name in names]
+
+
+def _plain(function: Callable[..., Any], names: Sequence[str]) -> Callable[..., Any]:
+    """``function`` with arrays of known types as its results; one alone is no tuple."""
+
+    def called(*values: Any) -> Any:
+        found = function(*map(np.asarray, values))
+        arrays = tuple(np.asarray(x, kind) for x, kind in zip(found, _kinds(names), strict=True))
+        return arrays if len(names) > 1 else arrays[0]
+
+    return called
+
+
+def _aligned(call: Callable[[], Any], given: Mapping[str, Any]) -> list[Any]:
+    """All results of ``call``; InputError where the labels or shapes of its arguments do not fit."""
     try:
-        columns = apply(chunk, *given.values(), kinds=kinds)
+        found = call()
     except InputError:
         raise
     except ValueError as error:
         labels = {name: getattr(value, "sizes", np.shape(value)) for name, value in given.items()}
         raise InputError("inputs", labels, "labelled and shaped alike: align them first") from error
-    mu_macro, mu_ratio, bound, source = columns[: len(_VALUES)]
-    answer = Answer(mu_macro, mu_ratio, bound, source, look_up=look_up)
-    rest = list(columns[len(_VALUES) :])
-    if counts["groups"]:
-        answer._groups, rest = tuple(rest[:3]), rest[3:]
-        answer._certain = (
-            (lambda v, y: apply(certain, v, y, kinds=[np.dtype(np.bool_)]))
-            if xarray
-            else (lambda v, y: da.map_blocks(certain, v, y, dtype=np.bool_))
-        )
-    if counts["gradient"]:
-        answer.gradient = dict(zip(FIELDS, rest[:6], strict=True))
-        answer.gradient_bound = dict(zip(FIELDS, rest[6:], strict=True))
-    return answer
+    return list(found) if isinstance(found, tuple) else [found]
+
+
+def _pandas(function: Callable[..., Any], given: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
+    import pandas as pd
+
+    series = {name: value for name, value in given.items() if isinstance(value, pd.Series)}
+    index = next((value.index for value in series.values()), None)
+    for name, value in series.items():
+        if not value.index.equals(index):
+            raise InputError(name, "a Series", "indexed as the other inputs are: align them first")
+    plain = [x.to_numpy() if isinstance(x, (pd.Series, pd.Index)) else x for x in given.values()]
+    arrays = _aligned(lambda: _plain(function, names)(*plain), given)
+    return _aligned(lambda: tuple(pd.Series(x, index, name=n) for x, n in zip(arrays, names, strict=True)), given)
+
+
+def _categories(entries: Any, code: Any, name: str) -> Any:
+    """Names as categories, without the empty one of illegal cases."""
+    import pandas as pd
+
+    kinds = list(dict.fromkeys(entry for entry in entries if entry))
+    places = np.array([kinds.index(entry) if entry else -1 for entry in entries])
+    return pd.Series(pd.Categorical.from_codes(places[code.to_numpy()], kinds), code.index, name=name)
+
+
+def _xarray(function: Callable[..., Any], given: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
+    import xarray as xr
+
+    options: dict[str, Any] = {"output_core_dims": [()] * len(names), "output_dtypes": _kinds(names)}
+    options |= {"dask": "parallelized", "keep_attrs": False}
+    arrays = _aligned(lambda: xr.apply_ufunc(_plain(function, names), *given.values(), **options), given)
+    found = [array.rename(name) for array, name in zip(arrays, names, strict=True)]
+    for array, name in zip(found, names, strict=True):
+        array.attrs = dict(zip(("units", "long_name"), _ABOUT[name], strict=True))
+    return found
+
+
+def _dask(function: Callable[..., Any], given: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
+    import dask.array
+
+    apply: Any = dask.array.apply_gufunc  # which has no types
+    signature = ",".join(["()"] * len(given)) + "->" + ",".join(["()"] * len(names))
+    options = {"output_dtypes": _kinds(names) if len(names) > 1 else _kinds(names)[0], "vectorize": False}
+    return _aligned(lambda: apply(_plain(function, names), signature, *given.values(), **options), given)
+
+
+_APPLY: dict[str, Apply] = {"pandas": _pandas, "xarray": _xarray, "dask": _dask}

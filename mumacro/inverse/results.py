@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
-from mumacro.inputs import BOUNDS, FIELDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE, UNITS
+from mumacro.inputs import FIELDS, as_columns, check_inputs
 
 __all__ = ["Crossing", "Reach", "Root", "Solution", "checked_case"]
 
@@ -96,48 +95,24 @@ class Crossing:
     mu_macro: float
 
 
-def checked_case(case: Mapping[str, float | None], without: str) -> dict[str, float | None]:
-    """The five known inputs as floats; ``k`` is None for rigid contact.
+def checked_case(case: Mapping[str, Any], without: str) -> dict[str, float]:
+    """The five known inputs [SI]; an infinite ``k`` is rigid contact.
 
-    ``f`` [Hz] may stand for ``omega`` [rad/s].
+    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.
 
     Raises
     ------
     InputError
-        A value is missing, out of bounds, given twice, or given for the unknown.
+        A value is missing, not one number, out of bounds, given twice, or given for the unknown.
     """
     if without not in FIELDS:
         raise InputError("unknown", without, f"one of {', '.join(FIELDS)}")
-    given = dict(case)
-    frequency = given.pop("f", None)
-    if frequency is not None:
-        if given.get("omega") is not None:
-            raise InputError("f", frequency, "left out where omega is given")
-        omega = RAD_PER_CYCLE * _number("f", frequency, "finite and >= 0")
-        if omega == math.inf:
-            raise InputError("f", frequency, f"at most {MOST_HZ:.4g} Hz, where omega leaves double range")
-        given["omega"] = omega
-    if given.get(without) is not None:
-        raise InputError(without, given[without], "left out, because it is the unknown")
-    out: dict[str, float | None] = {}
-    for name in FIELDS:
-        if name == without:
-            continue
-        if name == "k" and name in given and given[name] in (None, math.inf):
-            out[name] = None
-            continue
-        if given.get(name) is None:
-            hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
-            raise InputError(name, None, f"given{hint}")
-        out[name] = _number(name, given[name], BOUNDS[name])
-    return out
-
-
-def _number(name: str, value: object, bound: str) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(name, value, bound) from error
-    if not (math.isfinite(number) and (number > 0.0 or (number == 0.0 and name not in POSITIVE))):
-        raise InputError(name, value, bound)
-    return number
+    given = {name: value for name, value in case.items() if value is not None or name == "k" != without}
+    for name in given.keys() & ({"omega", "f"} if without == "omega" else {without}):
+        raise InputError(name, given[name], f"left out, because {without} is the unknown")
+    columns = as_columns({**given, without: 1.0})
+    for name, column in columns.items():
+        if column.size != 1:
+            raise InputError(name, given.get(name, given.get("f")), "one number")
+    check_inputs(columns, given.get("f"))
+    return {name: float(column.item()) for name, column in columns.items() if name != without}

@@ -28,32 +28,27 @@ _PER_CALL = 512
 
 
 class Sweep:
-    """mu_macro as a function of one input; ``case`` holds the other five, ``k`` None or missing is rigid contact."""
+    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite ``k`` is rigid."""
 
-    def __init__(self, surrogate: Surrogate, case: Mapping[str, float | None], unknown: str) -> None:
-        self.surrogate = surrogate
-        self.unknown = unknown
-        self.case: dict[str, Any] = {"k": None, **case}
+    def __init__(self, surrogate: Surrogate, case: Mapping[str, float], unknown: str) -> None:
+        self.surrogate, self.case, self.unknown = surrogate, case, unknown
 
-    def answer(self, x: Array) -> Answer[Any]:
+    def answer(self, x: Array, gradient: bool = False) -> Answer[Any]:
         """The surrogate's results at the values ``x`` (n,) of the input [SI]."""
-        answer: Answer[Any] = self.surrogate.evaluate(**{**self.case, self.unknown: x})
+        inputs: dict[str, Any] = {**self.case, self.unknown: x}
+        answer: Answer[Any] = self.surrogate.evaluate(**inputs, gradient=gradient)
         return answer
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""
-        out: Array = np.asarray(self.answer(x).mu_macro)
+        out: Array = self.answer(x).mu_macro
         return out
-
-    def at(self, x: float) -> float:
-        """mu_macro [-] at one value."""
-        return float(self.mu(np.array([x]))[0])
 
     def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
         """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
-        answer = self.surrogate.evaluate(**{**self.case, self.unknown: x}, gradient=True)
+        answer = self.answer(x, gradient=True)
         with np.errstate(over="ignore", invalid="ignore"):
-            return answer, x * answer.gradient[self.unknown]
+            return answer, x * answer.gradient[self.unknown]  # type: ignore[index]
 
 
 class Curve:

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,11 @@ from numpy.typing import ArrayLike, NDArray
 from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs import POSITIVE
-from mumacro.inverse.results import Reach, Root, Solution, checked_case
-from mumacro.inverse.rootfinding import TINY, Curve, Sweep
+from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case
+from mumacro.inverse.rootfinding import TINY, Curve, Sweep, last_double
 from mumacro.surrogate import Surrogate
 
-__all__ = ["MONOTONE", "Y_CLOSEST", "scale_of", "solve_for"]
+__all__ = ["border_crossings", "solve_for"]
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -48,45 +49,152 @@ HUGE = 1.7976931348623157e308
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  At r = 10, three
 # percent above its onset, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
-_PER_DECADE = 100
+# Where mu_macro is monotone, samples only bracket roots, for Newton's method to finish.
+_PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
 _MAX_SAMPLES = 20_001
-# Elsewhere samples only bracket roots, for Newton's method to finish: close together within so many decades of where
-# mu_macro turns from one limit to the other, wide apart in the rest of the double range.
-_NEAR, _NEAR_PER_DECADE, _FAR = 9, 6, 8
 # y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls strictly from 2 to 1/2
 # (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on either side.
-Y_CLOSEST = 1.290791
+_Y_CLOSEST = 1.290791
 
 
-def scale_of(case: Mapping[str, float | None], unknown: str) -> float:
-    """Value of ``unknown`` (k, Fz or mu0) at which y~ = 1, within double range; y0 must be > 0, k not None."""
-    product = {"k": ("mu0", "Fz"), "Fz": ("y0", "k"), "mu0": ("y0", "k")}[unknown]
-    divisor = {"k": "y0", "Fz": "mu0", "mu0": "Fz"}[unknown]
-    a, b = (math.log(float(case[name] or 1.0)) for name in product)
-    return math.exp(min(max(a + b - math.log(float(case[divisor] or 1.0)), -690.0), 690.0))
+def solve_for(
+    surrogate: Surrogate,
+    unknown: str,
+    targets: ArrayLike,
+    case: Mapping[str, float | None],
+    within: tuple[float, float] | None = None,
+) -> Solution:
+    """Every value of one input at which mu_macro has the wanted value.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        What is solved; a root is as good as its error bound, see :class:`Root`.
+    unknown : str
+        One of mu0, Fz, k, y0, omega, v0.
+    targets : array_like
+        Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
+    case : mapping
+        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
+    within : (float, float), optional
+        Search range [SI].  Left out: everywhere for v0, y0, omega; for k, Fz and mu0 from where the contact is so soft
+        that mu_macro = mu0 to where it is as good as rigid.
+
+    Returns
+    -------
+    Solution
+        All roots of every target, ascending, each with its interval from the error bound; and the reachable range.
+
+    Raises
+    ------
+    InputError
+        A value out of bounds, an unknown that is given or does not exist, an invalid range.
+
+    Examples
+    --------
+    >>> import mumacro
+    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
+    >>> found = solve_for(mumacro.open(), "y0", [0.15, 0.4], case)
+    >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]      # 0.4 is more than mu0
+    [['2.8570e-06 m'], []]
+    """
+    sweep = Sweep(surrogate, checked_case(case, unknown), unknown)
+    wanted = np.asarray(targets, dtype=np.float64).ravel()
+    bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
+    if bad.size:
+        raise InputError("target", float(wanted[bad[0]]), "finite and >= 0", int(bad[0]) if np.ndim(targets) else None)
+    low, high = _default_range(sweep, wanted) if within is None else _checked_range(within, unknown)
+    x = _samples(low, high, _PER_DECADE_MONOTONE if unknown in MONOTONE else _PER_DECADE)
+    answer = sweep.answer(x)
+    mu, noise = answer.mu_macro, 2.0 * answer.error_bound
+    turns = [] if unknown in MONOTONE else _turning_points(sweep, x, mu, noise)
+    curves = _curves(sweep, [low, *turns, high], x, mu)
+    if low == 0.0 and unknown != "v0" and abs(curves[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
+        # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
+        curves = [Curve(sweep, np.zeros(1), curves[0].mu[:1]), *_curves(sweep, [TINY, high], x, mu)]
+    ends = np.concatenate([curve.mu[[0, -1]] for curve in curves])
+    reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
+    constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in MONOTONE else float(noise.max()))
+    if within is None and unknown in MONOTONE and not constant:
+        reach = _without_limit(sweep, reach)
+    levels = tuple(wanted.tolist())
+    found = _roots(sweep, [] if constant else curves, wanted)
+    roots = (tuple(some) if reach.holds(level) else () for level, some in zip(levels, found, strict=True))
+    return Solution(unknown, levels, tuple(roots), reach, constant)
 
 
-def _ratio(case: Mapping[str, float | None]) -> float:
-    """r = y0 omega / v0 [-], cut to [1e-100, 1e100]."""
-    y0, omega, v0 = (float(case[name] or 0.0) for name in ("y0", "omega", "v0"))
-    if v0 == 0.0:
-        return 1.0
-    return math.exp(min(max(math.log(y0) + math.log(omega) - math.log(v0), -230.0), 230.0))
+def border_crossings(
+    surrogate: Surrogate, along: str, case: Mapping[str, float | None], low: float, high: float
+) -> tuple[Crossing, ...]:
+    """Where in ``low <= along <= high`` continuous sliding begins or ends: none, one, or (mu0, Fz, k) two places.
+
+    ``case`` holds the other five inputs.  None for rigid contact (never any stick) and without oscillation.
+    """
+    sweep = Sweep(surrogate, checked_case(case, along), along)
+    if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values():
+        return ()
+    middle = low if along in MONOTONE else _where(sweep, _Y_CLOSEST)
+    edges = np.array([low, middle, high] if low < middle < high else [low, high])
+
+    def slides(x: Array) -> Bools:
+        out: Bools = sweep.answer(x).regime == "continuous"
+        return out
+
+    state = slides(edges)
+    i = np.flatnonzero(state[1:] != state[:-1])
+    _, first = last_double(lambda x: slides(x) == state[i, None], edges[i], edges[i + 1])
+    return tuple(map(Crossing, first.tolist(), sweep.mu(first).tolist()))
 
 
-def _default_range(case: Mapping[str, float | None], unknown: str, targets: Array) -> tuple[float, float]:
-    """Where mu~ goes from 1 to its limit for rigid contact, to 1e-12 or so, and what the targets need beyond that."""
-    if case.get("k") is None and unknown != "k":
-        scale, y_low, y_high = 1.0, 1e-6, 1e6
-    else:
-        r = _ratio(case)
-        scale, y_low, y_high = scale_of(case, unknown), 1e-6, max(1e8, 1e8 * r, 1e3 * r * r)
-    low, high = (scale * y_low, scale * y_high) if unknown == "k" else (scale / y_high, scale / y_low)
+def _checked_range(within: tuple[float, float], unknown: str) -> tuple[float, float]:
+    low, high = (float(end) for end in within)
+    if not ((low > 0.0 if unknown in POSITIVE else low >= 0.0) and low < high < math.inf):
+        bound = "two ascending, finite numbers " + ("> 0" if unknown in POSITIVE else ">= 0")
+        raise InputError("range", [low, high], bound)
+    return low, high
+
+
+def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
+    """Everywhere; or from mu~ = 1 to its limit for rigid contact, to 1e-12 or so, and what the targets need beyond."""
+    case, unknown = sweep.case, sweep.unknown
+    if unknown in MONOTONE:
+        return 0.0, HUGE
+    if 0.0 in (case["y0"], case["omega"]):
+        return 1e-300, 1e300
+    y_high = 1e6
+    if case.get("k") != math.inf:
+        log_r = math.log(case["y0"]) + math.log(case["omega"]) - math.log(case["v0"]) if case["v0"] > 0.0 else 0.0
+        r = math.exp(min(log_r, 230.0))
+        y_high = max(1e8, 1e8 * r, 1e3 * r * r)
+    low, high = sorted((_where(sweep, 1e-6), _where(sweep, y_high)))
     if unknown == "mu0":  # mu_macro grows with it without limit
         wanted = targets[targets > 0.0]
-        if wanted.size:
-            low, high = min(low, 0.5 * float(wanted.min())), max(high, 2.0 * float(wanted.max()))
+        low, high = 0.5 * float(wanted.min(initial=2.0 * low)), 2.0 * float(wanted.max(initial=0.5 * high))
     return max(low, 1e-300), min(high, 1e300)
+
+
+def _where(sweep: Sweep, y_tilde: float) -> float:
+    """Value of k, Fz or mu0 at which y~ is ``y_tilde``, within double range; of a rigid contact any."""
+    at_one = float(sweep.surrogate.evaluate({**sweep.case, sweep.unknown: 1.0}).y_tilde)
+    scale = 1.0 if sweep.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
+    return y_tilde / scale if sweep.unknown == "k" else scale / y_tilde
+
+
+def _samples(low: float, high: float, per_decade: int) -> Array:
+    """Values > 0 from ``low`` to ``high``, ascending, evenly spread over the logarithm."""
+    start, stop = math.log(max(low, TINY)), math.log(high)
+    count = min(max(int((stop - start) / math.log(10.0) * per_decade), 64) + 1, _MAX_SAMPLES)
+    with np.errstate(over="ignore"):
+        return np.clip(np.exp(np.linspace(start, stop, count)), max(low, TINY), high)
+
+
+def _without_limit(sweep: Sweep, reach: Reach) -> Reach:
+    """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in general not reached."""
+    if sweep.unknown == "v0":
+        return replace(reach, max_included=False)
+    vanishes = sweep.unknown == "y0" or sweep.case["k"] == math.inf
+    # at rest friction takes its last value at y0 = l0, or at any frequency
+    return replace(reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=sweep.case["v0"] == 0.0)
 
 
 def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[float]:
@@ -153,7 +261,7 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
             value = np.where(last & (sweep.mu(value) != wanted), end, value)
         answer, slope = sweep.with_slope(value)
         low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
-        columns = (value, low, high, np.asarray(answer.mu_macro), np.asarray(answer.regime))
+        columns = (value, low, high, answer.mu_macro, answer.regime)
         for i, root in zip(which.tolist(), map(Root, *(column.tolist() for column in columns)), strict=True):
             if not found[i] or root.value != found[i][-1].value:
                 found[i].append(root)
@@ -167,10 +275,10 @@ def _enclosures(
 
     ``answer`` and ``slope`` (d mu_macro / d ln x) are those at the root.
     """
-    bound = np.asarray(answer.error_bound)
+    bound = answer.error_bound
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
         beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
-        bound = np.maximum(bound, np.asarray(sweep.answer(beside).error_bound))
+        bound = np.maximum(bound, sweep.answer(beside).error_bound)
     levels = np.concatenate((wanted - curve.sign * bound, wanted + curve.sign * bound))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = bound / (curve.sign * slope)
@@ -183,156 +291,3 @@ def _enclosures(
     if curved.size:
         ends[curved] = curve.meet(levels[curved], leave=curved >= value.size)
     return np.minimum(ends[: value.size], value), np.maximum(ends[value.size :], value)
-
-
-def solve_for(
-    surrogate: Surrogate,
-    unknown: str,
-    targets: ArrayLike,
-    case: Mapping[str, float | None],
-    within: tuple[float, float] | None = None,
-) -> Solution:
-    """Every value of one input at which mu_macro has the wanted value.
-
-    Parameters
-    ----------
-    surrogate : Surrogate
-        What is solved; a root is as good as its error bound, see :class:`Root`.
-    unknown : str
-        One of mu0, Fz, k, y0, omega, v0.
-    targets : array_like
-        Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
-    case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
-    within : (float, float), optional
-        Search range [SI].  Left out: everywhere for v0, y0, omega; for k, Fz and mu0 from where the contact is so soft
-        that mu_macro = mu0 to where it is as good as rigid.
-
-    Returns
-    -------
-    Solution
-        All roots of every target, ascending, each with its interval from the error bound; and the reachable range.
-
-    Raises
-    ------
-    InputError
-        A value out of bounds, an unknown that is given or does not exist, an invalid range.
-
-    Examples
-    --------
-    >>> import mumacro
-    >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1.3e5, "v0": 0.01}
-    >>> found = solve_for(mumacro.open(), "y0", [0.15, 0.4], case)
-    >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]      # 0.4 is more than mu0
-    [['2.8570e-06 m'], []]
-    """
-    known = checked_case(case, unknown)
-    wanted = np.atleast_1d(np.asarray(targets, dtype=np.float64)).ravel()
-    bad = ~(np.isfinite(wanted) & (wanted >= 0.0))
-    if bad.any():
-        i = int(np.flatnonzero(bad)[0])
-        raise InputError("target", float(wanted[i]), "finite and >= 0", i if np.ndim(targets) else None)
-    if within is not None:
-        within = _checked_range(within, unknown)
-    sweep = Sweep(surrogate, known, unknown)
-    return (_solve_monotone if unknown in MONOTONE else _solve_folded)(sweep, wanted, within)
-
-
-def _checked_range(within: tuple[float, float], unknown: str) -> tuple[float, float]:
-    low, high = (float(end) for end in within)
-    floor = low > 0.0 if unknown in POSITIVE else low >= 0.0
-    if not (floor and low < high and math.isfinite(high)):
-        bound = "two ascending, finite numbers " + ("> 0" if unknown in POSITIVE else ">= 0")
-        raise InputError("range", [low, high], bound)
-    return low, high
-
-
-def _solve_monotone(sweep: Sweep, targets: Array, within: tuple[float, float] | None) -> Solution:
-    low, high = within if within is not None else (0.0, HUGE)
-    mu = sweep.mu(np.array([low, max(low, TINY), high]))
-    # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
-    jump = low == 0.0 and sweep.unknown != "v0" and abs(mu[0] - mu[1]) > 1e-9 * mu[0]
-    constant = bool(mu[1] == mu[2])
-    first, last = float(mu[0]), float(mu[2])
-    if within is None and not constant:
-        last = _limit(sweep, last)
-    reach = Reach(
-        low, high, min(first, last), max(first, last),
-        min_included=within is not None or constant or first < last or last == first or _attained(sweep, last),
-        max_included=within is not None or constant or first > last,
-    )  # fmt: skip
-    if constant:
-        reach = Reach(low, high, min(first, last), max(first, last), True, True)
-    edges = [max(low, TINY) if jump else low, high]
-    solved: list[list[Root]] = [[] for _ in targets]
-    if not constant:
-        x = _samples(sweep, *edges)
-        solved = _roots(sweep, _curves(sweep, edges, x, sweep.mu(x)), targets)
-    at_zero = [Root(low, low, low, first, str(sweep.answer(np.array([low])).regime[0]))] if jump else []
-    roots = [
-        at_zero if jump and target == first else found if reach.holds(float(target)) else []
-        for target, found in zip(targets, solved, strict=True)
-    ]
-    return _solution(sweep, targets, roots, reach, constant and not jump)
-
-
-def _samples(sweep: Sweep, low: float, high: float) -> Array:
-    """Values strictly between ``low`` and ``high`` that bracket what is looked for: v0, y0 or omega, ascending."""
-    # products over quotients: where v~ or y~ is 1, and where y~ = v~
-    elastic = {
-        "v0": (("mu0", "Fz", "omega"), ("k",)),
-        "y0": (("mu0", "Fz"), ("k",)),
-        "omega": (("v0", "k"), ("mu0", "Fz")),
-    }
-    rigid = {"v0": (("y0", "omega"), ()), "y0": (("v0",), ("omega",)), "omega": (("v0",), ("y0",))}
-    parts = [np.arange(-323.0, 308.0, _FAR)]
-    for above, under in (elastic[sweep.unknown], rigid[sweep.unknown]):
-        if all(sweep.case[name] for name in above + under):
-            centre = sum(math.log10(sweep.case[name]) for name in above) - sum(
-                math.log10(sweep.case[name]) for name in under
-            )
-            parts.append(np.linspace(centre - _NEAR, centre + _NEAR, 2 * _NEAR * _NEAR_PER_DECADE + 1))
-    exponents = np.unique(np.clip(np.concatenate(parts), -323.0, 308.0))
-    x = 10.0**exponents
-    return np.unique(np.append(x[(x > low) & (x < high)], TINY if low < TINY < high else [])).astype(np.float64)
-
-
-def _limit(sweep: Sweep, last: float) -> float:
-    """What mu_macro tends to as v0, y0 or omega grows without limit; ``last`` is its value at the largest double."""
-    if sweep.unknown == "v0":
-        return float(sweep.case["mu0"])
-    if sweep.unknown == "y0":
-        return 0.0
-    return last if sweep.case["k"] is not None else 0.0
-
-
-def _attained(sweep: Sweep, last: float) -> bool:
-    """Whether the smallest mu_macro is reached at a finite value: friction that vanishes at rest, at y0 = l0."""
-    return sweep.unknown == "y0" and last == 0.0 and sweep.case["v0"] == 0.0
-
-
-def _solve_folded(sweep: Sweep, targets: Array, within: tuple[float, float] | None) -> Solution:
-    still = 0.0 in (sweep.case.get("y0"), sweep.case.get("omega"))
-    if within is not None:
-        low, high = within
-    elif still:
-        low, high = (1e-300, 1e300)
-    else:
-        low, high = _default_range(sweep.case, sweep.unknown, targets)
-    decades = math.log10(high) - math.log10(low)
-    x = np.exp(np.linspace(math.log(low), math.log(high), min(max(int(decades * _PER_DECADE), 64) + 1, _MAX_SAMPLES)))
-    x[0], x[-1] = low, high
-    answer = sweep.answer(x)
-    mu, noise = np.asarray(answer.mu_macro), 2.0 * np.asarray(answer.error_bound)
-    constant = float(mu.max() - mu.min()) <= float(noise.max())
-    edges = [low, *([] if constant else _turning_points(sweep, x, mu, noise)), high]
-    ends = sweep.mu(np.array(edges))
-    reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
-    roots: list[list[Root]] = [[] for _ in targets]
-    if not constant:
-        roots = _roots(sweep, _curves(sweep, edges, x, mu), targets)
-    return _solution(sweep, targets, roots, reach, constant)
-
-
-def _solution(sweep: Sweep, targets: Array, roots: list[list[Root]], reach: Reach, constant: bool) -> Solution:
-    return Solution(sweep.unknown, tuple(targets.tolist()), tuple(map(tuple, roots)), reach, constant)

@@ -6,6 +6,9 @@
 
 enum { MU_PIECE_FIRST, MU_PIECE_OFFSET, MU_PIECE_STEP, MU_PIECE_ERROR, MU_PIECE_COLUMNS };
 
+/* How far v~crit may be off, relative, with the last digits of v~ and y~. */
+MU_INLINE double mu_border_error(const mumacro_data *data) { return data->pieces[MU_PIECE_ERROR] + MU_ROUNDING; }
+
 /* What a node's value is multiplied by to give v~crit. */
 static double mu_border_scale(int piece, double y) { return piece == MU_BORDER_LOW ? 0.5 * y * y : sqrt(y); }
 

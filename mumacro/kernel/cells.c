@@ -72,3 +72,15 @@ MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
     }
     return out;
 }
+
+/* (d/dw at w - d/dw at 1) / (w - 1) of the polynomial at u: a polynomial again, so nothing cancels next to w = 1. */
+static double mu_cell_bend(const double *cell, double u, double w) {
+    double sum = 0.0, quotient = 0.0;
+    for (int k = 0; k < 6; ++k) { /* the power 7 - k of w */
+        double row = 0.0;
+        for (int i = 0; i < 8; ++i) row = mu_fma1(row, u, cell[8 * k + i]);
+        quotient += (7 - k) * row;
+        sum = mu_fma1(sum, w, quotient);
+    }
+    return sum;
+}

@@ -63,32 +63,43 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
     const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
-    double q_b = slope.q_b * 2.0 * block[MU_STEP_B], reach = fabs(turn.b_v), ratio, noise;
+    const double q_b = slope.q_b * 2.0 * block[MU_STEP_B];
+    double reach = fabs(turn.b_v), ratio, noise;
     double share_a = mu_edge_share(spot.u), share_b = mu_edge_share(spot.w);
+    /* that near to the border a point may lie beyond it, where a slope changes with the distance in another way */
+    const double inside = 1.0 - at->v / at->crit, off = mu_border_error(data);
+    const double unknown = MU_ROUNDING + (fabs(inside) <= off ? off : 0.0);
     mu_slopes out;
+    double along_b = turn.b_v * q_b, along_b_y = turn.b_y * q_b;
     if (about->about.smooth_at_border && at->block >= MU_S_LOW && at->block != MU_CORNER) {
-        /* At the border the quantity is smooth in v~, so q has no linear term in sqrt(1 - v~/v~crit); the interpolant
-         * has one of the size of its error, which the chain rule would divide by that root.  Taken out of the last
-         * cell, it leaves the slope bounded. */
-        const double last = (double)mu_whole_of(mu_fma1(MU_SQRT2, block[MU_STEP_B], block[MU_OFFSET_B]));
-        reach = mu_min(reach, 0.5 * block[MU_STEP_B]);
-        if (mu_fma1(at->b, block[MU_STEP_B], block[MU_OFFSET_B]) >= last) {
-            const double w = mu_min(spot.w, 1.0 - 2.0e-9 * block[MU_STEP_B]);
-            const double here = mu_cell_slopes(cell, spot.u, w).q_b, edge = mu_cell_slopes(cell, spot.u, 1.0).q_b;
-            q_b = (here - edge) * 2.0 * block[MU_STEP_B];
-            share_b = mu_border_share(w);
+        /* At the border the quantity is smooth in v~, so q has no linear term in root = sqrt(1 - v~/v~crit); the
+         * interpolant has one of the size of its error, which the chain rule would divide by root.  Taken out of the
+         * last cell, where 1 - w = 2 step root, it leaves the slope bounded. */
+        const double step = block[MU_STEP_B], last = (double)mu_whole_of(mu_fma1(MU_SQRT2, step, block[MU_OFFSET_B]));
+        reach = mu_min(reach, 0.5 * step);
+        if (mu_fma1(at->b, step, block[MU_OFFSET_B]) >= last) {
+            const double root = MU_SQRT2 - at->b;
+            along_b = -2.0 * step * step * (1.0 - root * root) * mu_cell_bend(cell, spot.u, spot.w);
+            along_b_y = -at->tilt * along_b;
+            share_b = mu_border_share(spot.w);
         }
     }
     out.value = mu_min(mu_max(mu_fma1(factor, slope.q, base), 0.0), about->most);
-    out.along_v = form.base_v + factor * (form.factor_v * slope.q + turn.a_v * q_a + turn.b_v * q_b);
-    out.along_y = form.base_y + factor * (form.factor_y * slope.q + turn.a_y * q_a + turn.b_y * q_b);
-    noise = 8.0 * MU_ROUNDING * (scale * (1.0 + fabs(form.factor_v) + fabs(form.factor_y) + reach) +
-                                 fabs(form.base_v) + fabs(form.base_y)) + MU_DENORMAL;
+    out.along_v = form.base_v + factor * (form.factor_v * slope.q + turn.a_v * q_a + along_b);
+    out.along_y = form.base_y + factor * (form.factor_y * slope.q + turn.a_y * q_a + along_b_y);
+    noise = 8.0 * MU_ROUNDING * (fabs(form.base_v) + fabs(form.base_y)) + MU_DENORMAL +
+            8.0 * unknown * scale * (1.0 + fabs(form.factor_v) + fabs(form.factor_y) + reach);
     out.bound_v = scale * mu_slope_error(errors, form.factor_v, share_a * turn.a_v, share_b * reach) + noise;
     /* along y~ what is removed from the last cell also depends on the border's slope */
     ratio = turn.b_v != 0.0 ? reach / fabs(turn.b_v) : 1.0;
     out.bound_y = scale * mu_slope_error(errors, form.factor_y, share_a * turn.a_y, share_b * turn.b_y * ratio) + noise;
     out.bound = scale * errors[0] + noise + 8.0 * MU_ROUNDING * fabs(base);
+    if (!about->about.smooth_at_border && at->block >= MU_S_LOW && at->block != MU_CORNER) {
+        /* a root of the distance to the border: |1/sqrt(1 - d) - 1| <= d / (1 - d) for the error d of that distance */
+        const double share = inside > off ? fabs(factor * q_b) * off / (inside - off) : HUGE_VAL;
+        out.bound_v += share * fabs(turn.b_v);
+        out.bound_y += share * fabs(turn.b_y);
+    }
     if (at->block == MU_CORNER) {
         const double digit = 8.0 * MU_ROUNDING / (3.0 * at->phi * at->phi + 2.0 * (at->y - 1.0));
         out.bound += digit * scale;
@@ -128,7 +139,11 @@ static mu_slopes mu_slopes_at(const mumacro_data *data, int quantity, double v, 
     at = mu_locate(data, v == 0.0 ? MU_CREEP : v, y);
     if (at.block == MU_FAST) return about->fast_slopes(data, v, y);
     form = about->forms[at.block];
-    if (form.factor == MU_NOTHING) return out;
+    if (form.factor == MU_NOTHING) {
+        if (!about->about.smooth_at_border && at.v <= at.crit * (1.0 + mu_border_error(data)))
+            out.bound_v = out.bound_y = HUGE_VAL;
+        return out;
+    }
     out = mu_slopes_in_block(data, quantity, &at, mu_base(form.base, &at), mu_factor(form.factor, &at));
     if (v == 0.0) out.along_v = 0.0;
     return out;

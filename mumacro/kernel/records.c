@@ -148,7 +148,7 @@ static double mu_power_slack(const mumacro_data *data, const mu_place *at, doubl
 /* What the stick fraction may be off by because v~crit is known to some digits only:
  * |sqrt(x) - sqrt(x - d)| <= d / sqrt(max(x, d)) below the border; above it, sqrt(d - distance) within d of it. */
 static double mu_edge_uncertainty(const mumacro_data *data, const mu_place *at) {
-    const double inside = 1.0 - at->v / at->crit, off = data->pieces[MU_PIECE_ERROR] + MU_ROUNDING;
+    const double inside = 1.0 - at->v / at->crit, off = mu_border_error(data);
     const double slope = mu_min(MU_EDGE_LOW, MU_EDGE_HIGH / sqrt(at->y));
     if (inside > 0.0) return slope * off / sqrt(mu_max(inside, off));
     return off + inside > 0.0 ? slope * sqrt(off + inside) : 0.0;
