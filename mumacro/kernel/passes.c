@@ -76,10 +76,74 @@ MU_INLINE int mu_pass_places(int n, mu_chunk *c) {
     return count;
 }
 
+/* A column of the blocks' rows, for looking up several at once. */
+#if MU_LANES == 8
+typedef struct {
+    __m512d low, high; /* 16 rows in two registers */
+} mu_column;
+
+MU_INLINE mu_column mu_column_of(const double *blocks, int column) {
+    double rows[16];
+    mu_column out;
+    for (int i = 0; i < 16; ++i) rows[i] = blocks[i * MU_BLOCK_COLUMNS + column];
+    out.low = (__m512d)mu_load(rows);
+    out.high = (__m512d)mu_load(rows + 8);
+    return out;
+}
+
+MU_INLINE mu_lanes mu_look_up(const mu_column *column, mu_mask block) {
+    return (mu_lanes)_mm512_permutex2var_pd(column->low, (__m512i)block, column->high);
+}
+#else
+typedef const double *mu_column;
+
+MU_INLINE mu_column mu_column_of(const double *blocks, int column) { return blocks + column; }
+
+MU_INLINE mu_lanes mu_look_up(const mu_column *column, mu_mask block) {
+    int64_t row[MU_LANES];
+    double found[MU_LANES];
+    memcpy(row, &block, sizeof block);
+    for (int i = 0; i < MU_LANES; ++i) found[i] = (*column)[row[i] * MU_BLOCK_COLUMNS];
+    return mu_load(found);
+}
+#endif
+
+/* As mu_find, the whole part of what may be any number. */
+MU_INLINE mu_lanes mu_wholes_of(mu_lanes x) {
+    x = mu_select(MU_WHERE(x > -1e9), x, mu_all(-1e9));
+    return MU_AS(mu_lanes, MU_AS(mu_whole, mu_select(MU_WHERE(x < 1e9), x, mu_all(1e9))));
+}
+
+/* mu_find for points of the chunk in whole lanes; returns how many points that are. */
+MU_INLINE int mu_pass_cells(const double *blocks, int64_t cells, int n, mu_chunk *c) {
+    const mu_lanes last = mu_all((double)(cells - 1)), zero = mu_all(0.0);
+    mu_column column[MU_STEP_B + 1];
+    int done = 0;
+    if (n < 2 * MU_LANES) return 0; /* too few for the columns to be fetched */
+    for (int i = 0; i <= MU_STEP_B; ++i) column[i] = mu_column_of(blocks, i);
+    for (; done + MU_LANES <= n; done += MU_LANES) {
+        const mu_lanes a = mu_load(c->a + done), b = mu_load(c->b + done);
+        mu_mask block;
+        mu_lanes x, z, i, j, cell;
+        mu_whole index;
+        memcpy(&block, c->block + done, sizeof block);
+        x = mu_fma(a, mu_look_up(column + MU_STEP_A, block), mu_look_up(column + MU_OFFSET_A, block));
+        z = mu_fma(b, mu_look_up(column + MU_STEP_B, block), mu_look_up(column + MU_OFFSET_B, block));
+        i = mu_wholes_of(x);
+        j = mu_wholes_of(z);
+        cell = mu_look_up(column + MU_FIRST, block) + i * mu_look_up(column + MU_CELLS_B, block) + j;
+        cell = mu_select(MU_WHERE(cell > 0.0), cell, zero);
+        index = MU_AS(mu_whole, mu_select(MU_WHERE(cell < last), cell, last));
+        memcpy(c->cell + done, &index, sizeof index);
+        mu_store(c->a + done, 2.0 * (x - i) - 1.0);
+        mu_store(c->b + done, 2.0 * (z - j) - 1.0);
+    }
+    return done;
+}
 /* Cells and values of mu~.  A point without a cell reads one that means nothing. */
 MU_INLINE void mu_pass_values(const mumacro_data *data, int n, mu_chunk *c, double *value) {
     const mumacro_cells *cells = &data->quantities[MU_MU_RATIO];
-    for (int i = 0; i < n; ++i) {
+    for (int i = mu_pass_cells(data->blocks, cells->cells, n, c); i < n; ++i) {
         const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[i]), 0, cells->cells, c->a[i], c->b[i]);
         c->cell[i] = (int32_t)spot.cell;
         c->a[i] = spot.u;
