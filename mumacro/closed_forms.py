@@ -164,19 +164,14 @@ def master_curve_limit(x: ArrayLike) -> Any:
     >>> round(float(master_curve_limit(1e-12)) / 1e-12, 4)        # the slope at creep, pi
     3.1416
     """
-    # b = arcsin x, 2 d = duration of slip: sin d sin(d - b) = (pi - d) sin b has one root in (b, b + pi/2)
+    # b = arcsin x, 2 d = duration of slip, 2 h = that of stick: tan b = sin^2 d / (h - sin h cos h), by Newton's method
     x = np.minimum(_float(x), 1.0)
     b = np.arcsin(x)
-    low, high = b, b + 0.5 * np.pi
-    d = np.minimum(0.5 * b + np.sqrt(0.25 * b * b + np.pi * b), 0.5 * (low + high))
-    for _ in range(60):
-        f = np.sin(d) * np.sin(d - b) - (np.pi - d) * x
-        low, high = np.where(f < 0.0, d, low), np.where(f < 0.0, high, d)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            newton = d - f / (2.0 * np.sin(d) * np.cos(d - b))
-        before, d = d, np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
-        if np.all(np.abs(d - before) <= 4e-16 * d):
-            break
+    d = np.minimum(0.5 * b + np.sqrt(0.25 * b * b + np.pi * b), np.pi)
+    for _ in range(5):
+        s, rest = np.sin(d), 0.5 * _minus_sine(2.0 * (np.pi - d))
+        slope = 2.0 * s * (np.cos(d) * rest + s**3) / np.maximum(s**4 + rest**2, 1e-200)
+        d = d - np.divide(np.arctan2(s * s, rest) - b, slope, out=np.zeros_like(d), where=slope > 0.0)
     stick = 2.0 * (np.pi - d)
     # integrals of 1 + cos t over stick and slip, every term positive
     pulled = stick * (2.0 * np.sin(0.5 * b) ** 2 + 0.5 * x * stick)

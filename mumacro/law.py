@@ -18,17 +18,9 @@ from mumacro.inverse import Crossing, border_crossings, checked_case
 from mumacro.surrogate import Surrogate
 
 __all__ = [
-    "APPROXIMATIONS",
-    "BORDERS",
-    "EQUATIONS",
-    "SCALES",
-    "Law",
-    "approximations",
-    "border_speeds",
-    "borders",
-    "friction_law",
-    "sweep_values",
-]
+    "APPROXIMATIONS", "BORDERS", "EQUATIONS", "SCALES", "Law", "approximations", "border_speeds", "borders",
+    "friction_law", "sweep_values",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -124,13 +116,10 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     if not (math.isfinite(stop) and stop > start):
         raise InputError("stop", stop, "finite and > start")
     if scale == "linear":
-        share = np.linspace(0.0, 1.0, points)
-        values: Array = start * (1.0 - share) + stop * share
-    else:
-        values = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))  # decades are exact
+        return np.linspace(start, stop, points)
+    values: Array = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))  # decades are exact
     values[0], values[-1] = start, stop
-    np.clip(values, start, stop, out=values)
-    return values
+    return np.clip(values, start, stop)
 
 
 def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[str, float | None]) -> Law:

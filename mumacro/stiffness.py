@@ -215,8 +215,8 @@ def cylinder_on_flat(
     -------
     Contact
         With nu > 0 k across the axis is the larger one, by up to 1/(1 - nu).  The model has one k for both directions.
-        Where they differ by 1.3, mu~ with k of the oscillation is right to 0.02, with k of the sliding to 0.21 only
-        (y~ from 0.3 to 10, v~ from 0.05 to 2): a cylinder that slides across its axis and oscillates along it takes
+        Where they differ by 1.3, mu~ with k of the oscillation is right to 0.02, with k of the sliding to 0.13 only
+        (y~ from 0.3 to 10, v~ from 0.2 to 2): a cylinder that slides across its axis and oscillates along it takes
         ``along=True``.
 
     Raises

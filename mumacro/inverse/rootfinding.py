@@ -2,8 +2,8 @@
 
 All levels of one problem lie on one curve, so the curve is sampled once; a search in the samples brackets every level,
 and Newton's method in the logarithm of the input, with the surrogate's gradient, does the rest.  A step that leaves its
-bracket, that has no finite slope (plateaus, the cusp of the static limit at y~ = 1) or that does not halve the
-step before the last is replaced by halving the bracket: by its geometric mean, so that any scale is reached.
+bracket, that has no finite slope (plateaus, the cusp of the static limit at y~ = 1) or that does not halve the last
+step is replaced by halving the bracket: by its geometric mean, so that any scale is reached.
 """
 
 from __future__ import annotations
@@ -87,11 +87,10 @@ class Curve:
         start = np.log(np.maximum(a, TINY))
         width = np.log(b) - start
         x = np.exp(start + np.clip(fa / np.where(fb > fa, fa - fb, -1.0), 0.02, 0.98) * width)
-        last, before = width.copy(), width.copy()  # the last two steps, in ln x
+        last = width.copy()  # the last step, in ln x
         found: Array = np.empty_like(a)
-        left = np.arange(level.size)
-        while left.size:
-            i = left
+        i = np.arange(level.size)
+        while i.size:
             lower, upper = a[i], b[i]
             at = np.where((x[i] > lower) & (x[i] < upper), x[i], _middle(lower, upper))
             answer, slope = self.sweep.with_slope(at)
@@ -105,13 +104,13 @@ class Curve:
                 wanted = at * np.exp(np.clip(step, -1.0e3, 1.0e3))
                 # less than the doubles are apart, though not met (the cusp of the static limit): its neighbour, then
                 wanted = np.where(wanted == at, np.nextafter(at, np.where(below, np.inf, 0.0)), wanted)
-                good = (wanted > a[i]) & (wanted < b[i]) & (2.0 * np.abs(step) <= np.abs(before[i]))
+                good = (wanted > a[i]) & (wanted < b[i]) & (2.0 * np.abs(step) <= np.abs(last[i]))
                 x[i] = np.where(good, wanted, _middle(a[i], b[i]))
-                before[i], last[i] = last[i], np.where(good, step, np.log(x[i] / at))
+                last[i] = np.where(good, step, np.log(x[i] / at))
             met = steep & (np.abs(f) <= 2.0 * _ROUNDING * np.abs(level[i]))
             shut = np.nextafter(a[i], np.inf) >= b[i]
             found[i] = np.where(met, at, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i]))
-            left = i[~(met | shut)]
+            i = i[~(met | shut)]
         return found
 
 

@@ -12,7 +12,7 @@ k      mu0 at k -> 0, eq. (37) at k -> inf    up to three: for r = y0 omega / v0
                                               from 4.1 to 6.4, rises to a maximum (at y~ = 0.115 r^2 for large r), and
                                               falls again
 Fz     the same in 1/Fz                       the same
-mu0    rises: it would fold only where        one, but searched like k and Fz
+mu0    rises: it would fold only where        one
        d ln mu~ / d ln y~ > 1 on a ray of
        constant r; it is 0.09 at the most
 =====  =====================================  ====================================================================
@@ -107,7 +107,7 @@ def solve_for(
     x = _samples(low, high, _PER_DECADE_MONOTONE if unknown in MONOTONE else _PER_DECADE)
     answer = sweep.answer(x)
     mu, noise = answer.mu_macro, 2.0 * answer.error_bound
-    turns = [] if unknown in MONOTONE else _turning_points(sweep, x, mu, noise)
+    turns = _turning_points(sweep, x, mu, noise) if unknown in ("k", "Fz") else []
     curves = _curves(sweep, [low, *turns, high], x, mu)
     if low == 0.0 and unknown != "v0" and abs(curves[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
         # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
@@ -198,38 +198,21 @@ def _without_limit(sweep: Sweep, reach: Reach) -> Reach:
 
 
 def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[float]:
-    """Where mu_macro stops rising or falling by more than ``noise``, ascending, from samples ``x``, ``mu`` (n,)."""
-    rise = np.sign(np.diff(mu))
-    # only where the samples themselves turn; the ends close the last stretch
-    places = np.unique(np.concatenate(([0], 1 + np.flatnonzero(rise[1:] != rise[:-1]), [x.size - 1])))
-    found: list[tuple[int, float]] = []
-    direction, top, bottom = 0.0, 0, 0
-    for i, m, slack in zip(places.tolist(), mu[places].tolist(), noise[places].tolist(), strict=True):
-        top = i if m > mu[top] else top
-        bottom = i if m < mu[bottom] else bottom
-        if direction >= 0.0 and m < mu[top] - slack:
-            if direction > 0.0:
-                found.append((top, 1.0))
-            direction, bottom = -1.0, i
-        elif direction <= 0.0 and m > mu[bottom] + slack:
-            if direction < 0.0:
-                found.append((bottom, -1.0))
-            direction, top = 1.0, i
-    return [_extremum(sweep, float(x[i - 1]), float(x[min(i + 1, x.size - 1)]), sign) for i, sign in found]
-
-
-def _extremum(sweep: Sweep, low: float, high: float, sign: float) -> float:
-    """Where the slope of mu_macro goes through zero between two samples: at a maximum (sign +1) or a minimum (-1)."""
-    a, b = low, high
-    for _ in range(5):
-        grid = np.geomspace(a, b, 34)
-        grid[0], grid[-1] = a, b
-        _, slope = sweep.with_slope(grid[1:-1])
-        # the first place from which the slope has turned; the ends stand for the directions that are known
-        turned = np.append(sign * slope < 0.0, True)
-        i = int(np.argmax(turned)) + 1
-        a, b = float(grid[i - 1]), float(grid[i])
-    return math.sqrt(a) * math.sqrt(b)
+    """Where mu_macro over k or Fz has its minimum and maximum, ascending, from samples ``x``, ``mu`` (n,)."""
+    order = 1 if sweep.unknown == "k" else -1  # along k it falls, may rise by more than the noise, and falls again
+    falling = mu[::order]
+    rise = falling - np.minimum.accumulate(falling)
+    top = int(np.argmax(rise))
+    if rise[top] <= noise[::order][top]:
+        return []
+    bottom = int(np.argmin(falling[: top + 1]))
+    places = np.array([bottom, top] if order == 1 else [x.size - 1 - top, x.size - 1 - bottom])
+    sign = np.array([[-1.0], [1.0]])[::order]
+    inside = (places > 0) & (places < x.size - 1)
+    places, sign = places[inside], sign[inside]
+    _, turns = last_double(lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1])
+    found: list[float] = turns.tolist()
+    return found
 
 
 def _curves(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
