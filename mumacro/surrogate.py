@@ -366,7 +366,7 @@ class Surrogate:
 
         Parameters
         ----------
-        cases : mapping, pandas.DataFrame or xarray.Dataset, optional
+        cases : mapping, DataFrame (pandas, Dask, Polars), pyarrow.Table or xarray.Dataset, optional
             The inputs by name, in place of keywords; other columns are ignored.
         mu0 : array_like
             Coulomb friction coefficient [-], > 0.
@@ -393,7 +393,7 @@ class Surrogate:
         -------
         Answer
             Or the container of the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
-            (see :mod:`mumacro.interop.labels`).
+            (see :mod:`mumacro.interop.labels`).  Arrow and Polars give an answer of arrays.
 
         Raises
         ------
