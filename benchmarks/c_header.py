@@ -5,7 +5,7 @@
     python benchmarks/c_header.py --write      write it into the page
     python benchmarks/c_header.py --quick      fewer points and rounds
 
-Times: points spread evenly in ln v~ and ln y~ over 1e-3 to 1e3, in random order.  Distances: on points over 1e-9 to 1e9,
+Times: points spread evenly in ln v~ and ln y~ over 1e-3 to 1e3, in random order.  Distances: points over 1e-9 to 1e9,
 half of them around the border of continuous sliding and around the corner; and once more without those within 1e-8 of
 the border, where rounding decides the side.
 """

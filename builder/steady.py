@@ -33,8 +33,9 @@ ADVICE = {
     NOT_CONVERGED: "the section's root was not found to rounding: " + _LOST,
 }
 
-# Results of solve_raw in ``res`` (7,), named as in Steady.
-MU_RATIO, DEFICIT, REGIME, STICK_FRACTION, POWER, SLIP_SPEED, MIN_SLIP_SPEED = range(7)
+#: results of solve_raw in ``res``, named as in Steady; those before the regime are columns of a sweep
+RESULTS = ("mu_ratio", "deficit", "stick_fraction", "power", "regime", "slip_speed", "min_slip_speed")
+MU_RATIO, DEFICIT, STICK_FRACTION, POWER, REGIME, SLIP_SPEED, MIN_SLIP_SPEED = range(N_RESULTS := len(RESULTS))
 
 RELATIVE_ERROR = 3e-15  # of the smaller of mu~ and 1 - mu~, see error_estimate
 
@@ -232,7 +233,7 @@ class Steady:
 @solver_kernel
 def workspace() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set per thread."""
-    return np.zeros((9, ORDER + 2)), np.zeros(12), np.zeros(6), np.zeros(7)
+    return np.zeros((9, ORDER + 2)), np.zeros(12), np.zeros(6), np.zeros(N_RESULTS)
 
 
 def solve(v: float, y: float, eta: float | None = None) -> Steady:
@@ -265,9 +266,11 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     check_range(v, y, eta)
     w, out, orbit, res = workspace()
     status = int(solve_raw(v, y, eta, w, out, orbit, res))
-    mu, deficit, regime, stick, power, speed, least = res.tolist()
-    name = "unknown" if math.isnan(regime) else REGIMES[int(regime)]
-    return Steady(mu, deficit, name, stick, power, speed, least, error_estimate(mu, deficit), status, ADVICE[status])
+    found = dict(zip(RESULTS, res.tolist(), strict=True))
+    found["regime"] = "unknown" if math.isnan(res[REGIME]) else REGIMES[int(res[REGIME])]
+    return Steady(
+        **found, error_estimate=error_estimate(res[MU_RATIO], res[DEFICIT]), status=status, advice=ADVICE[status]
+    )
 
 
 def border(y: float) -> tuple[float, float]:

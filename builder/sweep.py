@@ -27,8 +27,9 @@ __all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep", "solve_chunk"]
 
 Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
-COLUMNS = ("mu_ratio", "deficit", "stick_fraction", "power", "error_estimate", "status")
-_MU, _DEFICIT, _STICK, _POWER, _ERROR, _STATUS = range(len(COLUMNS))
+_RESULTS = steady.REGIME
+COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
+_MU, _DEFICIT, _ERROR, _STATUS = map(COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status"))
 
 
 class SolveError(ArithmeticError):
@@ -45,8 +46,7 @@ def _full(v: Array, y: Array, eta: Array, out: Array) -> None:
     w, end, orbit, res = steady.workspace()
     for i in range(v.size):
         status = steady.solve_raw(v[i], y[i], eta[i], w, end, orbit, res)
-        out[i, _MU], out[i, _DEFICIT] = res[steady.MU_RATIO], res[steady.DEFICIT]
-        out[i, _STICK], out[i, _POWER] = res[steady.STICK_FRACTION], res[steady.POWER]
+        out[i, :_RESULTS] = res[:_RESULTS]
         out[i, _ERROR] = steady.error_estimate(out[i, _MU], out[i, _DEFICIT])
         out[i, _STATUS] = status
 
@@ -58,12 +58,7 @@ def _continuous(v: Array, y: Array, _eta: Array, out: Array) -> None:
     for i in range(v.size):
         status = steady.continuous(v[i], y[i], w, end)
         steady.sliding(v[i], y[i], end, res)
-        out[i, _MU], out[i, _DEFICIT], out[i, _STICK], out[i, _POWER] = (
-            res[steady.MU_RATIO],
-            res[steady.DEFICIT],
-            0.0,
-            res[steady.POWER],
-        )
+        out[i, :_RESULTS] = res[:_RESULTS]
         out[i, _ERROR] = steady.error_estimate(out[i, _MU], out[i, _DEFICIT])
         out[i, _STATUS] = status
 
@@ -74,8 +69,8 @@ def _border(_v: Array, y: Array, _eta: Array, out: Array) -> None:
     w, end, _, _ = steady.workspace()
     for i in range(y.size):
         crit, mu, status = steady.border_raw(y[i], w, end)
-        out[i, _MU], out[i, _DEFICIT] = mu, crit
-        out[i, _STICK], out[i, _POWER], out[i, _ERROR] = 0.0, 0.0, steady.RELATIVE_ERROR * mu
+        out[i] = 0.0
+        out[i, _MU], out[i, _DEFICIT], out[i, _ERROR] = mu, crit, steady.RELATIVE_ERROR * mu
         out[i, _STATUS] = status
 
 

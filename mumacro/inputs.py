@@ -277,8 +277,12 @@ def _rigid_as_infinity(value: Any) -> Any:
         return math.inf if is_rigid(value) else value
     if not isinstance(value, (list, tuple)) and getattr(getattr(value, "dtype", None), "kind", "") not in ("O", "U"):
         return value
-    texts = np.asarray(value, dtype=object)
-    return np.array([math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]).reshape(texts.shape)
+    try:
+        texts = np.asarray(value, dtype=object)
+        read = [math.inf if isinstance(x, str) and is_rigid(x) else x for x in texts.flat]
+        return np.array(read).reshape(texts.shape)
+    except ValueError:  # lists of several lengths
+        return value
 
 
 def real(name: str, value: Any) -> Array:

@@ -18,7 +18,7 @@ MU_INLINE mu_lanes mu_share(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask sma
 
 /* base and factor of mu~ in a common chart; in continuous sliding root = v~ sqrt(share).
  *
- * continuous, y~ <= 1.5:  mu~ = 1 - q y~^2 / (4 (1 + v~^2)), eq. (31)    continuous above: mu~ = q / sqrt(1 + y~^2/v~^2)
+ * continuous, y~ <= 1.5: mu~ = 1 - q y~^2 / (4 (1 + v~^2)), eq. (31)   continuous above: mu~ = q / sqrt(1 + y~^2/v~^2)
  * stick-slip, y~ <= 0.75: mu~ = 1 - q y~^2    to 1.5: mu~ = q            stick-slip above: mu~ = q v~/y~ */
 MU_INLINE void mu_ratio_form(mu_lanes v, mu_lanes y, mu_mask sliding, mu_mask small, mu_mask lowest, mu_lanes share,
                              mu_lanes root, mu_lanes *base, mu_lanes *factor) {
@@ -37,13 +37,13 @@ typedef struct {
 /* The blocks of points with 0 < y~ <= MU_Y_TAIL, v~ > 0.  MU_CORNER and MU_FAST come without coordinates. */
 MU_INLINE mu_places mu_place_common(mu_lanes v, mu_lanes y, mu_lanes crit, mu_lanes ln_y) {
     const mu_lanes rho = v / crit, squared = y * y;
-    const mu_mask sliding = MU_WHERE(rho >= 1.0), small = MU_WHERE(y <= MU_Y_CONT), lowest = MU_WHERE(y <= MU_Y_STICK_LO);
-    const mu_mask half = MU_WHERE(rho < 0.5);
+    const mu_mask sliding = MU_WHERE(rho >= 1.0), half = MU_WHERE(rho < 0.5);
+    const mu_mask small = MU_WHERE(y <= MU_Y_CONT), lowest = MU_WHERE(y <= MU_Y_STICK_LO);
     /* one division and one root do for all blocks */
     const mu_lanes share = mu_share(v, y, sliding, small);
     const mu_lanes root = mu_sqrt(mu_select(sliding, v * v * share, mu_select(half, rho, 1.0 - rho)));
-    /* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on; both square-root edges become smooth
-     * for one root, and the knot between the halves is an edge of cells */
+    /* sigma stands for s: sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho = 1/2 on; both square-root edges become
+     * smooth for one root, and the knot between the halves is an edge of cells */
     const mu_lanes sigma = mu_select(half, root, MU_SQRT2 - root);
     const mu_lanes beyond = mu_select(small, 1.0 - share, mu_log(rho));
     /* -1 where true: what is counted is subtracted */
@@ -67,8 +67,8 @@ MU_INLINE mu_mask mu_is_common(mu_lanes v, mu_lanes y) {
 
 /* --- one point -------------------------------------------------------------------------------------- */
 
-/* Positive root phi of phi^3 + 2 eta phi = pi v~, v~ > 0: a guess right in every limit, off by 28 % at most, then Halley's
- * method; three steps of third order take that to rounding. */
+/* Positive root phi of phi^3 + 2 eta phi = pi v~, v~ > 0: a guess right in every limit, off by 28 % at most, then
+ * Halley's method; three steps of third order take that to rounding. */
 static double mu_normal_form_root(double v, double eta) {
     const double c = MU_PI * v, p = 2.0 * eta, root = mu_cube_root_near(c);
     double phi = eta >= 0.0 ? c / (p + root * root) : sqrt(root * root - p);
@@ -79,8 +79,8 @@ static double mu_normal_form_root(double v, double eta) {
     return phi;
 }
 
-/* Corner coordinates (R, tan(psi/2)): R sin psi = sqrt 2 phi, R cos psi = s0/sqrt 2, s0^2 = 2 pi v~/phi.  The tangent of
- * half the angle is analytic in it, runs from 0 to 1 as well, and costs a division. */
+/* Corner coordinates (R, tan(psi/2)): R sin psi = sqrt 2 phi, R cos psi = s0/sqrt 2, s0^2 = 2 pi v~/phi.  The tangent
+ * of half the angle is analytic in it, runs from 0 to 1 as well, and costs a division. */
 static void mu_place_corner(mu_place *at) {
     const double phi = mu_normal_form_root(at->v, at->y - 1.0), squared = 2.0 * MU_PI * at->v / phi;
     at->phi = phi;

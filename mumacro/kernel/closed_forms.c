@@ -105,7 +105,8 @@ static mu_power_terms mu_power_expansion(double v, double y) {
     /* <sqrt(1 + n cos^2)> = (1 + n) J3 = h i3; J1 is f */
     const double h = outer.h, j3 = outer.i3 / h, j5 = outer.i5 / h;
     const double next = (0.5 * (h * outer.i5 - j3) + outer.second) / v;
-    const double next_y = (h * outer.i5 - j5 - 2.5 * h * (outer.i5 - outer.i7) + 1.5 * (j3 - j5) + outer.second_slope) / v;
+    const double next_y =
+        (h * outer.i5 - j5 - 2.5 * h * (outer.i5 - outer.i7) + 1.5 * (j3 - j5) + outer.second_slope) / v;
     double lead = v * (h * outer.i3 - outer.first), lead_y = v * (h * outer.i3 - j3);
     mu_power_terms out;
     if (r < 0.2) { /* of the closed form, digits would cancel; eleven terms hold to rounding */

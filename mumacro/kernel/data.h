@@ -13,10 +13,10 @@ typedef struct {
 } mumacro_cells;
 
 /* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, 4): first cell, offset, step,
- * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused: step *
- * coordinate + offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the two terms
- * of large speed, in cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of them is
- * read. */
+ * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused; step
+ * times coordinate plus offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the
+ * two terms of large speed, in cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of
+ * them is read. */
 typedef struct {
     int64_t border_cells;
     const double *border, *pieces, *blocks, *outer;

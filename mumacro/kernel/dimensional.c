@@ -70,7 +70,7 @@ static mu_case mu_unusual_case(const mumacro_data *data, const mu_inputs *in) {
 }
 
 /* d mu_macro / d input and the bounds, 12 numbers stride apart.  One-sided at the edges: d/dy0 = 0 at y0 = 0,
- * d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, which is infinite on y~ = 1 and for rigid contact.
+ * d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, infinite on y~ = 1 and for rigid contact.
  * Relative to k the slope is 0 for rigid contact.  slopes: those of mu~, or NULL where they are not known yet. */
 MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const mu_case *found, const mu_slopes *known,
                            double *out, int64_t stride) {
@@ -80,7 +80,8 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
         for (int i = 0; i < 6; ++i) slope[i] = error[i] = NAN;
     } else if (found->source == MU_RIGID) {
         double along = 0.0;
-        const double rounding = 8.0 * MU_ROUNDING * found->mu, all = rounding + (found->bound > rounding ? found->bound : 0.0);
+        const double rounding = 8.0 * MU_ROUNDING * found->mu;
+        const double all = rounding + (found->bound > rounding ? found->bound : 0.0);
         if (found->mu < 1.0 || in->y0 * in->omega > 0.0) along = mu_outer_expansion(mu_amplitude_ratio(in)).first_slope;
         slope[3] = mu0 * along / in->y0;
         slope[4] = mu0 * along / in->omega;
@@ -198,8 +199,8 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
     }
 }
 
-static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
-                     double *out, int64_t stride, int8_t *source) {
+static void mu_cases(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides,
+                     int rows, double *out, int64_t stride, int8_t *source) {
     for (int64_t start = 0; start < n; start += MU_CHUNK) {
         const int few = mu_few(n - start);
         const int whole = (few + MU_LANES - 1) / MU_LANES * MU_LANES;

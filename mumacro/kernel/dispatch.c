@@ -25,7 +25,8 @@ extern const mumacro_kernel mumacro_kernel_avx512;
  * Not by __builtin_cpu_supports: what it reads is missing or empty in the run-time library of some compilers. */
 static int mu_runs(int level) {
     const unsigned first = bit_OSXSAVE | bit_FMA;
-    const unsigned seventh = level == 1 ? bit_AVX2 : bit_AVX2 | bit_AVX512F | bit_AVX512DQ | bit_AVX512VL | bit_AVX512BW;
+    const unsigned wide = bit_AVX512F | bit_AVX512DQ | bit_AVX512VL | bit_AVX512BW;
+    const unsigned seventh = level == 1 ? bit_AVX2 : bit_AVX2 | wide;
     const unsigned registers = level == 1 ? 0x06 : 0xe6; /* bits of XCR0 */
     unsigned a, b, c, d;
     if (!__get_cpuid(1, &a, &b, &c, &d) || (c & first) != first) return 0;

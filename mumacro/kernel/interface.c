@@ -111,7 +111,9 @@ MUMACRO_API int mumacro_values(int quantity, int64_t n, const double *v_tilde, c
     return 0;
 }
 
-MUMACRO_API double mumacro_mu_ratio(double v_tilde, double y_tilde) { return mu_ratio_alone(MU_TABLE, v_tilde, y_tilde); }
+MUMACRO_API double mumacro_mu_ratio(double v_tilde, double y_tilde) {
+    return mu_ratio_alone(MU_TABLE, v_tilde, y_tilde);
+}
 
 MUMACRO_API double mumacro_power(double v_tilde, double y_tilde) {
     double bound;

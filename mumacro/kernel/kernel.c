@@ -1,7 +1,7 @@
 /* The evaluation of mumacro's tables: every program, in any language, computes with these files.
  *
- * C99; no memory is taken, nothing is stored between calls, any thread may call; no input and no table makes it read out
- * of bounds.  SPDX-License-Identifier: Apache-2.0 */
+ * C99; no memory is taken, nothing is stored between calls, any thread may call; no input and no table makes it read
+ * out of bounds.  SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>

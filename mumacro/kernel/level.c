@@ -6,8 +6,8 @@ static void mu_borders(const mumacro_data *data, int64_t n, const double *y, dou
     for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_at(data, y[i]);
 }
 
-static void mu_places_of(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block, double *a,
-                         double *b) {
+static void mu_places_of(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block,
+                         double *a, double *b) {
     for (int64_t i = 0; i < n; ++i) {
         const mu_place at = mu_locate(data, v[i], y[i]);
         block[i] = (int8_t)at.block;
@@ -58,8 +58,8 @@ static const mumacro_quantity *mu_about(int code) {
 
 static const mumacro_atlas MU_ATLAS = {
     MU_Y_STICK_LO, MU_Y_STICK_HI, MU_Y_CONT, MU_Y_MID, MU_Y_HIGH, MU_Y_TAIL, MU_S_CUT, MU_SIGMA_CUT, MU_RHO_MAX,
-    MU_FAST_KAPPA, MU_ROUNDING, MU_OUTER_LOG_MAX, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES, MU_OUTER_CELLS,
-    MU_CHART, MU_PIECE, MU_SOURCE_NAME, MU_REGIME_NAME, MU_REGIME_OF_SOURCE,
+    MU_FAST_KAPPA, MU_ROUNDING, MU_OUTER_LOG_MAX, MU_CHARTS, MU_SOURCES, MU_PIECES, MU_QUANTITIES, MU_REGIMES,
+    MU_OUTER_CELLS, MU_CHART, MU_PIECE, MU_SOURCE_NAME, MU_REGIME_NAME, MU_REGIME_OF_SOURCE,
 };
 
 #define MU_TEXT(x) #x

@@ -34,14 +34,15 @@ typedef struct {
      * stride apart: mu_macro, mu_ratio, bound of mu_macro; of 5 also v~, y~; of 17 also d mu_macro / d input, bounds */
     void (*cases)(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
                   double *out, int64_t stride, int8_t *source);
-    /* the same alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~, y~,
-     * l0 = mu0 Fz / k, source; of 19 also the slopes and their bounds */
+    /* the same alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~,
+     * y~, l0 = mu0 Fz / k, source; of 19 also the slopes and their bounds */
     double (*ratio)(const mumacro_data *data, double v, double y);
     void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
                 int numbers, double *out);
     /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
-    /* blocks of points with 0 < v~, y~ < infinity, and their coordinates, as evaluation counts them; tail_fast has none */
+    /* blocks of points with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them, which tail_fast
+     * has not */
     void (*places)(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block, double *a,
                    double *b);
     /* for the builder: base and factor with value = base + factor q; eta = y~ - 1 counts in the corner only */
@@ -49,7 +50,8 @@ typedef struct {
                   double *factor);
     /* what node values of a piece of the border, and what its cells, are multiplied by to give v~crit */
     void (*border_scales)(int piece, int64_t n, const double *y, double *of_nodes, double *of_cells);
-    /* the shares of a cell's largest error that its derivatives have at w, -1 to 1, and in the last cell below the border */
+    /* the shares of a cell's largest error that its derivatives have at w, -1 to 1, and in the last cell below the
+     * border */
     void (*cell_shares)(int64_t n, const double *w, double *inside, double *at_border);
     void (*normal_form_root)(int64_t n, const double *v, const double *eta, double *root);
     /* the two terms of large speed and their slopes, 5 rows of out */

@@ -1,7 +1,7 @@
-/* Many points.  The choice of a point's block is a chain of branches that a processor cannot predict.  So MU_CHUNK points
- * go together through passes that select instead: amplitudes and the border's cell, v~crit, blocks and coordinates, cells,
- * values.  What the passes do not handle (the corner, closed forms, zero and extreme inputs) is marked and answered one
- * by one.  A single point is a chunk of one, so it has the same bits as in any array. */
+/* Many points.  The choice of a point's block is a chain of branches that a processor cannot predict.  So MU_CHUNK
+ * points go together through passes that select instead: amplitudes and the border's cell, v~crit, blocks and
+ * coordinates, cells, values.  What the passes do not handle (the corner, closed forms, zero and extreme inputs) is
+ * marked and answered one by one.  A single point is a chunk of one, so it has the same bits as in any array. */
 
 #define MU_CHUNK 256 /* the scratch of the passes stays in the fastest cache */
 
@@ -157,8 +157,8 @@ static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, co
     }
 }
 
-static void mu_values(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *value,
-                      double *bound, int8_t *source) {
+static void mu_values(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
+                      double *value, double *bound, int8_t *source) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         double *error = bound ? bound + i : NULL;
@@ -179,7 +179,8 @@ MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const m
     const mu_form form = MU_QUANTITY[quantity].forms[c->block[i] < MU_CHARTS ? c->block[i] : 0];
     if (c->block[i] < MU_CHARTS && form.factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
-        if (quantity == MU_MU_RATIO && at.block != MU_CORNER) return mu_slopes_in_block(data, quantity, &at, c->base[i], c->factor[i]);
+        if (quantity == MU_MU_RATIO && at.block != MU_CORNER)
+            return mu_slopes_in_block(data, quantity, &at, c->base[i], c->factor[i]);
         return mu_slopes_in_block(data, quantity, &at, mu_base(form.base, &at), mu_factor(form.factor, &at));
     }
     return mu_slopes_at(data, quantity, v, y);

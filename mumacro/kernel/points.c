@@ -39,8 +39,8 @@ static mu_answer mu_answer_at(const mumacro_data *data, int quantity, double v, 
     return out;
 }
 
-/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what interpolation leaves out,
- * is 64 at both edges and up to 8 between them. */
+/* The share of its largest error that a derivative has at u in a cell, about: that of T_8, what interpolation leaves
+ * out, is 64 at both edges and up to 8 between them. */
 MU_INLINE double mu_edge_share(double u) { return 1.0 / (1.0 + 7.0 * (1.0 - u * u)); }
 
 /* The same in the last cell below the border of (T_8' at w - T_8' at the border) / (1 - w): from 1344 to 64. */

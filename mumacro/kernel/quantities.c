@@ -4,8 +4,8 @@
  * power           p = <y~ cos tau u_y>, the mean power of the shaker over mu0 Fz l0 omega; that of the drive is v~ mu~
  * stick_fraction  f, the share of the period during which the contact sticks
  *
- * A record says how a value follows from what a block tabulates, value = base + factor q; what its bound allows beside the
- * table's error; and what is known where there is no table. */
+ * A record says how a value follows from what a block tabulates, value = base + factor q; what its bound allows beside
+ * the table's error; and what is known where there is no table. */
 
 /* base */
 enum { MU_NO_BASE, MU_ONE, MU_OUTER, MU_OUTER_LAYER, MU_FIRST_POWER };
@@ -58,9 +58,10 @@ static double mu_ratio_factor(const mu_place *at) {
     const mu_mask yes = mu_all_whole(-1), no = mu_all_whole(0);
     const int low = at->block == MU_C_LOW || at->block == MU_S_LOW;
     const mu_mask sliding = at->block < MU_S_LOW ? yes : no, small = low ? yes : no;
+    const mu_mask lowest = at->block == MU_S_LOW ? yes : no;
     const mu_lanes v = mu_all(at->v), y = mu_all(at->y), share = mu_share(v, y, sliding, small);
     mu_lanes base, factor;
-    mu_ratio_form(v, y, sliding, small, at->block == MU_S_LOW ? yes : no, share, mu_sqrt(v * v * share), &base, &factor);
+    mu_ratio_form(v, y, sliding, small, lowest, share, mu_sqrt(v * v * share), &base, &factor);
     return mu_first(factor);
 }
 

@@ -1,4 +1,4 @@
-/* What differs from quantity to quantity: limits, closed forms for large speed, rounding; and the records themselves. */
+/* What differs from quantity to quantity: limits, closed forms for large speed, rounding; and the records. */
 
 /* --- limits at v~ = 0, y~ = 0 or infinity ----------------------------------------------------------- */
 
@@ -115,8 +115,8 @@ static mu_slopes mu_stick_fast_slopes(const mumacro_data *data, double v, double
 
 /* --- what a bound allows beside the error of q: rounding, and in the corner the last digit of y~ ------- */
 
-/* d ln phi for that digit: d phi / d eta = -2 phi / stiff; where that is no longer linear over a digit, the root itself is
- * computed. */
+/* d ln phi for that digit: d phi / d eta = -2 phi / stiff; where that is no longer linear over a digit, the root itself
+ * is computed. */
 static double mu_corner_digit(const mu_place *at) {
     const double eta = at->y - 1.0, digit = MU_ROUNDING / (3.0 * at->phi * at->phi + 2.0 * eta);
     return digit < 1e-3 ? digit : (mu_normal_form_root(at->v, eta - MU_ROUNDING) - at->phi) / at->phi;
@@ -126,7 +126,8 @@ static double mu_ratio_slack(const mumacro_data *data, const mu_place *at, doubl
     double terms;
     (void)data;
     if (at->block == MU_CORNER) return MU_ROUNDING * at->phi + at->phi * mu_corner_digit(at);
-    if (at->block != MU_C_TAIL && at->block != MU_S_TAIL) return 0.0; /* those of common charts are in the table's errors */
+    /* that of common charts is in the table's errors */
+    if (at->block != MU_C_TAIL && at->block != MU_S_TAIL) return 0.0;
     /* the terms that are added up: the outer solution, and the layer's logarithm */
     terms = value + (factor > 0.0 ? factor * fabs(mu_log1(at->v) - 0.5 * mu_log1(at->y)) : 0.0);
     return 8.0 * MU_ROUNDING * terms + (at->block == MU_S_TAIL ? 16.0 * MU_ROUNDING * factor : 0.0) + MU_DENORMAL;
