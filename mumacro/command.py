@@ -100,7 +100,8 @@ def read_case(words: Sequence[str], without: str | None = None) -> dict[str, flo
         if name not in NAMES:
             meant = suggestion(name)
             case[meant or name] = math.nan  # not reported as missing, too
-            faults.append(f"unknown input {name!r}: " + (f"did you mean {meant}?" if meant else ", ".join(NAMES)))
+            advice = f"did you mean {meant}?" if meant else f"there are {', '.join(NAMES)}"
+            faults.append(f"unknown input {name!r}: {advice}")
             continue
         if name in case:
             faults.append(f"{name} is given twice")

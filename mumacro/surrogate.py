@@ -366,7 +366,7 @@ class Surrogate:
 
         Parameters
         ----------
-        cases : mapping, pandas.DataFrame or xarray.Dataset, optional
+        cases : mapping, DataFrame (pandas, Dask, Polars), pyarrow.Table or xarray.Dataset, optional
             The inputs by name, in place of keywords; other columns are ignored.
         mu0 : array_like
             Coulomb friction coefficient [-], > 0.
@@ -393,7 +393,7 @@ class Surrogate:
         -------
         Answer
             Or the container of the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
-            (see :mod:`mumacro.interop.labels`).
+            (see :mod:`mumacro.interop.labels`).  Arrow and Polars give an answer of arrays.
 
         Raises
         ------
@@ -477,6 +477,7 @@ class Surrogate:
             if twice := picked.keys() & inputs.keys():
                 raise InputError(min(twice), inputs[min(twice)], "given once: in the cases or as a keyword")
             inputs = {**picked, **inputs}
+        inputs = {name: _from_arrow(x) for name, x in inputs.items()}
         if _labelled(inputs, cases):
             from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
 
@@ -603,9 +604,7 @@ def _picked(cases: Any) -> dict[str, Any]:
             "cases", kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
             "give anything else as {name: array}, what is lazy after its collect() or read_all()"
         ) from error  # fmt: skip
-    # columns that are neither arrays nor labelled, such as those of Arrow and Polars
-    return {name: np.asarray(x) if hasattr(type(x), "__arrow_c_stream__") and not _labels(x) else x
-            for name, x in picked.items()}  # fmt: skip
+    return picked
 
 
 _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
@@ -618,6 +617,12 @@ def _labelled(inputs: Mapping[str, Any], cases: Any) -> bool:
 
 def _labels(x: Any) -> bool:
     return type(x).__module__.partition(".")[0] in ("pandas", "xarray", "dask")
+
+
+def _from_arrow(x: Any) -> Any:
+    """A column of Arrow, Polars or another library with Arrow's interface as an array, NaN where it is null."""
+    arrow = hasattr(type(x), "__arrow_c_stream__") or hasattr(type(x), "__arrow_c_array__")
+    return np.asarray(x) if arrow and not _labels(x) else x
 
 
 def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:

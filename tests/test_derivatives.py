@@ -47,6 +47,20 @@ def test_slopes_are_those_of_the_surrogate(table: Surrogate) -> None:
     np.testing.assert_array_equal(quantities(table)["mu_macro"].slopes(*six), [gradient[name] for name in FIELDS])
 
 
+@pytest.mark.parametrize("shape", [(), (1,), (0,), (2, 2), (0, 3)])
+def test_values_and_slopes_have_the_shape_of_their_arguments(table: Surrogate, shape: tuple[int, ...]) -> None:
+    for name, quantity in quantities(table).items():
+        point = [CASE[field] for field in FIELDS] if name == "mu_macro" else [0.1, 0.5]
+        arrays = [np.full(shape, value) for value in point]
+        found, slopes = quantity.value(*arrays), quantity.slopes(*arrays)
+        assert found.shape == shape
+        assert slopes.shape == (len(quantity.inputs), *shape)
+        one = [np.array([value]) for value in point]
+        np.testing.assert_array_equal(found, np.full(shape, quantity.value(*one)[0]))
+        np.testing.assert_array_equal(np.moveaxis(slopes, 0, -1), np.full((*shape, 1), 1) * quantity.slopes(*one)[:, 0])
+        assert np.isnan(quantity.value(*(np.full(shape, -1.0) for _ in point))).all()
+
+
 @pytest.mark.parametrize("name", QUANTITIES)
 @pytest.mark.parametrize("y", [0.3, 0.9, 1.2, 5.0])
 def test_slopes_at_rest_are_the_limit_of_those_beside_it(table: Surrogate, name: str, y: float) -> None:

@@ -318,13 +318,13 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
         table.evaluate(**{**CASE, "v0": lazy["v0"]})
 
 
-@pytest.mark.parametrize("library", ["pyarrow", "polars"])
-def test_columns_of_arrow_tables_give_arrays(table: Surrogate, library: str) -> None:
-    module = pytest.importorskip(library)
+@pytest.mark.parametrize("kind", ["pyarrow.table", "pyarrow.record_batch", "polars.DataFrame"])
+def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> None:
+    library, name = kind.split(".")
+    make: Any = getattr(pytest.importorskip(library), name)
     given = {name: values.tolist() for name, values in columns().items()}
     given["v0"][7] = None
     given["omega"] = [130_000] * N
-    make = module.table if library == "pyarrow" else module.DataFrame
     expected = columns()
     expected["v0"][7] = math.nan
     want = table.evaluate(expected, gradient=True)
@@ -334,6 +334,8 @@ def test_columns_of_arrow_tables_give_arrays(table: Surrogate, library: str) -> 
     assert isinstance(found.mu_macro, np.ndarray)
     words = make({**given, "k": ["rigid"] * N})
     np.testing.assert_array_equal(table.evaluate(words).mu_macro, table.evaluate({**expected, "k": math.inf}).mu_macro)
+    rigid = table.evaluate(**{**given, "k": words["k"], "v0": 0.01}).mu_macro
+    np.testing.assert_array_equal(rigid, table.evaluate({**expected, "k": math.inf, "v0": 0.01}).mu_macro)
     gap = make({"k": [None, 1e6]})["k"]
     assert np.isnan(table.evaluate(**{**CASE, "k": gap}).mu_macro).tolist() == [True, False]
 

@@ -90,7 +90,7 @@ def _of_any_shape(function: Callable[..., Array]) -> Callable[..., Array]:
 
     def called(*arrays: Array) -> Array:
         found = function(*(np.ravel(x) for x in arrays))
-        return found.reshape(*found.shape[:-1], *np.shape(arrays[0]))
+        return found.reshape((*found.shape[:-1], *np.shape(arrays[0])))
 
     return called
 
