@@ -182,7 +182,7 @@ class Surrogate:
         >>> round(s.mu_ratio(0.1, 0.5), 9)
         0.94200429
         """
-        if type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
+        if type(v_tilde) is float is type(y_tilde) or (type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS):
             try:
                 mu: float = _RATIO(self._pointer, v_tilde, y_tilde)
             except OverflowError:  # a whole number beyond double range
