@@ -263,7 +263,7 @@ def build_page(folder: str) -> int:
     python = (PYTHON, "-m")
     export = (*python, "builder", "export", table, "--format", "wasm", "--out", module)
     code = run(*export, env=environment(), quiet=True)
-    return code or run(*python, "service.static_page", table, module, folder, env=environment())
+    return code or run(*python, "builder.export_page", table, module, folder, env=environment())
 
 
 def passes(title: str, tool: str | Path, *arguments: str | Path) -> bool:

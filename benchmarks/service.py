@@ -39,10 +39,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import numpy as np
 import orjson
 from measuring import IMAGES, ROOT, free_port, machine, markdown, progress, quantity, write_section
-
-from mumacro.inputs import FIELDS
 from service.evaluation import answer_batch
 from service.formats import choose
+
+from mumacro.inputs import FIELDS
 from service.quantities import QUANTITIES
 from service.tables import LoadedTable
 

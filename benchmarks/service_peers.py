@@ -71,9 +71,9 @@ def inside() -> Any:
 def fastapi(sync: bool) -> Any:
     """Models in and out, around the same table."""
     from fastapi import FastAPI
+    from service.schemas import Case, CaseAnswer
 
     from mumacro import Surrogate
-    from service.schemas import Case, CaseAnswer
 
     surrogate = Surrogate.open(_table())
     surrogate.warm_up()

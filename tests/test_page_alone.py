@@ -9,9 +9,9 @@ import pytest
 
 from builder.c.wasm import compiler
 from builder.export import export_table
+from builder.export_page import PageError, main, write_page
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
-from service.static_page import PageError, main, write_page
 
 pytestmark = pytest.mark.slow
 
