@@ -46,7 +46,7 @@ ENV NUMBA_CPU_NAME=generic \
     NUMBA_CACHE_DIR=/app/cache \
     PYTHONPATH=/app
 RUN venv/bin/python -m compileall -q mumacro service \
-    && venv/bin/python -m service warm --tables tables \
+    && venv/bin/python -c 'import mumacro; mumacro.Surrogate.open("tables/mumacro-1e-12.nc").warm_up()' \
     && test -n "$(find cache -name '*.kernel' -print -quit)" \
     && chmod -R a+rX,go-w .
 

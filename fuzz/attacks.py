@@ -170,7 +170,7 @@ def asking(server: Server, waits: list[float]) -> Iterator[None]:
     refused: list[Any] = []
 
     def ask() -> None:
-        while not stop.wait(0.02):
+        while True:
             started = time.perf_counter()
             try:
                 status = server.ask("GET", "/livez")[0]
@@ -179,6 +179,8 @@ def asking(server: Server, waits: list[float]) -> Iterator[None]:
             waits.append(time.perf_counter() - started)
             if status != 200:
                 refused.append(status)
+            if stop.wait(0.02):
+                return
 
     thread = threading.Thread(target=ask)
     thread.start()

@@ -257,6 +257,7 @@ def bounded(bound: str, text: str = "", default: Any = ..., **more: Any) -> Any:
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 _STRICT = ConfigDict(strict=True, extra="forbid")
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -272,7 +273,7 @@ def input_fields(
     """The inputs as fields of a model; those that are ``shown`` have an example."""
     fields: dict[str, Any] = {}
     for name, (unit, _) in SI.items():
-        kind: Any = Positive if name in POSITIVE else NotNegative
+        kind: Any = Positive if name in POSITIVE else Hertz if name == "f" else NotNegative
         entry: Any = float | Literal["rigid"] if name == "k" else float
         kind = kind | Literal["rigid"] if name == "k" else kind
         kind = kind | None if name in ("omega", "f") or (name == "k" and null) else kind
@@ -406,12 +407,14 @@ CaseRequest: Any = create_model(
 )
 
 
-def query_of(name: str, base: type[BaseModel]) -> Any:
-    """The model of a query with the same members as a body: ``std`` becomes std_mu0, std_Fz, ..."""
+def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
+    """The model of a query with the same members as a body; ``std`` becomes std_mu0, std_Fz, ... unless ``changed``."""
     fields: dict[str, Any] = {key: (info.annotation, info) for key, info in base.model_fields.items() if key != "std"}
-    for key, (unit, _) in SI.items():
-        fields[f"std_{key}"] = (NotNegative | None, bounded("finite and >= 0", f"Standard deviation [{unit}]", None))
-    return create_model(name, __config__=_STRICT, **fields)
+    if not changed:
+        for key, (unit, _) in SI.items():
+            kind = Hertz if key == "f" else NotNegative
+            fields[f"std_{key}"] = (kind | None, bounded("finite and >= 0", f"Standard deviation [{unit}]", None))
+    return create_model(name, __config__=_STRICT, **{**fields, **changed})
 
 
 CaseQuery: Any = query_of(

@@ -122,7 +122,7 @@ def _parameters(model: type[BaseModel], schemas: Mapping[str, Any]) -> list[dict
         if "object" in (kind.get("type") for kind in kinds):
             continue  # such as family, which a query cannot hold
         kind = kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
-        kind = {key: value for key, value in kind.items() if key not in outer}
+        kind = {key: value for key, value in kind.items() if key not in outer or (key == "anyOf" and len(kinds) > 1)}
         if described.get("default") is not None:
             kind["default"] = described["default"]
         parameter = {"name": name, "in": "query", "required": name in schema.get("required", ()), "schema": kind}
@@ -131,6 +131,7 @@ def _parameters(model: type[BaseModel], schemas: Mapping[str, Any]) -> list[dict
         if "description" in described:
             parameter["description"] = described["description"]
         if kind.get("type") == "array":
+            kind["minItems"] = 1
             parameter |= {"style": "form", "explode": False}
         found.append(parameter)
     return found

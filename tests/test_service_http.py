@@ -162,6 +162,25 @@ def test_the_key_gives_access(closed, case, headers):
     assert response.headers["vary"] == "X-API-Key, Authorization"
 
 
+def test_a_key_given_twice_is_refused(closed, case, problem):
+    twice = [("X-API-Key", "s3cret-key"), ("X-API-Key", "wrong")]
+    problem(closed.get("/v1/mu-macro", params=case, headers=twice), 400)
+
+
+def test_an_upgrade_with_a_body_is_refused(client, case, problem):
+    response = client.post("/v1/mu-macro", json=case, headers={"Upgrade": "websocket", "Connection": "Upgrade"})
+    assert problem(response, 400)
+    assert response.headers["connection"] == "close"
+
+
+def test_too_little_memory_is_overload_and_no_fault(client, case, problem, monkeypatch):
+    def fail(*_args):
+        raise MemoryError
+
+    monkeypatch.setattr("service.routes.case.answer_case", fail)
+    assert problem(client.post("/v1/mu-macro", json=case), 503)["type"].endswith("out-of-memory")
+
+
 @pytest.mark.parametrize("path", sorted(HEALTH_PATHS))
 def test_health_needs_no_key(closed, path):
     assert closed.get(path).status_code == 200

@@ -219,6 +219,16 @@ def test_an_arrow_batch_over_the_limit_is_refused(tables_dir, case, problem):
         assert problem(client.post(PATH, content=body, headers={"Content-Type": ARROW}), 413)["max_batch"] == 3
 
 
+@pytest.mark.parametrize("codec", ["lz4", "zstd"])
+def test_a_compressed_arrow_stream_is_refused_unread(client, case, problem, codec):
+    """It states its unpacked size, so a small body could fill the memory."""
+    batch, sink = pa.record_batch({name: [value] * 10_000 for name, value in case.items()}), pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, batch.schema, options=pa.ipc.IpcWriteOptions(compression=codec)) as writer:
+        writer.write_batch(batch)
+    response = client.post(PATH, content=sink.getvalue().to_pybytes(), headers={"Content-Type": ARROW})
+    assert "compressed" in problem(response, 400)["detail"]
+
+
 def test_arrow_is_refused_where_it_is_not_installed(tables_dir, case, problem, monkeypatch):
     left = {name: form for name, form in forms().items() if name != ARROW}
     monkeypatch.setattr("service.routes.batch.forms", lambda: left)

@@ -22,7 +22,7 @@ from ..quantities import INCLUDES
 from ..tables import LoadedTable
 from ..wire.json import dump
 from . import Endpoint, given_in_body, given_in_query, reply, tables_of, work_of
-from .solve_for import FIVE, Name, in_si, per_value
+from .solve_for import FIVE, FIVE_QUERY, Name, in_si, per_value
 
 __all__ = ["ENDPOINTS"]
 
@@ -161,7 +161,11 @@ LawRequest.model_config["json_schema_extra"] = {
         | {"along": "v0", "start": 1e-4, "stop": 10.0, "points": 5}
     ]
 }
-LawQuery: Any = query_of("LawQuery", LawRequest)
+_only: Any = (
+    list[Literal["approximations"]] | None,
+    Field(None, max_length=4, description="approximations: those of the paper beside the exact values"),
+)
+LawQuery: Any = query_of("LawQuery", LawRequest, include=_only, k=FIVE_QUERY["k"])
 
 
 class BorderMark(BaseModel):

@@ -17,11 +17,12 @@ from ..tables import LoadedTable
 from ..wire.json import dump
 from . import Endpoint, given_in_body, reply, tables_of, work_of
 
-__all__ = ["ENDPOINTS", "FIVE", "Name", "in_si", "per_value"]
+__all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "Name", "in_si", "per_value"]
 
 MAX_TARGETS = 10_000
 _NO_LIMIT = 1e300
 Name: Any = Literal[INPUTS]
+FIVE_QUERY: Any = input_fields(optional=INPUTS, null=False, shown=["k"])
 FIVE: Any = create_model("_Five", **input_fields(optional=INPUTS, shown=[name for name in example if name != "v0"]))
 Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
 _listed = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
