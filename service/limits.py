@@ -50,6 +50,7 @@ AT_ONCE = 4000.0  # largest cost without a thread, in times of a plain case: und
 QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
+_PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
 _ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
 
 
@@ -182,13 +183,13 @@ def _too_large(limit: int) -> BodyTooLargeError:
 
 async def drained(receive: Receive) -> None:
     """Read and drop the rest of a body that is refused, for a while: else many clients see a reset and no reason."""
+    until, count, more = asyncio.get_running_loop().time() + _LINGER_S, 0, True
     with suppress(TimeoutError):
-        async with asyncio.timeout(_LINGER_S):
-            count, more = 0, True
-            while more and count < _LINGER:
+        while more and count < _LINGER:
+            async with asyncio.timeout(min(_PAUSE_S, until - asyncio.get_running_loop().time())):
                 message = await receive()
-                count += len(message.get("body", b""))
-                more = message.get("more_body", False)
+            count += len(message.get("body", b""))
+            more = message.get("more_body", False)
 
 
 def _stand_back() -> None:

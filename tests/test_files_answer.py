@@ -83,10 +83,19 @@ def test_numbers_are_read_from_every_type_that_holds_them(table, stiffness):
 
 
 @pytest.mark.parametrize(
-    "stiffness", [pa.array(["rigid"]), pa.array([" Rigid"]), pa.array([""]), pa.array([None], pa.float64()),
-                  pa.array([None], pa.string()), pa.nulls(1), pa.array([math.inf]), pa.array(["inf"])]
+    "gap", [pa.array([""]), pa.array([None], pa.float64()), pa.array([None], pa.string()), pa.nulls(1),
+            pa.array([math.nan]), pa.array(["nan"])]
 )  # fmt: skip
-def test_an_empty_or_rigid_cell_in_a_column_that_is_there_is_rigid(table, stiffness):
+def test_a_gap_in_k_is_never_rigid(table, gap):
+    found, rejects = answer(batch_of(k=gap), table)
+    assert rejects.column("reason").to_pylist() == ["is missing; write rigid or a number"]
+    assert found.column("mu_macro").to_pylist() == [None]
+
+
+@pytest.mark.parametrize(
+    "stiffness", [pa.array(["rigid"]), pa.array([" Rigid"]), pa.array([math.inf]), pa.array(["inf"])]
+)
+def test_a_rigid_cell_is_rigid(table, stiffness):
     found, rejects = answer(batch_of(k=stiffness), table)
     assert rejects.num_rows == 0
     assert found.column("source")[0].as_py() == "rigid"
@@ -97,7 +106,7 @@ def test_an_empty_or_rigid_cell_in_a_column_that_is_there_is_rigid(table, stiffn
     ("column", "cell", "reason"),
     [("k", "1e400", "is beyond double range"), ("k", "1" + 400 * "0", "is beyond double range"),
      ("k", "stiff", "must be a number"),
-     ("k", "0", "must be finite and > 0, or rigid"), ("k", "nan", "must be finite and > 0, or rigid"),
+     ("k", "0", "must be finite and > 0, or rigid"), ("k", "nan", "is missing; write rigid or a number"),
      ("k", "-inf", "must be finite and > 0, or rigid"), ("v0", "", "is missing"), ("v0", "1_0", "must be a number"),
      ("mu0", "0x1", "must be a number"), ("Fz", "inf", "must be finite and > 0"),
      ("omega", "-1", "must be finite and >= 0")],
@@ -132,7 +141,7 @@ def test_units_in_brackets_are_converted_exactly(table):
         (["mu0", "Fz", "K [N/mm]", "y0", "omega", "v0"], ["'K [N/mm]' is similar"]),
         (["mu0", "Fz", "k [psi]", "y0", "omega", "v0"], ["unit that k cannot have", "N/mm"]),
         (["mu0", "Fz", "k", "y0", "omega [Hz]", "v0"], ["a frequency is f [Hz]"]),
-        (["mu0", "Fz", "y0", "omega", "v0"], ["no column k [N/m]", "--rigid"]),
+        (["mu0", "Fz", "y0", "omega", "v0"], ["no column k [N/m]", "there are 'mu0', 'Fz', 'y0'", "--rigid"]),
         (["mu0", "Fz", "k", "y0", "v0"], ["omega [rad/s] or f [Hz]"]),
         (["mu0", "Fz", "k", "y0", "frequency", "v0"], ["'frequency' is similar", "rename that column to f [Hz]"]),
         (["mu0", "Fz", "k", "y0", "omega", "f", "v0"], ["both f [Hz] and omega"]),

@@ -141,7 +141,7 @@ def test_columns_of_parquet_keep_their_types(tmp_path, table):
 
 def test_text_columns_are_unchanged(tmp_path, table):
     lines = ['{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,"v0":1E-2,"id":12345678901234567890, "b":[1] }',
-             '{"v0":0.01,"mu0":0.3,"Fz":10,"k":null,"y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}']  # fmt: skip
+             '{"v0":0.01,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}']  # fmt: skip
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", table)
     for line, given in zip((tmp_path / "out.ndjson").read_text().splitlines(), lines, strict=True):
@@ -208,15 +208,15 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(tmp_path, capsys, 
             ",".join([*good[:2], "rigid", *good[3:]]), "", ",".join([*good[:4], "inf", good[5]]), GOOD]  # fmt: skip
     (tmp_path / "cases.csv").write_text("\n".join([HEADER, *rows]))
     out = tmp_path / f"out.{end}"
-    assert "4 of 10 rows evaluated" in ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
+    assert "3 of 10 rows evaluated" in ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
     found = read(out)
-    assert [row["source"] for row in found] == ["stick_slip_low", "rigid", "rigid", "stick_slip_low"]
+    assert [row["source"] for row in found] == ["stick_slip_low", "rigid", "stick_slip_low"]
     if end == "parquet":
-        assert [row["k"] for row in found] == [1e6, None, None, 1e6]
+        assert [row["k"] for row in found] == [1e6, math.inf, 1e6]
     assert rejects_of(out) == [
         (2, "mu0", "-0.3", "must be finite and > 0"), (3, "mu0", "x", "must be a number"), (4, "v0", "", "is missing"),
         (5, "", ",".join(good[:5]), "has 5 cells, the header has 6"),
-        (6, "", GOOD + ",7", "has 7 cells, the header has 6"),
+        (6, "", GOOD + ",7", "has 7 cells, the header has 6"), (7, "k", "", "is missing; write rigid or a number"),
         (9, "omega", "inf", "must be finite and >= 0"),
     ]  # fmt: skip
     assert "row 2: mu0 must be finite and > 0, got '-0.3'" in ran(
@@ -247,16 +247,17 @@ def test_bad_lines_of_ndjson_land_in_the_side_file(tmp_path, capsys, table, end)
     out = tmp_path / f"out.{end}"
     ran(capsys, 3, tmp_path / "cases.ndjson", "-o", out)
     found = read(out)
-    assert [row.get("tag") for row in found] == ["a", None, None, None]
-    assert [row["source"] for row in found] == ["stick_slip_low", "rigid", "rigid", "stick_slip_low"]
+    assert [row.get("tag") for row in found] == ["a", None, None]
+    assert [row["source"] for row in found] == ["stick_slip_low", "rigid", "stick_slip_low"]
     assert found[0]["mu_macro"] == table.evaluate(**CASE).mu_macro
     reasons = {row: (field, reason) for row, field, _, reason in rejects_of(out)}
-    assert reasons.keys() == {3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14, 16}
+    assert reasons.keys() == {2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14, 16}
+    assert reasons[2] == ("k", "is missing; write rigid or a number")
     assert reasons[3] == ("", "is no JSON object")
     assert reasons[5] == reasons[6] == ("v0", "must be a number")
     assert reasons[7] == ("Fz", "must be finite")
     assert reasons[8] == ("k", "must be finite")
-    assert reasons[11] == ("k", 'is missing; null or "rigid" for a rigid contact')
+    assert reasons[11] == ("k", "is missing; write rigid or a number")
     assert reasons[12] == ("v0", "is missing")
     assert reasons[13] == ("", "repeats the key 'mu0'")
     assert reasons[14][0] == "v0"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.files.columns import ANSWERS, Columns, FilesError, find_columns
-from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, RAD_PER_CYCLE, Scale
+from mumacro.inputs import FIELDS, POSITIVE, RAD_PER_CYCLE, RIGID, Scale, refusal
 from mumacro.surrogate import Surrogate
 
 __all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "numbers"]
@@ -52,7 +52,7 @@ def answer(
     ----------
     batch : pyarrow.RecordBatch
         Columns ``mu0`` [-], ``Fz`` [N], ``k`` [N/m], ``y0`` [m], ``omega`` [rad/s] or ``f`` [Hz], ``v0`` [m/s], with
-        another unit where the heading has it in brackets; numbers or text.  A null, an empty or a ``rigid`` k is a
+        another unit where the heading has it in brackets; numbers or text.  A ``rigid`` or infinite k is a
         rigid contact.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
         The table; left out, the tightest one that comes with the library.
@@ -144,7 +144,7 @@ def _in_si(found: Array, scale: Scale, factor: float) -> Array:
 def numbers(array: pa.Array, stiffness: bool) -> tuple[Array, NDArray[np.int8] | None]:
     """A column as doubles (n,), NaN where it holds none, and why (n,) (None: no such place).
 
-    With ``stiffness`` a null, an empty or a ``rigid`` cell is infinite.
+    With ``stiffness`` the word ``rigid`` is infinite.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def numbers(array: pa.Array, stiffness: bool) -> tuple[Array, NDArray[np.int8] |
         kind = array.type
     fault: NDArray[np.int8] | None = None
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind):
-        array, fault = _parsed(array, stiffness)
+        array, fault = _parsed(_words_as_infinity(array) if stiffness else array)
     elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
         array = pc.cast(array, pa.float64(), safe=False)
     elif pa.types.is_null(kind):
@@ -166,25 +166,23 @@ def numbers(array: pa.Array, stiffness: bool) -> tuple[Array, NDArray[np.int8] |
         raise FilesError(f"holds {kind}, not numbers")
     if array.null_count == 0:
         return array.to_numpy(zero_copy_only=False), fault
-    if stiffness and fault is None:
-        return pc.fill_null(array, math.inf).to_numpy(zero_copy_only=False), None
     empty = array.is_null().to_numpy(zero_copy_only=False)
     out: Array = array.to_numpy(zero_copy_only=False).copy()
     fault = np.zeros(out.size, np.int8) if fault is None else fault
-    if stiffness:
-        out[empty & (fault == 0)] = math.inf
-    else:
-        fault[empty & (fault == 0)] = _MISSING
+    fault[empty & (fault == 0)] = _MISSING
     return out, fault
 
 
-def _parsed(array: pa.Array, stiffness: bool) -> tuple[pa.Array, NDArray[np.int8] | None]:
-    """Text as doubles, null where a cell is empty (or rigid) or no number; and where it is no number."""
+def _words_as_infinity(array: pa.Array) -> pa.Array:
+    """A stiffness as text, with ``inf`` for the word ``rigid``."""
     text = pc.utf8_trim_whitespace(pc.cast(array, pa.large_string()))
-    empty = pc.equal(text, "")
-    if stiffness:
-        empty = pc.or_(empty, pc.equal(pc.ascii_lower(text), "rigid"))
-    text = pc.if_else(empty, None, text)
+    return pc.if_else(pc.fill_null(pc.equal(pc.ascii_lower(text), RIGID), False), "inf", text)
+
+
+def _parsed(array: pa.Array) -> tuple[pa.Array, NDArray[np.int8] | None]:
+    """Text as doubles, null where a cell is empty or no number; and where it is no number."""
+    text = pc.utf8_trim_whitespace(pc.cast(array, pa.large_string()))
+    text = pc.if_else(pc.equal(text, ""), None, text)
     wrong: NDArray[np.bool_] = np.zeros(len(text), np.bool_)
     try:
         out = pc.cast(text, pa.float64())
@@ -220,7 +218,8 @@ def _rejects(
             value = values[field][i]
             positive = value > 0.0 if field in POSITIVE else value >= 0.0
             if fault or not (positive and (math.isfinite(value) or field == "k")):
-                reason = _WHY[fault] if fault else f"must be {BOUNDS[field]}" + (", or rigid" if field == "k" else "")
+                gap = field == "k" and fault == _MISSING
+                reason = _WHY[fault] if fault and not gap else refusal(field, math.nan if gap else value)
                 listed.append((i, name, _text(batch.column(column)[i].as_py()), reason))
                 break
     by_field: list[Any] = [list(column) for column in zip(*listed, strict=True)] or [[] for _ in REJECTS]

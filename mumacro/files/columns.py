@@ -99,7 +99,11 @@ def _check_missing(names: Sequence[str], places: dict[str, tuple[str, Scale]], r
             raise FilesError(f"there is no column {name}; {remedy}")
         if name == "k":
             if not rigid:
-                raise FilesError("there is no column k [N/m]; give --rigid if all contacts are rigid")
+                seen = ", ".join(map(repr, names))
+                raise FilesError(
+                    f"there is no column k [N/m] (or another unit in brackets); there are {seen}; rename one of "
+                    "them, or give --rigid if all contacts are rigid"
+                )
         else:
             hint = "omega [rad/s] or f [Hz]" if name == "omega" else f"{name} [{SI[name][0]}]"
             raise FilesError(f"there is no column {hint}; there are {', '.join(map(repr, names))}")

@@ -22,7 +22,7 @@ __all__ = ["main"]
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
-  an empty cell or "rigid" in k is a rigid contact; without a column k give --rigid
+  the word rigid in k is a rigid contact, an empty cell is refused; without a column k give --rigid
   other columns are copied unchanged
 added: mu_macro, mu_ratio, regime, error_bound, source
 rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason

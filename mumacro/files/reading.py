@@ -32,7 +32,7 @@ from mumacro.files.blocks import (
     shorten,
 )
 from mumacro.files.columns import Columns, FilesError
-from mumacro.inputs import NAMES, split_unit
+from mumacro.inputs import NAMES, is_rigid, split_unit
 
 __all__ = ["FORMATS", "Source", "format_of", "open_source"]
 
@@ -421,13 +421,12 @@ class NdjsonSource(_TextSource):
         """The inputs of one object as doubles, or the fault of one of them."""
         for name, (column, _) in self.columns.places.items():
             value = found.get(column)
-            if name == "k" and (value is None or (isinstance(value, str) and value.strip().lower() in ("", "rigid"))):
-                if column not in found:
-                    return Fault(row, name, None, 'is missing; null or "rigid" for a rigid contact')
+            if value is None or (name == "k" and isinstance(value, str) and not value.strip()):
                 found[column] = None
-                continue
-            if value is None:
                 continue  # reported with all missing values
+            if name == "k" and isinstance(value, str) and is_rigid(value):
+                found[column] = math.inf
+                continue
             shown = shorten(json.dumps(value).encode())
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 return Fault(row, name, shown, "must be a number")

@@ -314,7 +314,7 @@ class _Run:
             column = batch.column(field.name)
             if column.type != field.type:  # an input that was text
                 value, _ = numbers(column, stiffness=self._is_stiffness(field.name))
-                column = pa.array(value, mask=np.isinf(value))
+                column = pa.array(value)  # infinite for a rigid contact: a null would be a gap
             columns.append(column)
         return pa.RecordBatch.from_arrays(columns, schema=self.schema), faults
 
