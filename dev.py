@@ -292,7 +292,7 @@ def page() -> int:
     python = (PYTHON, "-m")
     export = (*python, "builder", "export", table, "--format", "wasm", "--out", module)
     code = run(*export, env=environment(), quiet=True)
-    code = code or run(*python, "service.static_page", table, module, folder, env=environment())
+    code = code or run(*python, "builder.export_page", table, module, folder, env=environment())
     print(f"The page is in {folder}; try it:  python3 -m http.server -d {folder}" if code == 0 else "FAILED")
     return code
 

@@ -13,7 +13,7 @@ import difflib
 import math
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,12 +39,14 @@ __all__ = [
     "check_inputs",
     "is_rigid",
     "length_scale",
+    "number_hint",
     "read_number",
     "real",
     "refusal",
     "scale_of",
     "split_unit",
     "suggestion",
+    "unknown_name",
 ]
 
 Array = NDArray[np.float64]
@@ -191,6 +193,47 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
         near = difflib.get_close_matches(plain, _OTHER_NAMES, n=1, cutoff=0.75)
         return _OTHER_NAMES[near[0]] if near else None
     return None
+
+
+def unknown_name(name: str, known: Iterable[str]) -> str:
+    """Why an unknown name is refused, with the known name that was probably meant.
+
+    >>> unknown_name("omga", ("omega", "f"))
+    'unknown field; did you mean omega? allowed: omega, f'
+    """
+    names = list(known)
+    meant = suggestion(name[:80], loosely=False)
+    if meant not in names:
+        meant = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)
+    advice = f"did you mean {meant}? " if meant else ""
+    return f"unknown field; {advice}allowed: {', '.join(names)}"
+
+
+def number_hint(name: str, value: object) -> str:
+    """Why ``value`` is refused where the number of an input, or another number, should stand.
+
+    >>> number_hint("y0", "2um"), number_hint("y0", "2,5"), number_hint("y0", "2"), number_hint("y0", True)
+    ('must be a number: give metres, 2e-06', 'must be a number with a decimal point: 2.5', \
+'must be a number, not a text: leave out the quotes', 'must be a number')
+    """
+    if not isinstance(value, str):
+        return "must be a number"
+    text = value.strip()[:80]
+    if _PLAIN.fullmatch(text):
+        number = float(text)
+        if math.isfinite(number):
+            return "must be a number, not a text: leave out the quotes"
+        return "must be a number, or rigid" if name == "k" else "must be finite"
+    if re.fullmatch(r"[+-]?\d+,\d+", text):
+        return f"must be a number with a decimal point: {text.replace(',', '.')}"
+    found = _WITH_UNIT.fullmatch(text)
+    if found is None:
+        return "must be a number, or rigid" if name == "k" else "must be a number"
+    like = name if name in SI else "mu0"  # another number is a plain one, too
+    words, scale = SI[like][1], scale_of(like, found[2])
+    if scale is None:
+        return f"must be a number without a unit: give {words}"
+    return f"must be a number: give {words}, {scale.si(float(found[1])):.12g}"
 
 
 def read_number(name: str, text: str) -> float:

@@ -6,7 +6,7 @@ API_VERSION = "1"
 
 
 def __getattr__(name: str) -> str:
-    # Imported on first use: a health check imports this package every few seconds and must not load numba.
+    # Imported on first use: a health check imports this package every few seconds and must stay small.
     if name == "__version__":
         from mumacro.version import __version__
 

@@ -1,6 +1,5 @@
 """``python -m service``: serve (from an installed wheel: ``mumacro serve``).
 ``python -m service healthcheck``: check whether a running service is ready.
-``python -m service warm``: load the tables once, so that kernels are compiled and stored.
 
 Exit codes: 0 stopped by a signal (or ready), 1 could not run (or not ready), 2 bad setting or argument.
 """
@@ -16,7 +15,7 @@ from types import FrameType
 try:
     from .settings import PREFIX, Settings, SettingsError, load_settings
 except ModuleNotFoundError as error:
-    # Without mumacro.extras, which needs numba: perhaps no package is installed here.
+    # Without mumacro.extras: perhaps no package is installed here.
     raise SystemExit(
         f"python -m service: {error.name} is not installed: pip install 'mumacro[service]' "
         "(in a checkout: pip install -e '.[service]')"
@@ -33,9 +32,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Serve macroscopic friction over HTTP.  Every option is also a setting MUMACRO_<OPTION>.",
         epilog="Files of cases need no server: mumacro eval --help.",
     )
-    parser.add_argument(
-        "command", nargs="?", choices=("serve", "healthcheck", "warm"), default="serve", help="default: serve"
-    )
+    parser.add_argument("command", nargs="?", choices=("serve", "healthcheck"), default="serve", help="default: serve")
     for name in _OPTIONS:
         description = Settings.model_fields[name].description
         parser.add_argument(f"--{name.replace('_', '-')}", metavar=name.upper(), help=description)
@@ -59,15 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from .healthcheck import is_ready, loopback_url
 
         return 0 if is_ready(loopback_url(settings)) else 1
-    if chosen.command == "warm":
-        from .app import load
-        from .tables import Tables
-
-        tables = Tables(settings.tables)
-        load(tables)
-        if tables.fault is not None:
-            print(tables.fault, file=sys.stderr)
-        return 0 if tables.fault is None else 1
     return _serve(settings)
 
 
@@ -81,7 +69,7 @@ def _serve(settings: Settings) -> int:
     # Set before the slow imports: the first process of a container ignores a signal that has no handler.
     signal.signal(signal.SIGTERM, _stop)
 
-    # Imported here: a health check must not load the server and the kernels.
+    # Imported here: a health check must not load the server.
     try:
         import uvicorn
     except ModuleNotFoundError as error:
@@ -90,16 +78,15 @@ def _serve(settings: Settings) -> int:
         print(f"python -m service: {missing('service', error)}", file=sys.stderr)
         return 1
 
-    from .logs import log_config
-    from .shared import shared_folder
+    from .observe import log_config, shared_counters
 
     try:
-        with shared_folder() if settings.workers > 1 else nullcontext():
+        with shared_counters() if settings.workers > 1 else nullcontext():
             uvicorn.run(
                 # By name, so that only worker processes import it, and not their parent.
                 f"{__package__}.app:create_app",
                 factory=True,
-                http=f"{__package__}.connection:Connection",
+                http=f"{__package__}.server:Connection",
                 host=settings.host,
                 port=settings.port,
                 workers=settings.workers,
@@ -111,7 +98,6 @@ def _serve(settings: Settings) -> int:
                 root_path=settings.root_path,
                 proxy_headers=bool(settings.trusted_proxies),
                 forwarded_allow_ips=settings.trusted_proxies,
-                limit_concurrency=settings.max_connections,
                 timeout_keep_alive=settings.keep_alive_s,
                 timeout_graceful_shutdown=settings.shutdown_grace_s,
             )

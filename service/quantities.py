@@ -1,138 +1,26 @@
-"""The registry of quantities that ``include`` can add to an answer.
-
-A quantity is one entry: its name, its parts with units and texts, its cost, and how it is computed.  JSON, CSV, Arrow,
-the models of answers, OpenAPI, the estimated cost of a request and the warm-up use the registry.
+"""The quantities that ``include`` can add to an answer: one entry of the registry each.
 
 Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations"
 (Friction, 2018).
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from collections.abc import Sequence
+from functools import cache
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.charts import REGIME_OF_SOURCE, REGIMES, ROUNDING
+from mumacro.inputs import FIELDS, SI
 from mumacro.settling import settling
 
-from .kernel import FIELDS, REGIME_OF_SOURCE, ROUNDING, STATIC, UNITS, Array, Details, Kernel
+from .answers import QUANTITIES, Array, Cases, Part, Quantity, register
 
-__all__ = ["QUANTITIES", "Cases", "Part", "Quantity", "compute", "cost_of", "nested", "parts_of", "register"]
+__all__ = ["INCLUDES"]
 
 SAMPLES = 256  # of the inputs, for std_sampled
 ENOUGH = 0.1  # relative difference of std_sampled and std up to which first order counts as enough
-
-
-@dataclass(frozen=True)
-class Part:
-    """One column that a quantity adds.  ``path`` is its name in flat formats; in JSON the dot makes an object."""
-
-    path: str
-    unit: str
-    text: str
-    kind: type = float
-
-
-@dataclass
-class Cases:
-    """Legal cases that quantities are computed for: six columns (n,), k = inf is rigid, and their default answers."""
-
-    kernel: Kernel
-    columns: Mapping[str, Array]
-    mu_macro: Array
-    error_bound: Array
-    source: NDArray[np.int8]
-    std: Mapping[str, float]
-    slopes: bool
-
-    @cached_property
-    def details(self) -> Details:
-        """Groups, and slopes if a requested quantity needs them."""
-        return self.kernel.details(self.columns, self.slopes)
-
-    @cached_property
-    def at_rest(self) -> NDArray[np.bool_]:
-        """Where nothing oscillates."""
-        resting: NDArray[np.bool_] = (self.columns["y0"] == 0.0) | (self.columns["omega"] == 0.0)
-        return resting
-
-    @cached_property
-    def usable(self) -> NDArray[np.bool_]:
-        """Where the contact is elastic, oscillates, and its groups are within double range."""
-        known: NDArray[np.bool_] = np.isfinite(self.details.y_tilde) & ~self.at_rest
-        return known
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One name that ``include`` may hold.
-
-    Attributes
-    ----------
-    name : str
-    text : str
-        Its meaning, in one sentence.
-    parts : tuple of Part
-        The columns that it adds.
-    compute : callable
-        From :class:`Cases` to one column (n,) per part, in their order; NaN where there is no value.
-    cost : float
-        Time of a case, in times of a plain answer.
-    slopes : bool
-        Whether it needs the gradient.
-    """
-
-    name: str
-    text: str
-    parts: tuple[Part, ...]
-    compute: Callable[[Cases], Sequence[Array]]
-    cost: float
-    slopes: bool = False
-
-
-QUANTITIES: dict[str, Quantity] = {}
-
-
-def register(quantity: Quantity) -> None:
-    """Add a quantity."""
-    QUANTITIES[quantity.name] = quantity
-
-
-def parts_of(include: Sequence[str]) -> list[Part]:
-    """The columns that these names add, in order."""
-    return [part for name in include for part in QUANTITIES[name].parts]
-
-
-def cost_of(include: Sequence[str]) -> float:
-    """Time of a case with these names, in times of a plain answer."""
-    return 1.0 + sum(QUANTITIES[name].cost for name in include)
-
-
-def compute(cases: Cases, include: Sequence[str]) -> dict[str, Array]:
-    """The columns that these names add, by path."""
-    found: dict[str, Array] = {}
-    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        for name in include:
-            quantity = QUANTITIES[name]
-            for part, column in zip(quantity.parts, quantity.compute(cases), strict=True):
-                found[part.path] = column
-    return found
-
-
-def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
-    """Columns by path as JSON has them: ``power.saved`` becomes ``power: {saved: ...}``."""
-    out: dict[str, Any] = {}
-    for path, column in columns.items():
-        name, _, key = path.partition(".")
-        if key:
-            out.setdefault(name, {})[key] = column
-        else:
-            out[name] = column
-    return out
-
+_STATIC = REGIMES.index("static")
 
 # --- groups and marks on the friction law -------------------------------------------------------------
 
@@ -159,7 +47,7 @@ register(
 def _limits(cases: Cases) -> Sequence[Array]:
     # Rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0, with mu_crit -> 0.
     mu0, omega = cases.columns["mu0"], cases.columns["omega"]
-    y_tilde, surrogate = cases.details.y_tilde, cases.kernel.surrogate
+    y_tilde, surrogate = cases.details.y_tilde, cases.surrogate
     y = np.where(cases.usable, y_tilde, 1.0)
     v = np.asarray(surrogate.v_tilde_crit(y))
     ratio = np.asarray(surrogate.mu_ratio(v, y))
@@ -192,9 +80,13 @@ register(
 
 def _regime_certain(cases: Cases) -> Sequence[Array]:
     y = np.where(cases.usable, cases.details.y_tilde, 1.0)
-    crit = np.asarray(cases.kernel.surrogate.v_tilde_crit(y))
+    crit = np.asarray(cases.surrogate.v_tilde_crit(y))
     distance = np.abs(cases.details.v_tilde / crit - 1.0)
-    clear = ~cases.usable | (REGIME_OF_SOURCE[cases.source] == STATIC) | (distance > cases.kernel.border_error)
+    clear = (
+        ~cases.usable
+        | (REGIME_OF_SOURCE[cases.source] == _STATIC)
+        | (distance > (cases.surrogate.border.max_rel_error + ROUNDING))
+    )
     return (clear.astype(np.float64),)
 
 
@@ -210,7 +102,8 @@ register(
 
 # --- sensitivity and uncertainty ----------------------------------------------------------------------
 
-_PER = {name: "-" if unit == "-" else f"1/({unit})" for name, unit in UNITS.items()}
+_UNITS = {name: unit for name, (unit, _) in SI.items()}
+_PER = {name: "-" if unit == "-" else f"1/({unit})" for name, unit in _UNITS.items()}
 
 
 def _gradient(cases: Cases) -> Sequence[Array]:
@@ -260,7 +153,8 @@ def _sampled(cases: Cases) -> Array:
             cases.columns[name] + shift if shift else cases.columns[name]
             for name, shift in zip(FIELDS, (point * deviations).tolist(), strict=True)
         ]
-        mu, _, _, _ = cases.kernel.columns(n, shifted)
+        a, b, c, d, e, f = shifted
+        mu, _, _, _ = cases.surrogate.evaluate_columns(a, b, c, d, e, f, n)
         off = np.where(np.isnan(mu), 0.0, mu - cases.mu_macro)
         total += off
         squares += off * off
@@ -317,7 +211,7 @@ register(
 
 def _stick_fraction(cases: Cases) -> Sequence[Array]:
     v, y = cases.details.v_tilde, cases.details.y_tilde
-    value, error = cases.kernel.surrogate.stick_fraction_with_bound(v, y)
+    value, error = cases.surrogate.stick_fraction_with_bound(v, y)
     bound = np.full(v.shape, np.nan) if error is None else np.asarray(error)
     # y~ below double range: the groups do not show whether such a contact sticks
     lost = (y == 0.0) & (v < np.inf) & ~cases.at_rest
@@ -344,7 +238,7 @@ def _power(cases: Cases) -> Sequence[Array]:
     usable = cases.usable & np.isfinite(details.v_tilde)
     v, y = (np.where(usable, group, 1.0) for group in (details.v_tilde, details.y_tilde))
     unit = mu0 * load * (details.length_scale * omega)
-    value, error = cases.kernel.surrogate.power_with_bound(v, y)
+    value, error = cases.surrogate.power_with_bound(v, y)
     bound = np.nan if error is None else np.asarray(error) * unit
     saved = (mu0 - cases.mu_macro) * load * v0
     return (
@@ -372,7 +266,7 @@ register(
 
 
 def _settling(cases: Cases) -> Sequence[Array]:
-    found = settling(cases.kernel.surrogate, **dict(cases.columns))  # type: ignore[arg-type]
+    found = settling(cases.surrogate, **dict(cases.columns))  # type: ignore[arg-type]
     return found.periods, found.periods_any, found.time, found.slip_path, found.error_bound
 
 
@@ -391,3 +285,6 @@ register(
         cost=5,
     )
 )
+
+#: names that ``include`` may hold
+INCLUDES = tuple(QUANTITIES)

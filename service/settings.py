@@ -7,13 +7,14 @@ names the variable, the value and what it must be; the value of the API key is n
 import os
 import re
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-__all__ = ["PREFIX", "Settings", "SettingsError", "cache_fields", "load_settings", "unknown_variables"]
+__all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
 
 PREFIX = "MUMACRO_"
 _MAX_AGE_S = 3600
@@ -71,7 +72,7 @@ class Settings(BaseSettings):
     workers: int = Field(1, ge=1, le=256, description="an integer from 1 to 256")
     max_body_bytes: int = Field(16 * 2**20, ge=1024, le=2**31, description="an integer from 1024 to 2147483648")
     max_batch: int = Field(100_000, ge=1, le=10_000_000, description="an integer from 1 to 10000000")
-    max_batches: int = Field(8, ge=1, le=1024, description="an integer from 1 to 1024")
+    max_batches: int = Field(4, ge=1, le=1024, description="an integer from 1 to 1024")
     max_connections: int = Field(1000, ge=1, le=1_000_000, description="an integer from 1 to 1000000")
     keep_alive_s: int = Field(75, ge=1, le=3600, description="an integer from 1 to 3600")
     client_timeout_s: int = Field(30, ge=1, le=3600, description="an integer from 1 to 3600")
@@ -86,11 +87,9 @@ class Settings(BaseSettings):
     root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
     trusted_proxies: str = Field("127.0.0.1", description="addresses or networks joined by commas, or *")
     guide: DirectoryPath | None = Field(None, description="a directory with the built documentation")
-    tracing: bool = Field(False, description="true or false")
     log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
         "info", description="one of debug, info, warning, error, critical"
     )
-    drain_s: float = Field(1.0, ge=0, le=600, description="a number from 0 to 600")
     shutdown_grace_s: int = Field(10, ge=0, le=3600, description="an integer from 0 to 3600")
 
     @field_validator("log_level", mode="before")
@@ -126,12 +125,12 @@ class Settings(BaseSettings):
             found.setdefault(self.api_key.get_secret_value(), "default")
         return found
 
-
-def cache_fields(settings: Settings) -> dict[str, str]:
-    """How long, and by whom, an answer may be cached: with an API key, only by the client itself."""
-    if not settings.keys():
-        return {"cache-control": f"public, max-age={_MAX_AGE_S}", "vary": "accept"}
-    return {"cache-control": f"private, max-age={_MAX_AGE_S}", "vary": "accept, x-api-key, authorization"}
+    @cached_property
+    def cache_fields(self) -> dict[str, str]:
+        """How long, and by whom, an answer may be cached: with an API key, only by the client itself."""
+        if not self.keys():
+            return {"Cache-Control": f"public, max-age={_MAX_AGE_S}"}
+        return {"Cache-Control": f"private, max-age={_MAX_AGE_S}", "Vary": "X-API-Key, Authorization"}
 
 
 def load_settings(**chosen: Any) -> Settings:

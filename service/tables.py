@@ -2,25 +2,18 @@
 
 import logging
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from hashlib import blake2b
 from pathlib import Path
-from typing import Annotated, Any, Self
-
-import orjson
-from fastapi import Depends
-from starlette.requests import Request
+from typing import Any, Self
 
 from mumacro import Surrogate, TableError
 
-from . import API_VERSION, __version__, numbers
-from .errors import FieldFault, InvalidFieldsError, NotReadyError
-from .kernel import Kernel
-from .metrics import first_cell
+from . import API_VERSION
+from .problems import FieldFault, NotReadyError, refuse
 
-__all__ = ["LoadedTable", "Tables", "TablesDep", "signature", "table_files", "tables_of"]
+__all__ = ["LoadedTable", "Tables", "table_files"]
 
 _log = logging.getLogger("mumacro.tables")
 
@@ -57,13 +50,11 @@ class LoadedTable:
     """A table in memory, and the state of its file when it was read."""
 
     surrogate: Surrogate
-    kernel: Kernel
     stamp: tuple[int, int, int]
-    cell: int = 0  # index of the counter of its first source
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Read and check one table, and load what its first answers need.
+        """Read and check one table.
 
         Raises
         ------
@@ -74,26 +65,24 @@ class LoadedTable:
             stamp = _stamp(path)
         except OSError as error:
             raise TableError(path, error.strerror or "unreadable") from error
-        surrogate = Surrogate.open(path)
-        kernel = Kernel(surrogate)
+        surrogate = Surrogate.open(path, threads=1)
         surrogate.self_check()
-        return cls(surrogate, kernel, stamp)
+        return cls(surrogate, stamp)
+
+    @cached_property
+    def id(self) -> str:
+        """The table's name."""
+        return self.surrogate.id
 
     @cached_property
     def label(self) -> dict[str, object]:
         """The table's label in every answer."""
-        return {"id": self.surrogate.id, "tolerance": self.surrogate.tolerance}
+        return {"id": self.id, "tolerance": self.surrogate.tolerance}
 
     @cached_property
-    def fragment(self) -> orjson.Fragment:
-        """The label as JSON."""
-        return orjson.Fragment(orjson.dumps(self.label))
-
-    @cached_property
-    def tag_key(self) -> bytes:
-        """The part of entity tags that depends on the table and the version."""
-        text = repr((self.kernel.checksum, self.surrogate.id, __version__, API_VERSION))
-        return blake2b(text.encode(), digest_size=32).digest()
+    def signature(self) -> dict[str, Any]:
+        """Fields of every answer: the table and the version of the interface."""
+        return {"table": self.label, "api_version": API_VERSION}
 
     @property
     def size_bytes(self) -> int:
@@ -125,20 +114,14 @@ class Tables:
         self.paths = tuple(paths)
         self.loaded: tuple[LoadedTable, ...] = ()
         self.fault: str | None = "the tables are not loaded yet"
-        self.ready = False  # whether requests are answered
-        self.draining = False
-        self.warm = False  # whether everything compiled is loaded, not only what the first answers need
 
-    def load(self, before_answers: Callable[[list[dict[str, Any]]], None] | None = None) -> None:
-        """Load all tables.  A refused table makes the service not ready; it never stops the process.
-
-        ``before_answers`` is called with the labels of the tables before the first request is answered.
-        """
+    def load(self) -> None:
+        """Load all tables.  A refused table makes the service not ready; it never stops the process."""
         try:
             tables = [LoadedTable.open(path) for path in table_files(self.paths)]
-            names = [table.surrogate.id for table in tables]
+            names = [table.id for table in tables]
             for table in tables:
-                if names.count(table.surrogate.id) > 1:
+                if names.count(table.id) > 1:
                     raise TableError(table.surrogate.path, "another table has the same name")
         except TableError as error:
             self.fault = f"table {error.path.name}: {error.reason}"
@@ -147,26 +130,19 @@ class Tables:
             self.fault = "the tables could not be loaded; the log has the reason"
             _log.exception("no tables")
         else:
-            tables.sort(key=lambda table: (table.surrogate.tolerance, table.surrogate.id))
-            self.loaded = tuple(replace(table, cell=first_cell(i)) for i, table in enumerate(tables))
-            labels = [table.label for table in self.loaded]
-            if before_answers is not None:
-                before_answers(labels)
-            self.fault = None
-            _log.info("tables are loaded", extra={"fields": {"tables": labels}})
+            tables.sort(key=lambda table: (table.surrogate.tolerance, table.id))
+            self.loaded, self.fault = tuple(tables), None
+            _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in tables]}})
 
     def check(self) -> None:
-        """Raise NotReadyError if a table does not give its known answer, or if the service is stopping."""
-        if self.draining:
-            raise NotReadyError("the service is stopping")
-        self._ready()
+        """Raise NotReadyError if a table does not give its known answer or its file was changed."""
         try:
-            for table in self.loaded:
+            for table in self._ready():
                 table.check()
         except TableError as error:
             raise NotReadyError(f"table {error.path.name}: {error.reason}") from error
 
-    def pick(self, tolerance: float | None = None, place: str = "pointer") -> LoadedTable:
+    def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
         """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-]).
 
         Raises
@@ -180,9 +156,8 @@ class Tables:
         fit = [table for table in tables if table.surrogate.tolerance <= tolerance]
         if not fit:
             tightest = tables[0].surrogate.tolerance
-            reason = f"no loaded table is that tight; the tightest has {tightest:g}"
-            fault = FieldFault("tolerance", reason, tolerance, f">= {tightest:g}", place)
-            raise InvalidFieldsError(f"tolerance: {reason}", [fault], tightest_available=tightest)
+            reason = f"must be >= {tightest:g}: no loaded table is tighter"
+            refuse([FieldFault(("tolerance",), reason, tolerance, parameter)], tightest_available=tightest)
         return min(fit, key=lambda table: (table.size_bytes, -table.surrogate.tolerance))
 
     def named(self, identity: str) -> LoadedTable:
@@ -193,37 +168,12 @@ class Tables:
         NotReadyError, InvalidFieldsError
             No table is loaded; none has that name.
         """
-        tables = self._ready()
-        for table in tables:
-            if table.surrogate.id == identity:
-                return table
-        reason = "must be one of " + ", ".join(table.surrogate.id for table in tables)
-        raise InvalidFieldsError(f"id: {reason}", [FieldFault("id", reason, identity, place="parameter")])
+        found = {table.id: table for table in self._ready()}
+        if identity not in found:
+            refuse([FieldFault.of("id", f"must be one of {', '.join(found)}", identity)])
+        return found[identity]
 
     def _ready(self) -> tuple[LoadedTable, ...]:
         if self.fault is not None:
             raise NotReadyError(self.fault)
         return self.loaded
-
-    def warm_up_more(self) -> None:
-        """Load or compile the code that the first answers do not need: the reader of batches, then the quantities."""
-        numbers.load()
-        self.warm = True
-
-
-def signature(table: LoadedTable) -> dict[str, object]:
-    """Fields of every answer: the table and the version of the interface."""
-    return {"table": table.label, "api_version": API_VERSION}
-
-
-def tables_of(request: Request) -> Tables:
-    """The tables of the application that the request came to."""
-    tables: Tables = request.app.state.tables
-    return tables
-
-
-async def _tables(request: Request) -> Tables:  # async: FastAPI would run a plain function in a thread
-    return tables_of(request)
-
-
-TablesDep = Annotated[Tables, Depends(_tables)]

@@ -27,8 +27,9 @@ from builder.sweep import Sweep
 from mumacro import Surrogate
 
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
-    from fastapi import FastAPI
     from starlette.testclient import TestClient
+
+    from service.app import Application
 
 START_S = 180  # a first start compiles the kernels
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -47,16 +48,16 @@ def tables_dir(repository: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def app(tables_dir: Path) -> "FastAPI":
+def app(tables_dir: Path) -> "Application":
     """An application on the committed tables, with default settings."""
     from service.app import create_app
     from service.settings import Settings
 
-    return create_app(Settings(tables=(tables_dir,)), wait=True)
+    return create_app(Settings(tables=(tables_dir,)))
 
 
 @pytest.fixture(scope="session")
-def client(app: "FastAPI") -> "Iterator[TestClient]":
+def client(app: "Application") -> "Iterator[TestClient]":
     """A client of that application, after its start."""
     from starlette.testclient import TestClient
 

@@ -24,10 +24,10 @@ import sys
 
 from mumacro_client import Client
 from mumacro_client.api.answers import (
-    get_mu_macro, post_law, post_mu_macro, post_mu_macro_batch_columns, post_mu_macro_batch_rows, post_solve_for,
+    get_mu_macro, post_law, post_mu_macro, post_mu_macro_batch, post_solve_for,
 )
 from mumacro_client.models import (
-    BatchColumns, Case, CaseAnswer, CaseRequest, CaseRequestIncludeType0Item, ColumnsAnswer, LawAnswer, LawRequest,
+    Case, CaseAnswer, CaseColumns, CaseRequest, CaseRequestIncludeType0Item, ColumnsAnswer, LawAnswer, LawRequest,
     Power, Problem, RowsAnswer, SolveForAnswer, SolveForRequest, SolveForRequestUnknown,
 )
 
@@ -48,13 +48,13 @@ refused = post_mu_macro.sync(client=client, body=CaseRequest(mu0=-0.3, fz=10.0, 
 assert isinstance(refused, Problem) and refused.errors
 found.update(refused=refused.errors[0].field)
 
-columns = post_mu_macro_batch_columns.sync(
-    client=client, body=BatchColumns(mu0=0.3, fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=[0.0, 0.01]))
+columns = post_mu_macro_batch.sync(
+    client=client, body=CaseColumns(mu0=0.3, fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=[0.0, 0.01]))
 assert isinstance(columns, ColumnsAnswer)
 found.update(columns=columns.mu_macro)
 
-rows = post_mu_macro_batch_rows.sync(
-    client=client, body=[Case(mu0=0.3, fz=10.0, k=None, y0=2e-6, omega=1.3e5, v0=0.01)])
+rows = post_mu_macro_batch.sync(
+    client=client, body=[Case(mu0=0.3, fz=10.0, k="rigid", y0=2e-6, omega=1.3e5, v0=0.01)])
 assert isinstance(rows, RowsAnswer) and rows.results[0] is not None
 found.update(rows=rows.results[0].mu_macro)
 

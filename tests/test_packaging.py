@@ -55,7 +55,7 @@ def test_the_manifest_gives_a_pod_nothing_that_it_does_not_need(repository):
     scaled = found["HorizontalPodAutoscaler"]["spec"]
     assert scaled["scaleTargetRef"]["name"] == found["Deployment"]["metadata"]["name"]
     assert scaled["minReplicas"] > found["PodDisruptionBudget"]["spec"]["minAvailable"]
-    grace = load_settings().drain_s + load_settings().shutdown_grace_s + 3.0  # preStop
+    grace = load_settings().shutdown_grace_s + 3.0  # preStop
     assert pod["terminationGracePeriodSeconds"] > grace
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from builder.c.wasm import compiler
 from builder.export import export_table
+from builder.export_page import PageError, main, write_page
 from comparing import close
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
-from service.static_page import PageError, main, write_page
 
 pytestmark = pytest.mark.slow
 

@@ -34,9 +34,9 @@ def load(name: str) -> ModuleType:
         sys.path[:] = before
 
 
-tables, hostile, faults, answers, strings, traffic, restarts, strange, framing = map(
+tables, hostile, faults, answers, strings, strange, limits = map(
     load,
-    ("tables", "hostile_tables", "faults", "answers", "number_strings", "load", "restarts", "strange", "parsers"),
+    ("tables", "hostile_tables", "faults", "answers", "number_strings", "strange", "attacks"),
 )
 
 
@@ -243,14 +243,7 @@ def test_a_file_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.Monkey
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"old")]
 
 
-# --- the page -----------------------------------------------------------------------------------------
-
-
 # --- the service --------------------------------------------------------------------------------------
-
-
-def test_no_request_is_seen_where_h11_sees_none_or_another() -> None:
-    assert "FAILED" not in framing.parsers(0.003)
 
 
 def test_strange_requests_are_answered_or_refused() -> None:
@@ -260,7 +253,7 @@ def test_strange_requests_are_answered_or_refused() -> None:
 
 @pytest.mark.parametrize(
     "script",
-    [tables, faults, answers, strings, traffic, restarts, strange, framing],
+    [tables, faults, answers, strings, strange, limits],
     ids=lambda script: script.__name__,
 )
 def test_every_section_of_a_script_is_on_the_page_and_nothing_failed(script: ModuleType) -> None:

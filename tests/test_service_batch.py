@@ -1,6 +1,7 @@
 """Batches over HTTP: columns and rows, broadcasting, bad cases among good ones, size limits."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ rows_of_cases = st.lists(
             "mu0": positive,
             "Fz": positive,
             "y0": st.just(0.0) | positive,
-            "k": positive | st.none(),
+            "k": positive | st.just("rigid"),
             "omega": positive,
             "v0": st.just(0.0) | positive,
         }
@@ -46,7 +47,7 @@ def test_rows_and_columns_answer_like_the_surrogate(client, surrogate, rows):
     for name in VALUES:
         assert [result[name] for result in by_rows["results"]] == by_columns[name]
     for row, result in zip(rows, by_rows["results"], strict=True):
-        expected = surrogate.evaluate(**{"k": None, **row})
+        expected = surrogate.evaluate(**row)
         assert result["mu_macro"] == close(expected.mu_macro, rel=1e-12)
         assert (result["regime"], result["source"]) == (expected.regime, expected.source)
 
@@ -63,7 +64,7 @@ def test_a_column_is_evaluated_at_once_and_scalars_hold_for_every_case(client, c
 
 
 def test_a_batch_agrees_with_its_cases_one_by_one(client, case):
-    rows = [{**case, "v0": v0, "k": k} for v0 in (0, 1e-3, 0.1, 10) for k in (1e5, 1e7, None)]
+    rows = [{**case, "v0": v0, "k": k} for v0 in (0, 1e-3, 0.1, 10) for k in (1e5, 1e7, "rigid")]
     results = client.post(PATH, params={"include": "groups,limits"}, json=rows).json()["results"]
     for row, result in zip(rows, results, strict=True):
         single = client.post("/v1/mu-macro", json={**row, "include": ["groups", "limits"]}).json()
@@ -74,7 +75,7 @@ def test_a_batch_agrees_with_its_cases_one_by_one(client, case):
 
 
 def test_a_bad_case_affects_only_itself_in_columns(client, case):
-    body = {**case, "v0": [0.1, -1, 0.2, 0.3, None], "Fz": [10, 10, "10", 20, 10], "k": [1e6, 1e6, 1e6, None, 1e6]}
+    body = {**case, "v0": [0.1, -1, 0.2, 0.3, None], "Fz": [10, 10, "10", 20, 10], "k": [1e6, 1e6, 1e6, "rigid", 1e6]}
     answer = client.post(PATH, json={**body, "include": ["groups", "limits"]}).json()
     for name in VALUES:
         assert [value is None for value in answer[name]] == [False, True, True, False, True]
@@ -205,7 +206,7 @@ def test_a_large_batch_keeps_its_order(client, case, surrogate):
 
 
 def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
-    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3), wait=True)) as client:
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=3))) as client:
         assert client.post(PATH, json={**case, "v0": [0.1] * 3}).status_code == 200
         for body in ({**case, "v0": [0.1] * 4}, [case] * 4, [None] * 400):
             assert problem(client.post(PATH, json=body), 413)["max_batch"] == 3
@@ -214,7 +215,7 @@ def test_a_batch_over_the_limit_is_refused(tables_dir, case, problem):
 @pytest.mark.parametrize("end", ["\n", "\r", "\r\n"])
 def test_lines_of_csv_are_counted_however_they_end(tables_dir, case, problem, end):
     head, row = ",".join(case), ",".join(map(str, case.values()))
-    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=10), wait=True)) as client:
+    with TestClient(create_app(Settings(tables=(tables_dir,), max_batch=10))) as client:
         for many, status in ((10, 200), (11, 413)):
             text = end.join([head, *[row] * many])
             answer = client.post(PATH, content=text, headers={"Content-Type": "text/csv"})
@@ -223,9 +224,9 @@ def test_lines_of_csv_are_counted_however_they_end(tables_dir, case, problem, en
 
 
 def test_one_batch_too_many_is_refused_before_it_is_read(tables_dir, case, problem):
-    app = create_app(Settings(tables=(tables_dir,), max_batches=2), wait=True)
+    app = create_app(Settings(tables=(tables_dir,), max_batches=2))
     with TestClient(app) as client:
-        app.state.work.used = 2
+        app.state.work.batches.used = 2
 
         def pieces():
             yield json.dumps({**case, "v0": [0.1] * 20_000}).encode()
@@ -235,17 +236,17 @@ def test_one_batch_too_many_is_refused_before_it_is_read(tables_dir, case, probl
         assert response.headers["retry-after"] == "1"
         problem(client.post(PATH, content=pieces()), 503)
         assert client.post(PATH, json=[case]).status_code == 200  # a small one is not counted
-        app.state.work.used = 0
+        app.state.work.batches.used = 0
         assert client.post(PATH, json={**case, "v0": [0.1] * 20_000}).status_code == 200
-        assert app.state.work.used == 0
+        assert app.state.work.batches.used == 0
 
 
 def test_a_small_text_that_asks_for_much_takes_a_place(tables_dir, case, problem):
-    app = create_app(Settings(tables=(tables_dir,), max_batches=1), wait=True)
+    app = create_app(Settings(tables=(tables_dir,), max_batches=1))
     body = {**case, "v0": [1] * 25_000, "include": ["limits", "gradient", "stick_fraction", "power", "groups"]}
     with TestClient(app) as client:
         assert len(json.dumps(body, separators=(",", ":"))) < 64 * 1024
-        app.state.work.used = 1
+        app.state.work.batches.used = 1
         problem(client.post(PATH, content=json.dumps(body, separators=(",", ":"))), 503)
 
 
@@ -301,8 +302,9 @@ TWICE = (
 
 @pytest.mark.parametrize("text", TWICE)
 def test_a_name_given_twice_is_refused(client, problem, text):
-    bodies = {"/v1/mu-macro": text % "0.1", PATH: text % "[0.1, 0.2]", f"{PATH}/rows": f"[{text % '0.1'},{text % '1'}]"}
+    bodies = {"/v1/mu-macro": text % "0.1", PATH: text % "[0.1, 0.2]", "rows": f"[{text % '0.1'},{text % '1'}]"}
     for path, body in bodies.items():
+        path = PATH if path == "rows" else path
         answer = client.post(path, content=body, headers={"Content-Type": "application/json"})
         found = problem(answer, 422)
         assert [(fault["field"], fault["reason"]) for fault in found["errors"]] == [("mu0", "is given more than once")]
@@ -318,9 +320,48 @@ def test_options_with_a_name_given_twice_are_refused(client, problem, case):
 
 
 def test_explicit_nulls_are_read_like_absent_names(client, case):
-    rows = [{**case, "f": None}, {**case, "k": None}, {**case, "omega": None, "f": 1e4}]
+    rows = [{**case, "f": None}, {**case, "k": "rigid"}, {**case, "omega": None, "f": 1e4}]
     answer = client.post(PATH, json=rows).json()
     assert answer["n_errors"] == 0
     assert [row["mu_macro"] for row in answer["results"]] == [
         client.post("/v1/mu-macro", json=row).json()["mu_macro"] for row in rows
     ]
+
+
+@pytest.mark.parametrize("gap", [None, "", "  ", float("nan")])
+def test_a_gap_in_k_is_never_a_rigid_contact(client, case, problem, gap):
+    """Null, an empty cell, NaN: in every form the case is refused, and the others are answered."""
+    k = [case["k"], gap, "rigid"]
+    rows = [{**case, "k": value} for value in k]
+    long = [case["k"]] * 1000
+    answers = [
+        client.post(PATH, content=json.dumps({**case, "k": k})).json(),
+        client.post(PATH, content=json.dumps(rows)).json(),
+        client.post(PATH, content=json.dumps({**case, "k": [long[0], gap, "rigid", *long]})).json(),
+    ]
+    lines = client.post(
+        PATH, content="\n".join(map(json.dumps, rows)), headers={"Content-Type": "application/x-ndjson"}
+    )
+    first, second, third = map(json.loads, lines.text.splitlines())
+    assert (first["source"], second["status"], third["source"]) == ("stick_slip_low", 422, "rigid")
+    assert second["errors"][0]["field"] == "k"
+    for answer in answers:
+        (fault,) = answer["errors"]
+        assert (fault["index"], fault["field"], "rigid" in fault["reason"]) == (1, "k", True)
+    if gap is None:
+        assert fault["reason"] == "is missing; write rigid or a number"
+        problem(client.post(PATH, json={**case, "v0": [0.1, 0.2], "k": None}), 422)
+    text = "\n".join([",".join(case), *(",".join(map(str, {**case, "k": value or ""}.values())) for value in k)])
+    rejected = client.post(PATH, content=text, headers={"Content-Type": "text/csv"}).text.splitlines()
+    assert [line.rpartition(",")[2][:2] for line in rejected[1:]] == ["", "k:", ""]
+
+
+def test_a_head_of_csv_may_have_any_unit_of_its_column(client, case):
+    text = (
+        f"mu0 [%],Fz (kN),k [N/um],y0 [um],f [kHz],v0 [mm/s]\r\n30,0.01,1,2,{case['omega'] / (2e3 * math.pi)!r},10\r\n"
+    )
+    answer = client.post(PATH, content=text, headers={"Content-Type": "text/csv"}).text.splitlines()[1]
+    expected = client.post("/v1/mu-macro", json=case).json()["mu_macro"]
+    assert float(answer.split(",")[0]) == pytest.approx(expected, rel=1e-13, abs=0.0)
+    wrong = client.post(PATH, content="k [N/s]\r\n1\r\n", headers={"Content-Type": "text/csv"})
+    assert "unit that k cannot have" in wrong.text

@@ -2,7 +2,6 @@
 
 import http.client
 import json
-import signal
 import socket
 import threading
 import time
@@ -283,18 +282,6 @@ def test_a_body_is_read_in_pieces_of_any_size_and_after_100_continue(server, cas
         assert (reply.status, reply.read()) == (200, expected)
 
 
-def test_a_request_right_behind_a_large_body_is_answered(server, case):
-    body = json.dumps([case]).encode() + b" " * 3_000_000
-    with connect(server) as raw:
-        for _ in range(2):
-            raw.sendall(head(BATCH, len(body)) + body)
-        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
-        received = read_to_end(raw)
-    assert received.count(b"HTTP/1.1 200 OK\r\n") == 3
-    assert received.count(b'"n_errors":0') == 2
-    assert b'"alive"' in received
-
-
 def test_threads_for_batches_have_a_lower_priority(server, case):
     body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 50_001)]})
     assert server.ask("POST", BATCH, body, {"Content-Type": "application/json"})[0] == 200
@@ -341,117 +328,3 @@ def test_a_declared_length_over_the_limit_is_a_problem_document(server):
             answer = read_to_end(raw)
         assert answer.startswith(b"HTTP/1.1 413")
         assert b"content-type: application/problem+json" in answer
-
-
-def test_a_stop_lets_readiness_fall_first_and_requests_finish(serving, surrogate, case):
-    with serving(surrogate.path, MUMACRO_DRAIN_S="3", MUMACRO_SHUTDOWN_GRACE_S="20") as server:
-        assert server.ask("GET", "/readyz")[0] == 200
-        with connect(server) as raw:
-            body = json.dumps([case]).encode()
-            raw.sendall(head(BATCH, len(body)) + body[:10])
-            server.process.send_signal(signal.SIGTERM)
-            deadline = time.monotonic() + PATIENCE_S
-            while server.ask("GET", "/readyz")[0] == 200:
-                assert time.monotonic() < deadline
-            assert server.ask("GET", "/livez")[0] == 200  # still listening
-            assert server.ask("POST", "/v1/mu-macro", json.dumps(case))[0] == 200
-            while True:  # until the port is closed
-                try:
-                    server.ask("GET", "/livez")
-                except OSError:
-                    break
-                assert time.monotonic() < deadline
-            raw.sendall(body[10:])
-            answer = read_to_end(raw)
-        assert answer.startswith(b"HTTP/1.1 200")
-        assert b'"n_errors":0' in answer
-        assert server.wait() == 0
-
-
-def test_a_second_signal_does_not_wait(serving, surrogate):
-    with serving(surrogate.path, MUMACRO_DRAIN_S="600") as server:
-        server.process.send_signal(signal.SIGTERM)
-        while server.ask("GET", "/readyz")[0] == 200:
-            pass
-        server.process.send_signal(signal.SIGTERM)
-        assert server.wait() == 0
-
-
-def test_pipelined_requests_are_answered_in_order(server, case):
-    query = "&".join(f"{name}={value}" for name, value in case.items() if name != "v0")
-    bodies = [json.dumps({**case, "v0": 0.01 * i}).encode() for i in range(1, 6)]
-    asked = b""
-    for i, body in enumerate(bodies, 1):
-        asked += f"GET /v1/mu-macro?{query}&v0={0.01 * i:.2f} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
-        asked += head("/v1/mu-macro", len(body)) + body
-    with connect(server) as raw:
-        raw.sendall(asked + b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
-        received = read_to_end(raw)
-    documents = [json.loads(part.split(b"\r\n\r\n")[1]) for part in received.split(b"HTTP/1.1 200 OK\r\n")[1:]]
-    values = [document["mu_macro"] for document in documents[:-1]]
-    assert documents[-1]["status"] == "alive"
-    assert values[::2] == values[1::2] == sorted(values[::2])
-    assert len(values) == 10
-
-
-@pytest.mark.parametrize(
-    "extra", ["Expect: 100-continue\r\n", "Connection: close\r\n", "X-Forwarded-For: 10.1.2.3\r\n", ""]
-)
-def test_the_fast_and_the_general_path_give_the_same_answer(server, case, extra):
-    body = json.dumps(case).encode()
-    with connect(server) as raw:
-        raw.sendall(head("/v1/mu-macro", len(body), extra=extra))
-        if "Expect" in extra:
-            assert raw.recv(4096).startswith(b"HTTP/1.1 100")
-        raw.sendall(body)
-        reply = http.client.HTTPResponse(raw, method="POST")
-        reply.begin()
-        answer = json.loads(reply.read())
-        names = {name.lower() for name in reply.headers}
-    _, _, other = server.ask("GET", "/v1/mu-macro?" + "&".join(f"{name}={value}" for name, value in case.items()))
-    assert answer == json.loads(other)
-    assert {"content-length", "content-type", "date", "x-request-id", "x-content-type-options"} <= names
-
-
-def test_two_thousand_idle_connections_are_kept_and_delay_no_request(serving, surrogate, case):
-    resource = pytest.importorskip("resource", reason="this system has no limits of open files to set")
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if hard != resource.RLIM_INFINITY and hard < 5000:
-        pytest.skip("this user may not open 5,000 files")
-    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 5000), hard))
-    ask = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
-    try:
-        with serving(surrogate.path, MUMACRO_MAX_CONNECTIONS="2500", MUMACRO_KEEP_ALIVE_S="600") as server:
-            base = memory(server)
-            raws = [connect(server) for _ in range(2000)]
-            for _ in range(2):
-                for raw in raws:
-                    raw.sendall(ask)
-                for raw in raws:
-                    assert raw.recv(4096).startswith(b"HTTP/1.1 200")
-                body = json.dumps(case)
-                assert server.ask("POST", "/v1/mu-macro", body, {"Content-Type": "application/json"})[0] == 200
-                assert memory(server) - base < 100_000_000
-            for raw in raws:
-                raw.close()
-            assert server.stop() == 0
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def test_a_connection_too_many_is_refused_with_retry_after(serving, surrogate):
-    with serving(surrogate.path, MUMACRO_MAX_CONNECTIONS="20") as server:
-        ask = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
-        raws = [connect(server) for _ in range(20)]
-        for raw in raws:
-            raw.sendall(ask)
-            assert raw.recv(4096).startswith(b"HTTP/1.1 200")
-        with connect(server) as late:
-            late.sendall(ask)
-            answer = read_to_end(late).lower()
-        assert answer.startswith(b"http/1.1 503")
-        assert b"retry-after: 1\r\n" in answer
-        for raw in raws:
-            raw.sendall(ask)
-            assert raw.recv(4096).startswith(b"HTTP/1.1 200")
-            raw.close()

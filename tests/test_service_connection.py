@@ -1,34 +1,47 @@
-"""HTTP/1.1 as bytes on a socket: the responses and their order, for any division of the bytes."""
+"""HTTP/1.1 as bytes on a socket: the limits of a connection, and that one client cannot keep others out."""
 
-import asyncio
+import contextlib
 import http.client
 import json
 import socket
-from types import SimpleNamespace
+import threading
+import time
 
 import pytest
-
-from service.connection import Connection
-
-pytestmark = pytest.mark.slow
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 GET = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
 LAST = b"GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+WAIT_S = 1  # the client timeout of the strict service
+FULL = 6  # its connections
+
+
+@pytest.fixture(scope="module")
+def strict(serving, surrogate):
+    """A service with short times and few connections."""
+    with serving(
+        surrogate.path, MUMACRO_CLIENT_TIMEOUT_S=str(WAIT_S), MUMACRO_TIME_LIMIT_S="4", MUMACRO_KEEP_ALIVE_S="60",
+        MUMACRO_MAX_CONNECTIONS=str(FULL), MUMACRO_MAX_BATCHES="2",
+    ) as server:  # fmt: skip
+        yield server
+
+
+def connect(port):
+    return socket.create_connection(("127.0.0.1", port), timeout=30)
 
 
 @pytest.fixture
 def raw(live_server):
-    host, _, port = live_server.url.removeprefix("http://").rpartition(":")
-    with socket.create_connection((host, int(port)), timeout=30) as made:
+    with connect(int(live_server.url.rpartition(":")[2])) as made:
         yield made
 
 
 def rest(raw):
     """All bytes until the service closes."""
     received = b""
-    while piece := raw.recv(65536):
-        received += piece
+    with contextlib.suppress(ConnectionResetError):
+        while piece := raw.recv(65536):
+            received += piece
     return received
 
 
@@ -43,30 +56,32 @@ def chunked(path, pieces):
     return f"POST {path} HTTP/1.1\r\n{fields}".encode() + body + b"0\r\n\r\n"
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 64, 1000])
+def answer(raw):
+    """One answer."""
+    response = http.client.HTTPResponse(raw)
+    response.begin()
+    return response.status, response.read()
+
+
+@pytest.mark.parametrize("size", [1, 7, 64, 1000])
 def test_the_answers_do_not_depend_on_how_the_bytes_come(raw, case, size):
     body = json.dumps(case).encode()
-    text = post(SINGLE, body) + GET + chunked(SINGLE, [body[:40], body[40:]]) + b"\r\n" + post(BATCH, b"[]") + LAST
-    for start in range(0, len(text), size):
-        raw.sendall(text[start : start + size])
+    requests = [post(SINGLE, body), GET, chunked(SINGLE, [body[:40], body[40:]]), post(BATCH, b"[]"), LAST]
+    for text in requests:
+        for start in range(0, len(text), size):
+            raw.sendall(text[start : start + size])
+        status, content = answer(raw)
+        assert status == 200
+        assert b"mu_macro" in content or text in (GET, LAST, requests[3])
+    assert rest(raw) == b""
+
+
+def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes(raw):
+    raw.sendall(post(SINGLE, b"{}") + GET * 5000)
     received = rest(raw)
-    assert received.count(b"HTTP/1.1 200 OK\r\n") == 5
-    assert received.count(b'"mu_macro":0.24001211754819618') == 2
-    assert received.rstrip().endswith(b"}")
-    assert received.count(b"connection: close") == 1
-
-
-@pytest.mark.parametrize("many", [2, 600, 5000])
-def test_pipelined_requests_are_answered_in_order(raw, many):
-    wanted = [b"/livez" if i % 2 else b"/nothing%d" % i for i in range(many)]
-    received = bytearray()
-    for start in range(0, many, 500):
-        part = wanted[start : start + 500]
-        raw.sendall(b"".join(b"GET %b HTTP/1.1\r\nHost: x\r\n\r\n" % path for path in part))
-        while received.count(b"HTTP/1.1 ") < start + len(part) or not received.endswith(b"}"):
-            received += raw.recv(65536)
-    statuses = [int(part[:3]) for part in bytes(received).split(b"HTTP/1.1 ")[1:]]
-    assert statuses == [200 if path == b"/livez" else 404 for path in wanted]
+    assert received.count(b"HTTP/1.1 ") == 1
+    assert received.startswith(b"HTTP/1.1 422 ")
+    assert b"connection: close" in received
 
 
 def test_a_half_closed_client_gets_the_whole_answer(raw, case):
@@ -77,168 +92,131 @@ def test_a_half_closed_client_gets_the_whole_answer(raw, case):
     assert received.endswith(b"0\r\n\r\n")
 
 
-@pytest.mark.parametrize("path", [SINGLE, BATCH])
-@pytest.mark.parametrize("before", [b"", GET])
-def test_a_client_that_ends_within_a_body_is_disconnected_at_once(raw, path, before):
-    raw.settimeout(10)  # less than the timeout for a slow client
-    raw.sendall(before + f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n".encode() + b"{")
-    raw.shutdown(socket.SHUT_WR)
-    received = rest(raw)
-    assert received.count(b" 200 ") == (1 if before else 0)
-
-
-def served(app, request, *, stopping=False):
-    """The bytes that the connection sends with this application, perhaps after the server has begun to stop."""
-
-    async def talk():
-        state = SimpleNamespace(connections=set(), tasks=set(), total_requests=0, default_headers=[(b"date", b"now")])
-        config = SimpleNamespace(
-            loaded=True, loaded_app=app, asgi_version="3.0", root_path="", timeout_keep_alive=5, limit_concurrency=None
-        )
-        loop = asyncio.get_running_loop()
-        server = await loop.create_server(lambda: Connection(config, state, {}), "127.0.0.1", 0)
-        reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
-        if stopping:
-            while not state.connections:
-                await asyncio.sleep(0.0)
-            next(iter(state.connections)).shutdown()
-        writer.write(request)
-        received = await asyncio.wait_for(reader.read(), 10)
-        writer.close()
-        await writer.wait_closed()
-        while state.connections:
-            await asyncio.sleep(0.01)
-        server.close()
-        await server.wait_closed()
-        return received
-
-    return asyncio.run(talk())
-
-
-def test_an_answer_without_fields_is_whole():
-    answer = b"HTTP/1.1 204 No Content\r\ndate: now\r\n"
-    assert served(empty, GET + LAST) == answer + b"\r\n" + answer + b"connection: close\r\n\r\n"
-
-
-async def empty(_scope, _receive, send):
-    await send({"type": "http.response.start", "status": 204, "headers": []})
-    await send({"type": "http.response.body"})
-
-
-def test_large_bodies_and_the_requests_behind_them_are_kept_apart():
-    bodies = [bytes([97 + i]) * size for i, size in enumerate((0, 300_000, 5, 16_384, 70_000, 1, 65_536, 600_000))]
-    received = served(echo, b"".join(post("/", body) for body in bodies) + LAST)
-    head = b"HTTP/1.1 200 OK\r\ndate: now\r\ncontent-length: %d\r\n"
-    wanted = [head % len(body) + b"\r\n" + body for body in bodies]
-    assert received == b"".join(wanted) + head % 0 + b"connection: close\r\n\r\n"
-
-
-async def echo(_scope, receive, send):
-    body, more = b"", True
-    while more:
-        message = await receive()
-        body, more = body + message["body"], message["more_body"]
-    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % len(body))]})
-    await send({"type": "http.response.body", "body": body})
-
-
-def test_a_request_that_was_on_its_way_when_the_server_stopped_is_answered():
-    answer = b"HTTP/1.1 204 No Content\r\ndate: now\r\nconnection: close\r\n\r\n"
-    assert served(empty, GET, stopping=True) == answer
-    assert served(empty, b"", stopping=True) == b""
-
-
-@pytest.mark.parametrize("behind", [b"", GET])
-def test_an_application_that_ends_without_an_answer_is_reported(behind):
-    async def silent(_scope, _receive, _send):
-        pass
-
-    received = served(silent, GET + behind)
-    assert received.startswith(b"HTTP/1.1 500 ")
-    assert received.count(b"HTTP/1.1") == 1
-
-
-@pytest.mark.parametrize("field", [(b"x-a", b"1\r\nx-b: 2"), (b"x-a\n", b"1"), (b"x-a", b"\0")])
-def test_a_field_that_would_break_the_head_is_not_written(field):
-    async def broken(_scope, _receive, send):
-        await send({"type": "http.response.start", "status": 200, "headers": [field]})
-
-    assert served(broken, GET).startswith(b"HTTP/1.1 500 ")
-
-
-@pytest.mark.parametrize("try_number", range(10))
-def test_a_client_that_sends_too_much_can_read_the_reason(live_server, try_number):
-    del try_number  # a reset would occur in about half of the tries
-    host, _, port = live_server.url.removeprefix("http://").rpartition(":")
-    connection = http.client.HTTPConnection(host, int(port), timeout=30)
-    connection.request("POST", SINGLE, b" " * 3_000_000, {"Content-Type": "application/json"})
-    response = connection.getresponse()
-    assert response.status == 413
-    assert json.loads(response.read())["status"] == 413
-    connection.close()
-
-
 @pytest.mark.parametrize(
-    "text",
+    ("text", "status"),
     [
-        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\nhello",
-        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\nhello",
-        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nContent-Length: 0x5\r\n\r\nhello",
-        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\nContent-Length: 5\r\n\r\nhello",
-        b"GET /livez HTTP/1.1\r\nHost: x\r\nX-A: a\0b\r\n\r\n",
-        b"GET /livez HTTP/1.1\r\nHost: x\r\n folded\r\n\r\n",
-        b"GET /livez HTTP/1.1\r\nX A: b\r\n\r\n",
-        b"GET /livez HTTP/1.1\r\n\r\n",
-        b"GET /livez HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n",
-        b"GET /livez\r\n\r\n",
-        b"GET /livez HTTP/2.0\r\nHost: x\r\n\r\n",
-        b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n",
-        b"GET \xff HTTP/1.1\r\nHost: x\r\n\r\n",
-        b"nonsense\r\n\r\n",
-        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
+        (b"GET /livez HTTP/1.1\r\n\r\n", 400),
+        (b"GET /livez HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n", 400),
+        (b"nonsense\r\n\r\n", 400),
+        (b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 400),
+        (b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a: b\r\n" * 99 + b"\r\n", 200),
+        (b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a: b\r\n" * 100 + b"\r\n", 431),
+        (b"GET /livez HTTP/1.1\r\nHost: x\r\nA: " + b"b" * 65_000 + b"\r\n\r\n", 200),
+        (b"GET /livez HTTP/1.1\r\nHost: x\r\nA: " + b"b" * 66_000 + b"\r\n\r\n", 431),
+        (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431),
     ],
 )
-def test_a_request_that_is_not_http_is_refused_and_closed(raw, text):
-    raw.sendall(GET)
-    first = raw.recv(65536)
+def test_a_head_is_refused_with_its_status(raw, text, status):
     raw.sendall(text)
-    received = rest(raw)
-    assert first.startswith(b"HTTP/1.1 200")
-    assert received.startswith(b"HTTP/1.1 400")
-    assert received.count(b"HTTP/1.1 ") == 1
+    found, content = answer(raw)
+    assert found == status
+    if status != 200:
+        assert json.loads(content)["status"] == status
 
 
-def test_good_requests_are_answered_before_a_malformed_one(raw, case):
-    raw.sendall(post(SINGLE, json.dumps(case).encode()) + GET + b"nonsense\r\n\r\n")
-    received = rest(raw)
-    assert received.count(b"HTTP/1.1 200") == 2
-    assert b"connection: close" in received
+def test_a_head_without_an_end_is_cut_at_its_limit(raw):
+    with contextlib.suppress(OSError):
+        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\nA: ")
+        for _ in range(100):
+            raw.sendall(b"b" * 100_000)
+    assert not rest(raw).startswith(b"HTTP/1.1 200")
 
 
-def test_http_1_0_is_answered_and_closed(raw):
-    raw.sendall(b"GET /livez HTTP/1.0\r\n\r\n")
-    assert rest(raw).startswith(b"HTTP/1.1 200")
+SLOW = {
+    "silent": (b"", b""),
+    "a head without an end": (b"GET /livez HTTP/1.1\r\nHost: x\r\nA: ", b" 408 "),
+    "a body that stops": (post(SINGLE, b"x" * 90)[:-89], b" 408 "),
+    "a batch that stops": (post(BATCH, b"x" * 90)[:-89], b" 408 "),
+    "empty lines": (b"\r\n", b""),
+}
 
 
-def test_a_client_that_expects_100_continue_gets_it(raw, case):
-    body = json.dumps(case).encode()
-    whole = post(SINGLE, body, "Expect: 100-continue\r\nConnection: close\r\n")
-    raw.sendall(whole[: -len(body)])
-    assert raw.recv(65536) == b"HTTP/1.1 100 Continue\r\n\r\n"
-    raw.sendall(body)
-    assert rest(raw).startswith(b"HTTP/1.1 200")
+@pytest.mark.parametrize("name", SLOW)
+def test_a_client_that_stops_is_disconnected(strict, name):
+    text, expected = SLOW[name]
+    with connect(strict.port) as raw:
+        raw.sendall(text)
+        raw.settimeout(20 * WAIT_S)
+        assert expected in rest(raw)
 
 
-def test_head_has_the_head_of_get_and_no_body(raw):
-    raw.sendall(b"HEAD /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
-    received = rest(raw)
-    assert received.endswith(b"\r\n\r\n")
-    assert b"content-length: 62\r\n" in received
+@pytest.mark.parametrize("drop", [b"A: b\r\n", b"\r\n"])
+def test_a_client_that_drips_is_disconnected(strict, drop):
+    with connect(strict.port) as raw:
+        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n" if drop != b"\r\n" else b"")
+        with pytest.raises(OSError, match=r"."):  # noqa: PT012
+            for _ in range(200):
+                raw.sendall(drop)
+                time.sleep(0.1)
 
 
-def test_fields_behind_a_body_are_read_and_dropped(raw, case):
-    text = chunked(SINGLE, [json.dumps(case).encode()]).removesuffix(b"\r\n") + b"x-request-id: stray\r\n\r\n"
-    raw.sendall(text + LAST)
-    received = rest(raw)
-    assert received.count(b"HTTP/1.1 200") == 2
-    assert b"stray" not in received
+def test_a_client_that_does_not_read_is_disconnected(strict, case):
+    body = json.dumps({**case, "v0": [1e-6 * i for i in range(1, 100_001)]}).encode()
+    with socket.socket() as raw:
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        raw.settimeout(30)
+        raw.connect(("127.0.0.1", strict.port))
+        raw.sendall(post(BATCH, body))
+        time.sleep(6 * WAIT_S)
+        assert b'"n_errors"' not in rest(raw)
+
+
+def test_a_stream_ends_at_the_deadline_however_busy(strict, case):
+    line = json.dumps({**case, "v0": [0.1] * 10}).encode() + b"\n"
+    head = (
+        f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: application/x-ndjson\r\nTransfer-Encoding: chunked\r\n\r\n"
+    )
+    with connect(strict.port) as raw:
+        raw.sendall(head.encode())
+        reader = threading.Thread(target=rest, args=(raw,))
+        reader.start()
+        with pytest.raises(OSError, match=r"."):  # noqa: PT012
+            for _ in range(300):
+                raw.sendall(b"%x\r\n%b\r\n" % (len(line), line))
+                time.sleep(0.1)
+        reader.join()
+
+
+def test_streams_without_a_line_take_no_slot_and_questions_have_their_own(strict, case):
+    head = (
+        f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: application/x-ndjson\r\nTransfer-Encoding: chunked\r\n\r\n"
+    )
+    large = json.dumps({**case, "v0": [0.1] * 20_000})
+    law = json.dumps({**{name: case[name] for name in case if name != "v0"}, "start": 1e-3, "stop": 1.0})
+    line = json.dumps(case).encode() + b"\n"
+    with contextlib.ExitStack() as held:
+        idle = [held.enter_context(connect(strict.port)) for _ in range(3)]
+        for raw in idle:
+            raw.sendall(head.encode())
+        assert strict.ask("POST", BATCH, large)[0] == 200
+        for raw in idle[:2]:  # now they have a slot each
+            raw.sendall(b"%x\r\n%b\r\n" % (len(line), line))
+            while b"mu_macro" not in raw.recv(65536):
+                pass
+        assert strict.ask("POST", BATCH, large)[0] == 503
+        assert strict.ask("POST", "/v1/law", law)[0] == 200
+        assert strict.ask("POST", BATCH, json.dumps([case]))[0] == 200  # a small one needs no slot
+
+
+def test_health_is_answered_when_all_connections_are_open(strict, case):
+    with contextlib.ExitStack() as held:
+        for _ in range(3 * FULL):  # silent ones: the oldest gives way
+            held.enter_context(connect(strict.port))
+        assert strict.ask("GET", SINGLE + "?" + "&".join(f"{k}={v}" for k, v in case.items()))[0] == 200
+    with contextlib.ExitStack() as held:
+        for _ in range(FULL):  # busy ones
+            raw = held.enter_context(connect(strict.port))
+            raw.sendall(post(SINGLE, b"x" * 90)[:-89])
+        time.sleep(0.2)
+        assert strict.ask("GET", "/livez")[0] == 200
+        assert strict.ask("GET", "/readyz")[0] == 200
+        assert strict.ask("GET", "/v1/table")[0] == 503
+    time.sleep(2 * WAIT_S)
+    assert strict.ask("GET", "/v1/table")[0] == 200
+
+
+def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(strict):
+    status, headers, content = strict.ask("POST", SINGLE, b"x" * 3_000_000)
+    assert status == 413
+    assert headers["connection"] == "close"
+    assert json.loads(content)["max_bytes"] == 65536

@@ -133,7 +133,7 @@ def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case)
         reader.join(60)
     found = fields_of(lines)
     (dropped,) = {line["logger"] for line in found if "were dropped" in line["message"]}
-    assert dropped == "service.logs"
+    assert dropped == "service.observe"
     lost = sum(int(line["message"].split()[0]) for line in found if "were dropped" in line["message"])
     access = [line for line in found if line["logger"] == "mumacro.access"]
     assert lost > 0

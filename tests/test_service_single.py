@@ -2,7 +2,6 @@
 
 import json
 import math
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -102,9 +101,9 @@ def test_rigid_contact_is_stated_and_never_assumed(client, case, problem):
     assert client.post(PATH, json={**case, "k": "rigid"}).json() == null
     assert client.get(PATH, params={**case, "k": "rigid"}).json() == null
     absent = {name: value for name, value in case.items() if name != "k"}
-    for response, word in ((client.post(PATH, json=absent), "null"), (client.get(PATH, params=absent), "rigid")):
+    for response in (client.post(PATH, json=absent), client.get(PATH, params=absent)):
         (fault,) = problem(response, 422)["errors"]
-        assert (fault["field"], word in fault["reason"]) == ("k", True)
+        assert (fault["field"], "rigid" in fault["reason"]) == ("k", True)
     absent["k"] = None
     stiff = client.post(PATH, json={**case, "k": 1e18}).json()
     assert stiff["mu_macro"] == close(null["mu_macro"], rel=1e-5)
@@ -230,30 +229,13 @@ def test_a_refusal_suggests_the_right_field(client, case, problem, change, advic
 
 def test_one_value_is_returned_as_text(client, case, problem):
     answer = client.post(PATH, json={**case, "include": ["power"]}).json()
-    plain = client.get(PATH, params=case, headers={"Accept": "text/plain"})
+    plain = client.get(f"{PATH}.txt", params=case)
     assert (float(plain.text), plain.headers["content-type"]) == (answer["mu_macro"], "text/plain; charset=utf-8")
-    assert float(client.get(f"{PATH}.txt", params=case).text) == answer["mu_macro"]
     asked = {**case, "include": "power", "value": "power.saved"}
     assert float(client.get(f"{PATH}.txt", params=asked).text) == answer["power"]["saved"]
     assert client.get(f"{PATH}.txt", params={**case, "value": "regime"}).text == "stick_slip"
     (fault,) = problem(client.get(f"{PATH}.txt", params={**case, "value": "power"}), 422)["errors"]
     assert fault["parameter"] == "value"
-
-
-def test_most_cases_take_the_fast_path(client, app, case):
-    def short():
-        layer = app.middleware_stack
-        while type(layer).__name__ != "SingleCase":
-            layer = layer.app
-        return layer.answered
-
-    before = short()
-    assert client.post(PATH, json=case).status_code == 200
-    assert client.get(PATH, params=case).status_code == 200
-    assert client.post(PATH, json={**case, "k": None, "include": ["groups"]}).status_code == 200
-    assert short() == before + 3
-    assert client.post(PATH, json={**case, "v0": -1}).status_code == 422
-    assert short() == before + 3
 
 
 def test_unknown_and_repeated_fields_are_refused(client, case, problem):
@@ -286,9 +268,15 @@ def test_a_body_that_is_not_json_is_malformed(client, problem, body):
     problem(client.post(PATH, content=body), 400)
 
 
-def test_an_integer_that_no_parser_holds_is_malformed(client, case, problem):
-    body = json.dumps({**case, "v0": "@"}).replace('"@"', "1" + "0" * 5000)
-    problem(client.post(PATH, content=body), 400)
+@pytest.mark.parametrize("digits", ["1" + "0" * 400, "1" + "0" * 5000, "1e400", "-1e400", "1." + "0" * 5000 + "e999"])
+def test_a_number_that_no_double_holds_is_refused_by_name_whatever_its_digits(client, case, problem, digits):
+    body = json.dumps({**case, "v0": "@"}).replace('"@"', digits)
+    (fault,) = problem(client.post(PATH, content=body), 422)["errors"]
+    assert fault["field"] == "v0"
+    listed = json.dumps({**case, "v0": [0.1, "@"]}).replace('"@"', digits)
+    for batch in (listed, f"[{json.dumps(case)}, {body}]"):
+        found = client.post(f"{PATH}/batch", content=batch).json()
+        assert [(error["index"], error["field"]) for error in found["errors"]] == [(1, "v0")]
 
 
 @pytest.mark.parametrize(
@@ -335,29 +323,9 @@ def test_a_tolerance_is_a_positive_number(client, case, problem, tolerance):
     assert fault["field"] == "tolerance"
 
 
-def test_an_answer_is_cached_by_its_tag(client, case):
-    first = client.get(PATH, params=case)
-    tag = first.headers["etag"]
-    assert tag.startswith('"')
-    assert first.headers["cache-control"] == "public, max-age=3600"
-    for offered in (tag, f'"other", {tag}', f"W/{tag}", "*"):
-        again = client.get(PATH, params=case, headers={"If-None-Match": offered})
-        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
-    assert client.get(PATH, params=case, headers={"If-None-Match": '"other"'}).status_code == 200
-
-
-def test_the_tag_follows_the_question_not_its_spelling(client, case):
-    tag = client.get(PATH, params=case).headers["etag"]
-    respelled = {**dict(reversed(case.items())), "Fz": "1.0e1"}
-    assert client.get(PATH, params=respelled).headers["etag"] == tag
-    others: list[dict[str, Any]] = [{**case, "v0": 0.02}, {**case, "include": "groups"}, {**case, "k": 2e6}]
-    tags = {client.get(PATH, params=other).headers["etag"] for other in others}
-    assert len(tags | {tag}) == 4
-
-
 def test_head_is_get_without_the_body(client, case):
     head, get = client.head(PATH, params=case), client.get(PATH, params=case)
-    assert (head.status_code, head.headers["etag"]) == (200, get.headers["etag"])
+    assert (head.status_code, head.content, head.headers["content-length"]) == (200, b"", str(len(get.content)))
 
 
 def test_two_frequencies_in_the_deviations_of_a_query_are_reported_by_name(client, case, problem):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.schemas import INCLUDES
+from service.quantities import INCLUDES
 
 pytestmark = pytest.mark.slow
 

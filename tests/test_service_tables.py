@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from mumacro import TableError
 from service.app import create_app
-from service.errors import InvalidFieldsError, NotReadyError
+from service.problems import InvalidFieldsError, NotReadyError
 from service.settings import Settings
 from service.tables import LoadedTable, Tables, table_files
 
@@ -23,7 +23,7 @@ def table_copy(surrogate, tmp_path):
 
 
 def started(*paths):
-    return TestClient(create_app(Settings(tables=paths), wait=True))
+    return TestClient(create_app(Settings(tables=paths)))
 
 
 def test_the_table_describes_itself(client, surrogate):
@@ -139,7 +139,7 @@ def test_a_file_that_goes_or_changes_after_loading_is_noticed(table_copy, case, 
 
 
 def test_before_the_start_nothing_is_ready(tables_dir, case, problem):
-    client = TestClient(create_app(Settings(tables=(tables_dir,)), wait=True))
+    client = TestClient(create_app(Settings(tables=(tables_dir,))))
     problem(client.get("/readyz"), 503)
     problem(client.post("/v1/mu-macro", json=case), 503)
 
@@ -157,7 +157,7 @@ def test_an_unexpected_error_while_loading_is_not_shown(surrogate, problem, monk
     def broken(_self):
         raise RuntimeError("secret")
 
-    monkeypatch.setattr("service.kernel.Kernel.warm_up", broken)
+    monkeypatch.setattr("mumacro.Surrogate.self_check", broken)
     with started(surrogate.path) as client:
         assert "secret" not in problem(client.get("/readyz"), 503)["detail"]
 
@@ -188,7 +188,7 @@ def tables():
     """Three tables: a tighter one is larger, except one that is tight and small."""
 
     def table(name, tolerance, size):
-        return LoadedTable(SimpleNamespace(id=name, tolerance=tolerance), None, (size, 0, 0))
+        return LoadedTable(SimpleNamespace(id=name, tolerance=tolerance), (size, 0, 0))
 
     filled = Tables(())
     filled.loaded = (table("c", 1e-12, 9000), table("b", 1e-10, 100), table("a", 1e-8, 500))

@@ -1,395 +1,271 @@
-"""Many cases at once: ``POST /v1/mu-macro/batch``, in every format of :mod:`service.formats`.
+"""Many cases at once: ``POST /v1/mu-macro/batch``; the Content-Type gives the form, the answer has the same.
 
-The Content-Type gives the format.  ``/v1/mu-macro/batch/<name>`` takes one format only, so that generated clients are
-typed.  Answers are sent piece by piece, no faster than the client reads them.
+A body is read whole, evaluated and answered in slices.  A stream of lines is answered line by line while it arrives.
+A slot is taken when more than a small body, or a large computation, is at hand; for a stream at its first complete
+line.  Computing, reading and compressing happen in threads.
 """
 
-import asyncio
-from collections import deque
-from collections.abc import Callable, Coroutine, Iterator
-from functools import partial
-from typing import Annotated, Any
+import zlib
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-from fastapi import APIRouter, Depends, Query
-from fastapi.routing import APIRoute
-from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
-from starlette.types import Message, Receive, Scope, Send
+from starlette.types import Receive, Scope, Send
 
-from mumacro.errors import MumacroError
+from ..answers import answer_case, cost_of
+from ..case import OPTIONS, Columns, Options, OptionsQuery, options_of, read_form
+from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body, wants_gzip
+from ..problems import (
+    BodyTooLargeError,
+    FieldFault,
+    InvalidFieldsError,
+    MalformedBodyError,
+    RequestError,
+    in_query,
+    pieces_of_problem,
+    refuse,
+)
+from ..wire import Batch, Form, forms
+from ..wire.json import decode, dump
+from . import Endpoint, given_in_query, tables_of
 
-from ..errors import BodyTooLargeError, FieldFault, MalformedBodyError, accepts, faults_of, problem_of, refusal
-from ..evaluation import Answers, answer_batch
-from ..formats import FORMATS, Format, choose
-from ..formats.columns import dump
-from ..formats.lines import LineAnswers
-from ..formats.rows import objects
-from ..guard import AT_ONCE, BATCH_PATH, CLOSE, SMALL_BODY, Work, check_media_type
-from ..metrics import Metrics
-from ..openapi import batch_operation, problems
-from ..quantities import cost_of
-from ..schemas import BatchQuery, Options, deviations
-from ..tables import LoadedTable, Tables, TablesDep, signature, tables_of
-from . import once_each
+__all__ = ["ENDPOINTS"]
 
-__all__ = ["Batches", "router"]
-
-router = APIRouter(tags=["answers"])
-
+PATH = "/v1/mu-macro/batch"
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
-_AHEAD = 1024 * 1024  # bytes of a stream that are read before their answers are taken
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
-_LONG = 1e9  # cost of what may have to be compiled first
-_NO_QUERY = BatchQuery()
 
 
-class Batches:
-    """Objects that all batches share; one per application."""
+class _Answer(Response):
+    """Reads the body of a batch, and answers in pieces."""
 
-    def __init__(self, tables: Tables, work: Work, metrics: Metrics, max_body_bytes: int, max_batch: int) -> None:
-        self.tables = tables
-        self.work = work
-        self.metrics = metrics
-        self.max_body_bytes = max_body_bytes
-        self.max_batch = max_batch
-
-    def count(self, table: LoadedTable, answers: Answers) -> None:
-        """Count the cases of an answer."""
-        self.metrics.count_cases(table.cell, answers.source, answers.n_bad)
-
-    def too_large(self) -> BodyTooLargeError:
-        """The error for a body with more bytes than the settings allow."""
-        return BodyTooLargeError(
-            f"the body may have up to {self.max_body_bytes} bytes: split it, or stream it as NDJSON without a "
-            "Content-Length and read the answer while you send",
-            headers=CLOSE, max_bytes=self.max_body_bytes,
-        )  # fmt: skip
-
-
-class BatchResponse(Response):
-    """Reads the body, and answers in pieces."""
-
-    def __init__(self, request: Request, batches: Batches, chosen: Format | None, query: BatchQuery) -> None:
+    def __init__(self, request: Request) -> None:
         self._request = request
-        self._batches = batches
-        self._chosen = chosen
-        self._query = query
+        self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
+        self._state = request.app.state
+        self._work: Work = request.app.state.work
+        self._limit: int = self._state.settings.max_body_bytes
+        self._most: int = self._state.settings.max_batch
         self._placed = False
         self.background = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, and give the slot back if one was taken."""
-        started = False
-
-        async def send_noted(message: Message) -> None:
-            nonlocal started
-            started = True
-            await send(message)
-
+        del scope
         try:
-            known = {name: entry.media_type for entry in FORMATS for name in (entry.media_type, *entry.aliases)}
-            if self._chosen is not None:
-                known = dict.fromkeys((self._chosen.media_type, *self._chosen.aliases), self._chosen.media_type)
-            media_type = check_media_type(self._request.headers, known)
-            if any(entry.streams for entry in FORMATS if entry.media_type == media_type):
-                await self._stream(receive, send_noted, media_type)
-            else:
-                await self._whole(receive, send_noted, media_type)
-        except MumacroError as error:
-            if started:
-                raise ClientDisconnect from error  # the answer has begun: end the connection
-            await problem_of(error, scope["path"])(scope, receive, send)
+            async with self._work.deadline():
+                self._query = self._options_of_query()
+                known = {
+                    name: form.media_type for form in forms().values() for name in (form.media_type, *form.aliases)
+                }
+                form = forms()[media_type_of(self._given, known)]
+                if form.streams:
+                    await self._stream(form, receive, send)
+                else:
+                    await self._whole(form, receive, send)
         finally:
             if self._placed:
-                self._batches.work.used -= 1
+                self._work.batches.give_back()
 
     def _place(self) -> None:
         if not self._placed:
-            self._batches.work.take()
+            self._work.batches.take()
             self._placed = True
-
-    # --- bodies that are read whole -------------------------------------------------------------------
-
-    async def _whole(self, receive: Receive, send: Send, media_type: str) -> None:
-        text = await self._body(receive)
-        if not text:
-            raise MalformedBodyError("the body is empty")
-        size = len(text)
-        chosen = self._chosen or choose(media_type, memoryview(text))
-        query = self._options({}, "parameter")[0]
-        # Reading costs by the byte, computing by the case: a small body can request much computation.
-        reading = size / _BYTES_PER_UNIT if self._batches.tables.warm else _LONG
-        batch, given = await self._run(partial(chosen.read, text, self._batches.max_batch), reading)
-        options, place = self._options(given, "pointer") if given else (query, "parameter")
-        if given and self._query.given().get("tolerance") is not None:
-            place = "parameter"
-        del text
-        table = self._batches.tables.pick(options.tolerance, place)
-        include = options.names()
-        cost = batch.size * cost_of(include) * (1.0 if not include or self._batches.tables.warm else _LONG)
-        answers = await self._run(partial(answer_batch, table, batch, include, deviations(options.std)), cost)
-        del batch
-        self._batches.count(table, answers)
-        pieces = _gathered(chosen.write(answers, signature(table)))
-        await self._send(send, chosen.media_type, pieces, cost=size / _BYTES_PER_UNIT + cost, table=table)
 
     async def _run(self, work: Any, cost: float) -> Any:
         if cost > AT_ONCE:
             self._place()
-        return await self._batches.work.run(work, cost)
+        return await self._work.batches.run(work, cost)
 
-    async def _body(self, receive: Receive) -> bytearray:
-        """The body; one of more than 64 KiB needs a slot."""
-        limit, work = self._batches.max_body_bytes, self._batches.work
-        length = self._request.headers.get("content-length", "0")
-        if not length.isdigit() or len(length) > 18 or int(length) > limit:
-            raise self._batches.too_large()
-        if int(length) > SMALL_BODY:
-            self._place()
-        return await work.client(self._read(receive))
-
-    async def _read(self, receive: Receive) -> bytearray:
-        body = bytearray()
-        more = True
-        while more:
-            message = await receive()
-            if message["type"] != "http.request":
-                raise ClientDisconnect
-            body += message.get("body", b"")
-            more = message.get("more_body", False)
-            if len(body) > SMALL_BODY:
-                self._place()
-            if len(body) > self._batches.max_body_bytes:
-                raise self._batches.too_large()
-        return body
-
-    def _options(self, given: dict[str, Any], place: str) -> tuple[Options, str]:
-        """Options of query and body together, and which of the two holds them."""
-        query = self._query.given()
-        twice = [name for name in given if name in query]
-        if twice:
-            faults = [FieldFault(name, "is given in the query and in the body", given[name]) for name in twice]
-            raise refusal(faults)
+    def _options_of_query(self) -> dict[str, Any]:
+        if not self._request.scope["query_string"]:
+            return {}
+        given = given_in_query(self._request)
         try:
-            return Options.model_validate({**query, **given}), place
-        except ValidationError as error:
-            faults = faults_of(error.errors(include_url=False), place, tuple(Options.model_fields))
-            raise refusal(faults) from None
+            _, rest, faults = options_of(Options, given, OptionsQuery.model_fields)
+            faults += [FieldFault.of(name, "is no option; inputs belong in the body") for name in rest]
+            if faults:
+                refuse(faults)
+        except InvalidFieldsError as error:
+            raise in_query(error) from None
+        return given
 
-    async def _send(
-        self, send: Send, media_type: str, pieces: Iterator[bytes], *, cost: float, table: LoadedTable
-    ) -> None:
-        """Send the pieces, with a Content-Length if there is only one."""
-        work = self._batches.work
-        piece, following = await work.run(lambda: (next(pieces, b""), next(pieces, None)), cost)
-        headers = [(b"content-type", media_type.encode("ascii")), (b"x-table", table.surrogate.id.encode("latin-1"))]
+    def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
+        """The batch with the options of query and body together."""
+        self._only_once(given)
+        options, _, faults = options_of(Options, {**self._query, **given}, OPTIONS)
+        if options is None:
+            refuse(faults)
+        table = tables_of(self._request).pick(options.tolerance, "tolerance" in self._query)
+        count = self._state.metrics.cases
+        return Batch(table, columns, options.names(), options.deviations(), count=count)
+
+    def _only_once(self, given: Mapping[str, Any]) -> None:
+        twice = [name for name in given if name in self._query]
+        if twice:
+            refuse([FieldFault.of(name, "is given in the query and in the body", given[name]) for name in twice])
+
+    # --- bodies that are read whole -------------------------------------------------------------------
+
+    async def _whole(self, form: Form, receive: Receive, send: Send) -> None:
+        text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
+        if not text:
+            raise MalformedBodyError("the body is empty")
+        # Reading costs by the byte, computing by the case: a small body can request much computation.
+        cost = len(text) / _BYTES_PER_UNIT
+        columns, given = await self._run(lambda: form.read(text, self._most), cost)
+        text = bytearray()  # freed, unless the columns are views of it
+        batch = self._batch(columns, given)
+        cost += columns.size * cost_of(batch.include)
+        packer = self._packer() if columns.size > 100 else None
+        pieces = _packed(form.write(batch), packer)
+        piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
+        headers = [
+            (b"content-type", form.media_type.encode("ascii")),
+            (b"x-table", batch.table.id.encode("latin-1")),
+            (b"vary", b"accept-encoding"),
+        ]
+        if packer is not None:
+            headers.append((b"content-encoding", b"gzip"))
         if following is None:
             headers.append((b"content-length", b"%d" % len(piece)))
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         while following is not None:
-            await work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
-            piece, following = following, await work.run(lambda: next(pieces, None), cost)
-        await work.client(send({"type": "http.response.body", "body": piece, "more_body": False}))
+            await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+            piece, following = following, await self._run(lambda: next(pieces, None), cost)
+        await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": False}))
+
+    def _packer(self) -> Any:
+        """What compresses the answer, if the client accepts gzip."""
+        wanted = wants_gzip(self._given.get(b"accept-encoding", b"").decode("latin-1"))
+        return zlib.compressobj(1, zlib.DEFLATED, 31) if wanted else None
 
     # --- streams --------------------------------------------------------------------------------------
 
-    async def _stream(self, receive: Receive, send: Send, media_type: str) -> None:
-        """Answer each line as soon as it arrives; memory does not grow with the stream."""
-        batches, work = self._batches, self._batches.work
+    async def _stream(self, form: Form, receive: Receive, send: Send) -> None:
+        """Answer each line as soon as it has arrived; memory does not grow with the stream."""
         # A client that gives a length may send all of the body before it reads: the answer then comes after the body.
-        # A client that gives no length may wait for the start of the answer before it sends more.
-        more = "content-length" not in self._request.headers
-        options, place = self._options({}, "parameter")
-        table = batches.tables.pick(options.tolerance, place)
-        include = options.names()
-        answers = LineAnswers(
-            table,
-            include,
-            deviations(options.std),
-            batches.max_batch,
-            self._line,
-            batches.count,
-            self._request.scope["path"],
-        )
-        text = bytearray() if more else await self._body(receive)
-        self._place()
-        source = _Pieces(receive, work)
-        patience = self._request.app.state.settings.client_timeout_s
-        source.until = asyncio.get_running_loop().time() + patience
-        reader = asyncio.create_task(source.read_on()) if more else None
-        end = asyncio.get_running_loop().time() + self._request.app.state.settings.time_limit_s
-        try:
-            await send({
-                "type": "http.response.start", "status": 200,
-                "headers": [(b"content-type", media_type.encode("ascii")), (b"x-accel-buffering", b"no")],
-            })  # fmt: skip
-            number = 0
-            while True:
-                if not more and not text.endswith(b"\n"):
-                    text += b"\n"
-                cut = text.rfind(b"\n") + 1
-                for start, stop in _cut(text, cut, _LINES):
-                    pieces, count = await work.run(partial(_answered, answers, text, start, stop, number))
-                    number += count
+        # A client that gives none may wait for the start of the answer before it sends more.
+        more = b"content-length" not in self._given
+        text = bytearray()
+        if not more:
+            text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
+        options, _, _ = options_of(Options, self._query, OPTIONS)
+        tables_of(self._request).pick(options.tolerance if options else None, parameter=True)
+        head = [(b"content-type", form.media_type.encode("ascii")), (b"x-accel-buffering", b"no")]
+        await send({"type": "http.response.start", "status": 200, "headers": head})
+        number = 0
+        while True:
+            if not more and text and not text.endswith(b"\n"):
+                text += b"\n"
+            cut = text.rfind(b"\n") + 1
+            if cut:
+                self._place()
+                for start, stop in _cut(text, cut):
+                    lines = bytes(text[start:stop]).split(b"\n")[:-1]
+                    pieces = await self._run(lambda lines=lines, first=number: self._lines(form, lines, first), 1e9)
+                    number += len(lines)
                     for piece in pieces:
-                        await work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+                        await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
                 del text[:cut]
-                if cut:
-                    source.until = asyncio.get_running_loop().time() + patience
-                if not more:
-                    break
-                if len(text) > batches.max_body_bytes:
-                    raise batches.too_large()
-                if asyncio.get_running_loop().time() > end:
-                    raise work.took_too_long()
-                taken, more = await source.taken()
-                text += taken
-            await work.client(send({"type": "http.response.body", "body": b"", "more_body": False}))
-        finally:
-            if reader is not None:
-                reader.cancel()
+            if not more:
+                break
+            if len(text) > SMALL_BODY:
+                self._place()
+            if len(text) > self._limit:
+                raise BodyTooLargeError(f"a line may have up to {self._limit} bytes")
+            more = await self._work.client(_next_line(receive, text))
+        await self._work.client(send({"type": "http.response.body", "body": b"", "more_body": False}))
 
-    def _line(self, line: bytearray) -> Iterator[bytes]:
-        """Answer one line as a batch of its own: a block of columns, a list of rows, or one case."""
-        chosen = choose("application/json", memoryview(line))
-        batch, given = chosen.read(line, self._batches.max_batch)
-        options, place = self._options(given, "pointer")
-        table = self._batches.tables.pick(options.tolerance, place)
-        answers = answer_batch(table, batch, options.names(), deviations(options.std))
-        if answers.n_bad and not batch.listed:  # one case, and no list that could hold a null for it
-            raise refusal([FieldFault(error["field"] or "body", error["reason"]) for error in answers.errors])
-        self._batches.count(table, answers)
-        if batch.listed:
-            return chosen.write(answers, signature(table))
-        return iter([dump(objects(answers, 0, 1, signature(table))[0])])
+    def _lines(self, form: Form, lines: list[bytes], first: int) -> list[bytes]:
+        """The answers to some lines; blank ones are counted and have none."""
+        answers = (self._line(form, line, first + i + 1) for i, line in enumerate(lines) if line.strip())
+        return list(_packed((piece for answer in answers for piece in answer), None))
 
-
-class _Pieces:
-    """A body that is read ahead of the answers: some clients send the whole body before they read."""
-
-    def __init__(self, receive: Receive, work: Work) -> None:
-        self._receive = receive
-        self._work = work
-        self._held: deque[bytearray] = deque()
-        self._size = 0
-        self._more = True
-        self._fault: BaseException | None = None
-        self.until = 0.0  # time at which the current line must be complete
-        self._came, self._went = asyncio.Event(), asyncio.Event()
-
-    async def next(self) -> tuple[bytearray, bool]:
-        """The next piece, and whether there may be more."""
-        message = await self._work.message(self._receive, self.until)
-        return bytearray(message.get("body", b"")), message.get("more_body", False)
-
-    async def read_on(self) -> None:
-        """Read to the end of the body; pause while the buffer is full."""
+    def _line(self, form: Form, line: bytes, number: int) -> Iterator[bytes]:
+        """Answer one line: one case, or a block of columns or a list of rows as a batch of its own."""
         try:
-            while self._more:
-                if self._size > _AHEAD:
-                    self._went.clear()
-                    await self._went.wait()
-                piece, self._more = await self.next()
-                self._held.append(piece)
-                self._size += len(piece)
-                self._came.set()
-        except (MumacroError, ClientDisconnect) as error:
-            self._fault = error
-            self._came.set()
+            if b"[" in line:
+                columns, given = form.read(bytearray(line), self._most)
+                batch = self._batch(columns, given)
+                yield from form.write(batch) if columns.listed else [self._case(decode(line))]
+            else:
+                yield self._case(decode(line))
+        except RequestError as error:
+            scope = {**self._request.scope, "path": f"{self._request.scope['path']}#line={number}"}
+            yield dump(pieces_of_problem(error, scope)[1])
+        yield b"\n"
 
-    async def taken(self) -> tuple[bytes, bool]:
-        """All bytes since the last call; waits until there are some."""
-        while not self._held and self._more:
-            if self._fault is not None:
-                raise self._fault
-            self._came.clear()
-            await self._came.wait()
-        text = b"".join(self._held)
-        self._held.clear()
-        self._size = 0
-        self._went.set()
-        return text, self._more
+    def _case(self, given: Any) -> bytes:
+        """The answer to one case of a stream, where a null is a gap."""
+        if not isinstance(given, dict):
+            refuse([FieldFault((), "must be an object or a list of rows", given)])
+        self._only_once(given)
+        options, case = read_form(Options, {**given, **self._query}, null_is_rigid=False)
+        table = tables_of(self._request).pick(options.tolerance)
+        values, source = answer_case(table.surrogate, case, options.names(), options.deviations())
+        self._state.metrics.case(table, source)
+        return dump({**values, **table.signature})
 
 
-def _cut(text: bytearray, stop: int, most: int) -> Iterator[tuple[int, int]]:
+async def _next_line(receive: Receive, text: bytearray) -> bool:
+    """Add to the text until a line is complete, or the next piece is large; whether there is more."""
+    while True:
+        message = await receive()
+        if message["type"] != "http.request":
+            raise ClientDisconnect
+        piece, more = message.get("body", b""), bool(message.get("more_body", False))
+        text += piece
+        if b"\n" in piece or not more or len(text) > SMALL_BODY:
+            return more
+
+
+def _cut(text: bytearray, stop: int) -> Iterator[tuple[int, int]]:
     """Where some whole lines of the text before ``stop`` begin and end, one after another."""
     start = 0
     while start < stop:
-        end = stop if stop - start <= most else text.find(b"\n", start + most, stop) + 1 or stop
+        end = stop if stop - start <= _LINES else text.find(b"\n", start + _LINES, stop) + 1 or stop
         yield start, end
         start = end
 
 
-def _answered(answers: LineAnswers, text: bytearray, start: int, stop: int, number: int) -> tuple[list[bytes], int]:
-    """The answers to some lines, and the number of lines; blank lines are counted and have no answer."""
-    spans, count = [], 0
-    while start < stop:
-        end = text.find(b"\n", start)
-        count += 1
-        if text[start] not in b" \t\r\n" or text[start:end].strip():
-            spans.append((start, end, number + count))
-        start = end + 1
-    return list(_gathered(answers.pieces(text, spans))), count
-
-
-def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes in larger pieces."""
+def _packed(pieces: Iterator[bytes], packer: Any) -> Iterator[bytes]:
+    """The same bytes in larger pieces, compressed if there is a packer."""
     gathered: list[bytes] = []
     size = 0
     for piece in pieces:
-        gathered.append(piece)
-        size += len(piece)
+        gathered.append(piece if packer is None else packer.compress(piece))
+        size += len(gathered[-1])
         if size >= _PIECE:
             yield b"".join(gathered)
             gathered, size = [], 0
+    if packer is not None:
+        gathered.append(packer.flush())
+        size = 1
     if size:
         yield b"".join(gathered)
 
 
-class _Route(APIRoute):
-    """Lets FastAPI read the parameters only if there is a query: that takes as long as a small batch."""
+async def post_batch(request: Request) -> Response:
+    """Answer in the form of the request, order kept.  A bad case has the result null and an entry in ``errors``.
 
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """A handler that calls FastAPI's own only if there is a query."""
-        usual = super().get_route_handler()
-
-        async def answer(request: Request) -> Response:
-            if request.scope["query_string"]:
-                return await usual(request)
-            response: Response = await self.endpoint(_NO_QUERY, request, tables_of(request))
-            return response
-
-        return answer
+    A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
+    """
+    return _Answer(request)
 
 
-def _add(path: str, chosen: Format | None) -> None:
-    accepts(path, BatchQuery.model_fields)
-
-    async def post_batch(query: Annotated[BatchQuery, Query()], request: Request, _tables: TablesDep) -> Response:
-        """Answer in the format of the request, order kept.  A bad case has the result null and an entry in ``errors``.
-
-        A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
-        """
-        return BatchResponse(request, request.app.state.batches, chosen, query)
-
-    forms = FORMATS if chosen is None else [chosen]
-    router.add_api_route(
-        path, post_batch, methods=["POST"],
-        operation_id="post_mu_macro_batch" + (f"_{chosen.name}" if chosen else ""),
-        summary="Macroscopic friction of many cases" + (f", as {chosen.name}" if chosen else ""),
-        response_class=Response, route_class_override=_Route, dependencies=[Depends(once_each)],
-        responses={200: batch_operation(forms)["answer"], **problems(400, 401, 408, 413, 415, 422, 503)},
-        openapi_extra={"requestBody": batch_operation(forms)["body"]},
-    )  # fmt: skip
-
-
-def add_routes() -> None:
-    """One path for all formats, and one for each."""
-    _add(BATCH_PATH, None)
-    for entry in FORMATS:
-        _add(f"{BATCH_PATH}/{entry.name}", entry)
-
-
-add_routes()
+ENDPOINTS = [
+    Endpoint(
+        PATH, "POST", post_batch, "post_mu_macro_batch", "Macroscopic friction of many cases",
+        query=OptionsQuery, statuses=(400, 401, 408, 413, 415, 422, 503),
+        request={"required": True, "content": {form.media_type: form.body for form in forms().values()}},
+        content={
+            200: {
+                "description": "The answers, in the form of the request",
+                "content": {form.media_type: form.answer for form in forms().values()},
+            }
+        },
+    )
+]  # fmt: skip

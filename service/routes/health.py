@@ -1,52 +1,53 @@
-"""Health: ``/livez`` (the process answers), ``/readyz`` and its alias ``/healthz`` (answers are correct)."""
+"""Health: ``/livez`` (the process answers), ``/readyz`` and ``/healthz`` (answers are correct); and ``/metrics``."""
 
-from fastapi import APIRouter
+from prometheus_client import CONTENT_TYPE_LATEST
+from starlette.requests import Request
 from starlette.responses import Response
 
 from .. import API_VERSION, __version__
-from ..formats.columns import dump
-from ..openapi import problems
-from ..schemas import Health
-from ..tables import TablesDep
+from ..models import Health
+from ..wire.json import dump
+from . import Endpoint, reply, tables_of
 
-__all__ = ["router"]
-
-router = APIRouter(tags=["health"])
+__all__ = ["ENDPOINTS"]
 
 _NO_STORE = {"Cache-Control": "no-store"}
 _VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
 
 
-@router.head("/livez", include_in_schema=False)
-@router.get(
-    "/livez",
-    operation_id="livez",
-    summary="The process is alive",
-    response_model=Health,
-)
-async def livez() -> Response:
+async def livez(_request: Request) -> Response:
     """Report that the process answers, also without a table: a restart would not repair a table."""
-    return Response(dump({"status": "alive", **_VERSIONS}), headers=_NO_STORE, media_type="application/json")
+    return reply(dump({"status": "alive", **_VERSIONS}), _NO_STORE)
 
 
-@router.head("/healthz", include_in_schema=False)
-@router.get(
-    "/healthz",
-    operation_id="healthz",
-    summary="The same as /readyz",
-    response_model=Health,
-    responses=problems(503),
-)
-@router.head("/readyz", include_in_schema=False)
-@router.get(
-    "/readyz",
-    operation_id="readyz",
-    summary="The service is ready",
-    response_model=Health,
-    responses=problems(503),
-)
-async def readyz(tables: TablesDep) -> Response:
+async def readyz(request: Request) -> Response:
     """Check that every table is loaded, has the right checksum, gives its known answer and has an unchanged file."""
+    tables = tables_of(request)
     tables.check()
-    answer = {"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}
-    return Response(dump(answer), headers=_NO_STORE, media_type="application/json")
+    return reply(dump({"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}), _NO_STORE)
+
+
+async def get_metrics(request: Request) -> Response:
+    """Return the counters of all worker processes, in the text form of Prometheus."""
+    text = await request.app.state.work.question(request.app.state.metrics.text)
+    return Response(text, headers={**_NO_STORE, "Content-Type": CONTENT_TYPE_LATEST})
+
+
+_TEXT = {
+    "description": "Requests by route, method and status, their duration, cases by table, source and regime",
+    "content": {"text/plain": {"schema": {"type": "string"}}},
+}
+ENDPOINTS = [
+    Endpoint("/livez", "GET", livez, "livez", "The process is alive", model=Health, tag="health", open=True),
+    *(
+        Endpoint(
+            path, "GET", readyz, path[1:], "The service is ready", model=Health, statuses=(503,), tag="health",
+            open=True,
+        )
+        for path in ("/readyz", "/healthz")
+    ),
+    Endpoint(
+        "/metrics", "GET", get_metrics, "get_metrics", "Counters for Prometheus", statuses=(401, 503),
+        content={200: _TEXT}, tag="health",
+    ),
+]  # fmt: skip

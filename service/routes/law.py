@@ -3,130 +3,138 @@
 import csv
 import io
 import math
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from fastapi import APIRouter, Depends, Query
+from pydantic import BaseModel, BeforeValidator, Field, create_model, model_validator
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.errors import InputError
-from mumacro.law import approximations, border_speeds, friction_law, sweep_values
+from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, SI
+from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 
-from ..errors import FieldFault, InvalidFieldsError, accepts
-from ..evaluation import Batch, answer_batch
-from ..formats.columns import dump
-from ..kernel import FIELDS, RAD_PER_CYCLE, UNITS
-from ..openapi import problems
-from ..quantities import nested
-from ..questions import LawAnswer, LawFamilyAnswer, LawQuery, LawRequest
-from ..schemas import deviations
-from ..tables import LoadedTable, TablesDep, signature
-from . import JsonRoute, no_query, once_each, parameters_of
+from ..answers import answer_columns, nested, parts_of
+from ..case import INPUTS, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
+from ..models import Answered, default, included
+from ..problems import FieldFault, refuse
+from ..quantities import INCLUDES
+from ..tables import LoadedTable
+from ..wire.json import dump
+from . import Endpoint, given_in_body, given_in_query, reply, tables_of, work_of
+from .solve_for import FIVE, FIVE_QUERY, Name, in_si, per_value
 
-__all__ = ["router"]
+__all__ = ["ENDPOINTS"]
 
-router = APIRouter(tags=["answers"], route_class=JsonRoute)
-accepts("/v1/law", LawRequest.model_fields)
-accepts("/v1/law.csv", LawQuery.model_fields)
+MAX_POINTS = 10_001
+MAX_CURVES = 20
+MAX_ALL_POINTS = 20_002
+# JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema.
+_whole = BeforeValidator(lambda value: int(value) if isinstance(value, float) and value.is_integer() else value)
+LawInclude: Any = Literal[("approximations", *INCLUDES)]
+Points = Annotated[int, Field(ge=2, le=MAX_POINTS), _whole]
+Family = dict[Name, Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_CURVES)]]
 
 
-@router.post(
-    "/v1/law",
-    operation_id="post_law",
-    summary="mu_macro over a range of one input",
-    response_model=LawAnswer | LawFamilyAnswer,
-    responses=problems(400, 401, 413, 415, 422, 503),
-    dependencies=[Depends(no_query)],
-)
-async def post_law(form: LawRequest, tables: TablesDep, request: Request) -> Response:
+class LawOptions(Options):
+    """What is asked beside the five other inputs."""
+
+    along: Name = bounded(f"one of {', '.join(INPUTS)}", "The swept input", "v0")
+    start: NotNegative = bounded("finite and >= 0", "First value [SI]; > 0 on a logarithmic scale", examples=[1e-4])
+    stop: Positive = bounded("finite and > 0", "Last value [SI], > start", examples=[10.0])
+    points: Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
+    scale: Literal["log", "linear"] = bounded("log or linear", "Spacing of the values", "log")
+    family: Annotated[Family, Field(min_length=1, max_length=1)] | None = bounded(
+        f"an object with one input and 1 to {MAX_CURVES} values of it, finite and >= 0",
+        "One input that is left out elsewhere: one curve per value", None,
+    )  # fmt: skip
+    include: list[LawInclude] | None = bounded(
+        f"a list of names from: approximations, {', '.join(INCLUDES)}", "More to compute at every value", None,
+        max_length=2 + 2 * len(INCLUDES),
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Self:
+        if self.scale == "log" and self.start == 0.0:
+            raise relation("start", "must be > 0 on a logarithmic scale; for a range from 0 set scale to linear")
+        if not self.stop > self.start:
+            raise relation("stop", f"must be > start, which is {self.start:g}")
+        for name, values in (self.family or {}).items():
+            if in_si(name) == in_si(self.along):
+                raise relation("family", f"{name} is the swept input")
+            if len(values) * self.points > MAX_ALL_POINTS:
+                raise relation("points", f"all curves together may have up to {MAX_ALL_POINTS} points")
+            if name in POSITIVE and min(values) <= 0.0:
+                raise relation("family", f"{name} must be {BOUNDS[name]}")
+        return self
+
+
+def _read(given: Mapping[str, Any]) -> tuple[LawOptions, dict[str, float]]:
+    """The options and the other inputs; that of the family is asked for, too."""
+    family = given.get("family")
+    names = [given.get("along", "v0"), *(family if isinstance(family, dict) else ())]
+    return read_form(LawOptions, given, [name for name in names if name in INPUTS])
+
+
+async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
-    table = tables.pick(form.tolerance)
-    content = await request.app.state.work.run_in_place(lambda: dump(_answer(table, form, "pointer")))
-    return Response(content, media_type="application/json")
+    form, case = _read(await given_in_body(request))
+    table = tables_of(request).pick(form.tolerance)
+    return await work_of(request).question(lambda: reply(dump(_answer(table, form, case)), request=request))
 
 
-@router.head("/v1/law.csv", include_in_schema=False)
-@router.get(
-    "/v1/law.csv",
-    operation_id="get_law_csv",
-    summary="mu_macro over a range of one input, as a table for spreadsheets",
-    response_class=Response,
-    responses={
-        **problems(401, 422, 503),
-        200: {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}},
-    },
-    dependencies=[Depends(once_each)],
-)
-async def get_law_csv(query: Annotated[LawQuery, Query()], tables: TablesDep, request: Request) -> Response:
-    """Return the law as CSV (RFC 4180), one row per value; the header names the columns with their units."""
-    with parameters_of("/v1/law.csv"):
-        form = query.form()
-    table = tables.pick(form.tolerance, "parameter")
-    content = await request.app.state.work.run_in_place(lambda: _as_csv(_answer(table, form, "parameter")))
+async def get_law_csv(request: Request) -> Response:
+    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their units."""
+    given = given_in_query(request)
+    if "family" in given:
+        given["family"] = "no parameter of a query"
+    form, case = _read(given)
+    if form.names():
+        refuse(
+            [FieldFault.of("include", "must be approximations; POST /v1/law has the other quantities", form.names()[0])]
+        )
+    table = tables_of(request).pick(form.tolerance)
     headers = {
         "Content-Disposition": f'attachment; filename="friction-law-{form.along}.csv"',
         "Cache-Control": "no-cache",
     }
-    return Response(content, headers=headers, media_type="text/csv; charset=utf-8; header=present")
+    kind = "text/csv; charset=utf-8; header=present"
+    return await work_of(request).question(
+        lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind, request)
+    )
 
 
-def _answer(table: LoadedTable, form: LawRequest, place: str) -> dict[str, Any]:
-    case = form.inputs()
-    swept: dict[str, Any] = {"along": form.along, "unit": UNITS[form.along]}
-    try:
-        values = sweep_values(*_internal(form.along, form.start, form.stop), form.points, form.scale)
-        swept["values"] = (values / _per(form.along)).tolist()
-        if not form.family:
-            return {**swept, **_curve(table, form, values, case), **signature(table)}
-        ((name, listed),) = form.family.items()
-        inner = "omega" if name == "f" else name
-        curves = [
-            {"value": value, **_curve(table, form, values, {**case, inner: value * _per(name)})} for value in listed
-        ]
-        return {**swept, "family": name, "family_unit": UNITS[name], "curves": curves, **signature(table)}
-    except InputError as error:
-        reason = f"must be {error.bound}"
-        raise InvalidFieldsError(
-            f"{error.field}: {reason}", [FieldFault(error.field, reason, error.value, error.bound, place)]
-        ) from None
+def _answer(table: LoadedTable, form: LawOptions, case: dict[str, float]) -> dict[str, Any]:
+    per = per_value(form.along)
+    values = sweep_values(in_si(form.along), form.start * per, form.stop * per, form.points, form.scale)
+    swept = {"along": form.along, "unit": SI[form.along][0], "values": (values / per).tolist()}
+    if not form.family:
+        return {**swept, **_curve(table, form, values, case), **table.signature}
+    ((name, listed),) = form.family.items()
+    curves = [
+        {"value": value, **_curve(table, form, values, {**case, in_si(name): value * per_value(name)})}
+        for value in listed
+    ]
+    return {**swept, "family": name, "family_unit": SI[name][0], "curves": curves, **table.signature}
 
 
-def _per(name: str) -> float:
-    """Factor from a value of this name to the library's input: omega [rad/s] from f [Hz]."""
-    return RAD_PER_CYCLE if name == "f" else 1.0
-
-
-def _internal(name: str, start: float, stop: float) -> tuple[str, float, float]:
-    return "omega" if name == "f" else name, start * _per(name), stop * _per(name)
-
-
-def _curve(table: LoadedTable, form: LawRequest, values: Any, case: dict[str, Any]) -> dict[str, Any]:
-    along = "omega" if form.along == "f" else form.along
+def _curve(table: LoadedTable, form: LawOptions, values: Any, case: dict[str, float]) -> dict[str, Any]:
+    along = in_si(form.along)
     law = friction_law(table.surrogate, along, values, case)
-    answer: dict[str, Any] = {
-        "mu_macro": law.answer.mu_macro.tolist(),
-        "mu_ratio": law.answer.mu_ratio.tolist(),
-        "regime": law.answer.regime.tolist(),
-        "error_bound": law.answer.error_bound.tolist(),
-        "source": law.answer.source.tolist(),
-        "mu_static": law.mu_static.tolist(),
-        "border": [{"value": mark.value / _per(form.along), "mu_macro": mark.mu_macro} for mark in law.border],
-    }
+    include = form.names()
+    six = [values if name == along else np.array([case[name]]) for name in FIELDS]
+    found, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations())
+    answer = nested({part.path: part.values(found[part.path]) for part in parts_of(include)})
+    answer["mu_static"] = law.mu_static.tolist()
+    answer["border"] = [{"value": mark.value / per_value(form.along), "mu_macro": mark.mu_macro} for mark in law.border]
     if "approximations" in (form.include or ()):
         for name, columns in (("approximations", approximations), ("border_speeds", border_speeds)):
-            found = columns(table.surrogate, law, case)
-            answer[name] = {key: column.tolist() for key, column in found.items()}
-    quantities = form.quantities()
-    if quantities:
-        full = {"k": math.inf, **{name: math.inf if value is None else value for name, value in case.items()}}
-        columns_of = [values if name == along else np.array([full[name]]) for name in FIELDS]
-        more = answer_batch(table, Batch(values.size, columns_of), quantities, deviations(form.std))
-        answer.update(nested({path: column.tolist() for path, column in more.extras.items()}))
+            answer[name] = {key: column.tolist() for key, column in columns(table.surrogate, law, case).items()}
     return answer
 
 
 def _as_csv(answer: dict[str, Any]) -> str:
+    """The columns of the law; those that ``include`` adds, in order, with the path as their name."""
     columns: dict[str, list[Any]] = {f"{answer['along']} [{answer['unit']}]": answer["values"]}
     for name in ("mu_macro", "mu_ratio", "error_bound", "mu_static"):
         columns[f"{name} [-]"] = answer[name]
@@ -139,3 +147,87 @@ def _as_csv(answer: dict[str, Any]) -> str:
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
     return text.getvalue()
+
+
+# --- models -------------------------------------------------------------------------------------------
+
+LawRequest: Any = create_model(
+    "LawRequest", __base__=(LawOptions, FIVE),
+    __doc__="mu_macro over a range of one input; a list for one more input gives a family of curves.",
+)  # fmt: skip
+LawRequest.model_config["json_schema_extra"] = {
+    "examples": [
+        {name: value for name, value in example.items() if name != "v0"}
+        | {"along": "v0", "start": 1e-4, "stop": 10.0, "points": 5}
+    ]
+}
+_only: Any = (
+    list[Literal["approximations"]] | None,
+    Field(None, max_length=4, description="approximations: those of the paper beside the exact values"),
+)
+LawQuery: Any = query_of("LawQuery", LawRequest, include=_only, k=FIVE_QUERY["k"])
+
+
+class BorderMark(BaseModel):
+    """Where continuous sliding begins or ends."""
+
+    value: float = Field(description="The swept input [SI]")
+    mu_macro: float = Field(description="[-]")
+
+
+def _listed(columns: Mapping[str, str]) -> str:
+    return "; ".join(f"{name}: {text}" for name, text in columns.items())
+
+
+class _More(BaseModel):
+    mu_static: list[float] = Field(description="Static limit (v0 -> 0) of each case [-]")
+    border: list[BorderMark] = Field(description="Up to two points inside the range")
+    approximations: dict[str, list[float | None]] | None = Field(
+        None,
+        description=f"Only if requested [-]; null: outside the range of the formula. {_listed(APPROXIMATIONS)}",
+    )
+    border_speeds: dict[str, list[float | None]] | None = Field(
+        None,
+        description="Only with approximations [m/s]: v0 at which continuous sliding begins for each case; null: "
+        f"outside the range of the formula. {_listed(BORDERS)}",
+    )
+
+
+_made: Any = create_model
+Curve: Any = _made("Curve", __base__=_More, __doc__="A friction law in columns.", **default(True), **included(True))
+
+
+class _Swept(Answered):
+    along: Name
+    unit: str
+    values: list[float] = Field(description="The swept input [SI]")
+
+
+class FamilyCurve(Curve):  # type: ignore[misc]
+    """One curve of a family."""
+
+    value: float = Field(description="The family's input [SI]")
+
+
+LawAnswer: Any = _made("LawAnswer", __base__=(_Swept, Curve), __doc__="A friction law in columns.")
+
+
+class LawFamilyAnswer(_Swept):
+    """Friction laws for several values of one more input."""
+
+    family: Name
+    family_unit: str
+    curves: list[FamilyCurve]
+
+
+ENDPOINTS = [
+    Endpoint(
+        "/v1/law", "POST", post_law, "post_law", "mu_macro over a range of one input",
+        body=LawRequest, model=LawAnswer | LawFamilyAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+    ),
+    Endpoint(
+        "/v1/law.csv", "GET", get_law_csv, "get_law_csv", "mu_macro over a range of one input, as a table",
+        query=LawQuery, statuses=(400, 401, 422, 503),
+        content={200: {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}},
+    ),
+]  # fmt: skip

@@ -1,64 +1,86 @@
 """The inverse problem: ``POST /v1/solve-for``."""
 
-import math
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from fastapi import APIRouter, Depends
+from pydantic import BaseModel, BeforeValidator, Field, create_model, model_validator
 from starlette.requests import Request
 from starlette.responses import Response
 
+from mumacro.inputs import FIELDS, RAD_PER_CYCLE, SI
 from mumacro.inverse import Reach, Solution, solve_for
 
-from ..errors import accepts
-from ..evaluation import Batch, answer_batch
-from ..formats.columns import dump
-from ..formats.rows import objects
-from ..kernel import FIELDS, RAD_PER_CYCLE, UNITS
-from ..openapi import problems
-from ..questions import SolveForAnswer, SolveForRequest
-from ..schemas import canonical, deviations
-from ..tables import LoadedTable, TablesDep, signature
-from . import JsonRoute, no_query
+from ..answers import answer_columns, nested, parts_of
+from ..case import INPUTS, NotNegative, Options, bounded, example, input_fields, read_form, relation
+from ..models import Answered, included
+from ..tables import LoadedTable
+from ..wire.json import dump
+from . import Endpoint, given_in_body, reply, tables_of, work_of
 
-__all__ = ["router"]
+__all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "Name", "in_si", "per_value"]
 
-router = APIRouter(tags=["answers"], route_class=JsonRoute)
+MAX_TARGETS = 10_000
 _NO_LIMIT = 1e300
-accepts("/v1/solve-for", SolveForRequest.model_fields)
+Name: Any = Literal[INPUTS]
+FIVE_QUERY: Any = input_fields(optional=INPUTS, null=False, shown=["k"])
+FIVE: Any = create_model("_Five", **input_fields(optional=INPUTS, shown=[name for name in example if name != "v0"]))
+Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
+_listed = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
 
 
-@router.post(
-    "/v1/solve-for",
-    operation_id="post_solve_for",
-    summary="The value of one input that gives a wanted mu_macro",
-    response_model=SolveForAnswer,
-    responses=problems(400, 401, 413, 415, 422, 503),
-    dependencies=[Depends(no_query)],
-)
-async def post_solve_for(form: SolveForRequest, tables: TablesDep, request: Request) -> Response:
+class SolveForOptions(Options):
+    """What is asked beside the five known inputs."""
+
+    unknown: Name = bounded(f"one of {', '.join(INPUTS)}", "The input to solve for")
+    target: Annotated[Targets, _listed] = bounded(
+        f"a number, finite and >= 0, or a list of 1 to {MAX_TARGETS} of them", "Wanted value [-]"
+    )
+    quantity: Literal["mu_macro", "mu_ratio"] = bounded(
+        "mu_macro or mu_ratio", "What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)", "mu_macro"
+    )
+    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = bounded(
+        "two numbers, finite and >= 0, ascending", "Where to search [SI]; left out: wherever it changes mu_macro", None
+    )
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Self:
+        if self.quantity == "mu_ratio" and self.unknown == "mu0":
+            raise relation("quantity", "must be mu_macro where mu0 is the unknown")
+        return self
+
+
+async def post_solve_for(request: Request) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
-    table = tables.pick(form.tolerance)
-    content = await request.app.state.work.run_in_place(lambda: dump(_answer(table, form)))
-    return Response(content, media_type="application/json")
+    given = await given_in_body(request)
+    form, case = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in INPUTS else [])
+    table = tables_of(request).pick(form.tolerance)
+    return await work_of(request).question(lambda: reply(dump(_answer(table, form, case)), request=request))
 
 
-def _answer(table: LoadedTable, form: SolveForRequest) -> dict[str, Any]:
-    case = form.inputs()
-    unknown = "omega" if form.unknown == "f" else form.unknown
-    per_value = RAD_PER_CYCLE if form.unknown == "f" else 1.0
-    unit = float(case["mu0"]) if form.quantity == "mu_ratio" else 1.0
-    targets = form.target if isinstance(form.target, list) else [form.target]
-    within = (form.range[0] * per_value, form.range[1] * per_value) if form.range is not None else None
-    solution = solve_for(table.surrogate, unknown, [target * unit for target in targets], case, within)
-    more = _included(table, form, solution, unknown, case)
+def in_si(name: str) -> str:
+    """The field of an input: omega for f."""
+    return "omega" if name == "f" else name
+
+
+def per_value(name: str) -> float:
+    """Factor from a value of this name to its field: omega [rad/s] from f [Hz]."""
+    return RAD_PER_CYCLE if name == "f" else 1.0
+
+
+def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -> dict[str, Any]:
+    per = per_value(form.unknown)
+    unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
+    within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
+    wanted = [target * unit for target in form.target]
+    solution = solve_for(table.surrogate, in_si(form.unknown), wanted, case, within)
+    more = _included(table, form, solution, case)
     results = []
-    for target, roots in zip(targets, solution.roots, strict=True):
+    for target, roots in zip(form.target, solution.roots, strict=True):
         result: dict[str, Any] = {
             "target": target,
             "roots": [
                 {
-                    "value": root.value / per_value, "low": root.low / per_value, "high": root.high / per_value,
+                    "value": root.value / per, "low": root.low / per, "high": root.high / per,
                     "mu_macro": root.mu_macro, "regime": root.regime, **next(more, {}),
                 }
                 for root in roots
@@ -70,9 +92,9 @@ def _answer(table: LoadedTable, form: SolveForRequest) -> dict[str, Any]:
     reach = solution.reach
     return {
         "unknown": form.unknown,
-        "unit": UNITS[form.unknown],
+        "unit": SI[form.unknown][0],
         "quantity": form.quantity,
-        "range": [reach.low / per_value, None if reach.high > _NO_LIMIT else reach.high / per_value],
+        "range": [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per],
         "reachable": {
             "min": reach.mu_min / unit,
             "max": reach.mu_max / unit,
@@ -80,25 +102,93 @@ def _answer(table: LoadedTable, form: SolveForRequest) -> dict[str, Any]:
             "max_included": reach.max_included,
         },
         "results": results,
-        **signature(table),
+        **table.signature,
     }
 
 
-def _included(table: LoadedTable, form: SolveForRequest, solution: Solution, unknown: str, case: dict[str, Any]) -> Any:
+def _included(table: LoadedTable, form: SolveForOptions, solution: Solution, case: dict[str, float]) -> Any:
     """The included quantities of every root, in order."""
-    include = canonical(form.include)
+    include = form.names()
     values = np.array([root.value for roots in solution.roots for root in roots])
     if not include or values.size == 0:
         return iter(())
-    full = {"k": math.inf, **{name: math.inf if value is None else value for name, value in case.items()}}
-    columns = [values if name == unknown else np.array([full[name]]) for name in FIELDS]
-    answers = answer_batch(table, Batch(values.size, columns), include, deviations(form.std))
-    return iter([entry or {} for entry in objects(answers, 0, values.size)])
+    six = [values if name == in_si(form.unknown) else np.array([case[name]]) for name in FIELDS]
+    found, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations())
+    parts = parts_of(include)[len(parts_of(())) :]
+    columns = [part.values(found[part.path]) for part in parts]
+    return iter(
+        [nested(dict(zip((part.path for part in parts), row, strict=True))) for row in zip(*columns, strict=True)]
+    )
 
 
-def _reason(form: SolveForRequest, target: float, reach: Reach, constant: bool, unit: float) -> str:
+def _reason(form: SolveForOptions, target: float, reach: Reach, constant: bool, unit: float) -> str:
     low, high = reach.mu_min / unit, reach.mu_max / unit
     if constant:
         return f"{form.unknown} has no influence here: {form.quantity} is {low!r} for every value in the range"
     left, right = "[" if reach.min_included else "(", "]" if reach.max_included else ")"
     return f"{target!r} is not in the reachable range {left}{low!r}, {high!r}{right}"
+
+
+# --- models -------------------------------------------------------------------------------------------
+
+_target: Any = (
+    NotNegative | Targets,
+    Field(description=f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}"),
+)
+SolveForRequest: Any = create_model(
+    "SolveForRequest", __base__=(SolveForOptions, FIVE), __doc__="Which value of one input gives a wanted mu_macro.",
+    target=_target,
+)  # fmt: skip
+SolveForRequest.model_config["json_schema_extra"] = {
+    "examples": [{name: value for name, value in example.items() if name != "y0"} | {"unknown": "y0", "target": 0.15}]
+}
+
+
+class _Root(BaseModel):
+    """One value of the unknown, and the answer there."""
+
+    value: float = Field(description="The unknown [SI]")
+    low: float = Field(description="From low ...")
+    high: float = Field(description="... to high, mu_macro is the target within the table's error bound")
+    mu_macro: float = Field(description="Value of the table there [-]")
+    regime: Literal["continuous", "stick_slip", "static"]
+
+
+Root: Any = create_model("Root", __base__=_Root, __doc__=_Root.__doc__, **included(False))
+
+
+class TargetAnswer(BaseModel):
+    """All values that give one target."""
+
+    target: float
+    roots: list[Root] = Field(description="Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)")
+    reason: str | None = Field(None, description="Why there is no root")
+
+
+class Reachable(BaseModel):
+    """Range of mu_macro for all values of the unknown in its range."""
+
+    min: float
+    max: float
+    min_included: bool = Field(description="false: approached, never reached")
+    max_included: bool
+
+
+class SolveForAnswer(Answered):
+    """Answer to the inverse problem."""
+
+    unknown: Name
+    unit: str
+    quantity: Literal["mu_macro", "mu_ratio"]
+    range: list[float | None] = Field(description="The searched range [SI]; null: without limit")
+    reachable: Reachable
+    results: list[TargetAnswer] = Field(description="One per target, in order")
+
+
+ENDPOINTS = [
+    Endpoint(
+        "/v1/solve-for", "POST", post_solve_for, "post_solve_for",
+        "The value of one input that gives a wanted mu_macro",
+        body=SolveForRequest, model=SolveForAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+    )
+]  # fmt: skip

@@ -1,49 +1,54 @@
 """The table itself: ``GET /v1/table`` (metadata) and ``GET /v1/table.nc`` (the file)."""
 
-from typing import Annotated, Any
+from typing import Any, Self
 
-from fastapi import APIRouter, Depends, Query
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.errors import TableError
 
 from .. import __version__
-from ..errors import accepts
-from ..formats.columns import dump
-from ..openapi import problems
-from ..schemas import TableAnswer, TableChoice
-from ..tables import LoadedTable, TablesDep, signature
-from . import file_answer, once_each
+from ..case import Positive, bounded, relation
+from ..models import TableAnswer
+from ..problems import faults_of, refuse
+from ..tables import LoadedTable
+from ..wire.json import dump
+from . import Endpoint, file_answer, given_in_query, reply, tables_of
 
-__all__ = ["router"]
-
-router = APIRouter(tags=["table"])
-_FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
+__all__ = ["ENDPOINTS"]
 
 
-accepts("/v1/table", TableChoice.model_fields)
-accepts("/v1/table.nc", TableChoice.model_fields)
+class TableChoice(BaseModel):
+    """Choice of a table: by id or by tolerance; with neither, the tightest."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    id: str | None = bounded("the name of a table", default=None)
+    tolerance: Positive | None = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.id is not None and self.tolerance is not None:
+            raise relation("id", "choose by one id or by tolerance")
+        return self
 
 
-async def _chosen(choice: Annotated[TableChoice, Query()], tables: TablesDep) -> LoadedTable:
-    return tables.pick(choice.tolerance, "parameter") if choice.id is None else tables.named(choice.id)
+def _chosen(request: Request) -> LoadedTable:
+    given = given_in_query(request)
+    if "id" in given:
+        given["id"] = str(given["id"])
+    try:
+        choice = TableChoice.model_validate(given)
+    except ValidationError as error:
+        refuse(faults_of(error, TableChoice, TableChoice.model_fields))
+    tables = tables_of(request)
+    return tables.pick(choice.tolerance) if choice.id is None else tables.named(choice.id)
 
 
-ChosenTable = Annotated[LoadedTable, Depends(_chosen)]
-
-
-@router.head("/v1/table", include_in_schema=False)
-@router.get(
-    "/v1/table",
-    operation_id="get_table",
-    summary="Properties of a table",
-    response_model=TableAnswer,
-    responses=problems(401, 422, 503),
-    dependencies=[Depends(once_each)],
-)
-async def get_table(table: ChosenTable, tables: TablesDep) -> Response:
+async def get_table(request: Request) -> Response:
     """Describe the default table, or the one chosen by ``id`` or ``tolerance``; list all that are loaded."""
+    table = _chosen(request)
     surrogate = table.surrogate
     answer = {
         "id": surrogate.id,
@@ -55,33 +60,37 @@ async def get_table(table: ChosenTable, tables: TablesDep) -> Response:
         "max_rel_error": surrogate.max_rel_error,
         "attributes": surrogate.attributes,
         "blocks": surrogate.blocks,
-        "loaded": [other.label for other in tables.loaded],
+        "loaded": [other.label for other in tables_of(request).loaded],
         "service_version": __version__,
-        **signature(table),
+        **table.signature,
     }
-    return Response(dump(answer), media_type="application/json")
+    return reply(dump(answer))
 
 
-@router.head("/v1/table.nc", include_in_schema=False)
-@router.get(
-    "/v1/table.nc",
-    operation_id="get_table_file",
-    summary="The table as a netCDF-4 file",
-    response_class=Response,
-    responses={
-        **problems(400, 401, 416, 422, 503),
-        200: {"description": "The file", "content": _FILE},
-        206: {"description": "The part of it that Range requests", "content": _FILE},
-    },
-    dependencies=[Depends(once_each)],
-)
-async def get_table_file(table: ChosenTable, request: Request) -> Response:
+async def get_table_file(request: Request) -> Response:
     """Stream the file from disk; ranges are supported.  It is the file that the answers come from."""
-    # A file that was replaced after loading holds another table with the same name.
-    table.check()
+    table = _chosen(request)
+    table.check()  # a file that was replaced after loading holds another table with the same name
     path = table.surrogate.path
-    headers = {"ETag": f'"{table.kernel.checksum}"', "Cache-Control": "no-cache"}
+    headers = {"ETag": f'"{table.surrogate.checksum}"', "Cache-Control": "no-cache"}
     try:
         return file_answer(request, path, headers, media_type="application/x-netcdf", filename=path.name)
     except OSError as error:
         raise TableError(path, "the file is gone") from error
+
+
+_FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
+ENDPOINTS = [
+    Endpoint(
+        "/v1/table", "GET", get_table, "get_table", "Properties of a table",
+        query=TableChoice, model=TableAnswer, statuses=(400, 401, 422, 503), tag="table",
+    ),
+    Endpoint(
+        "/v1/table.nc", "GET", get_table_file, "get_table_file", "The table as a netCDF-4 file",
+        query=TableChoice, statuses=(400, 401, 416, 422, 503), tag="table",
+        content={
+            200: {"description": "The file", "content": _FILE},
+            206: {"description": "The part of it that Range requests", "content": _FILE},
+        },
+    ),
+]  # fmt: skip

@@ -1,7 +1,7 @@
 """Writes the page as a folder for any static host: it computes in the browser, from a table compiled to WebAssembly.
 
     python -m builder export tables/mumacro-1e-7.nc --format wasm --out mumacro.wasm
-    python -m service.static_page tables/mumacro-1e-7.nc mumacro.wasm FOLDER
+    python -m builder.export_page tables/mumacro-1e-7.nc mumacro.wasm FOLDER
 
 It is the page of the service with another ``service.js``.  It hides the functions that need the service, and says so.
 """
@@ -9,16 +9,19 @@ It is the page of the service with another ``service.js``.  It hides the functio
 from __future__ import annotations
 
 import html
+import json
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 from mumacro import MumacroError, Surrogate
-
-from .routes.page import ASSETS, FOLDER, POLICY, map_content, names_content
+from mumacro.page import POLICY, map_of, names
 
 __all__ = ["write_page"]
 
+# the files of the service, as data: this package does not import it
+_FOLDER = Path(__file__).resolve().parent.parent / "service" / "static" / "page"
 _POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'").replace(
     "; frame-ancestors 'none'", ""
 )  # browsers ignore frame-ancestors in a meta element
@@ -43,13 +46,13 @@ def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
         raise PageError(f"{wasm} was not exported from {table}")
     parts = out / "static" / "page"
     parts.mkdir(parents=True, exist_ok=True)
-    for name in ASSETS:
-        shutil.copyfile(FOLDER / name, parts / name)
-    shutil.copyfile(FOLDER.parent / "alone" / "service.js", parts / "service.js")
-    made = {"mumacro.wasm": module, "names.json": names_content(guide=False), "map.json": map_content(surrogate)}
+    for path in _FOLDER.glob("*.*s"):  # scripts and styles
+        shutil.copyfile(path, parts / path.name)
+    shutil.copyfile(_FOLDER.parent / "alone" / "service.js", parts / "service.js")
+    made = {"mumacro.wasm": module, "names.json": _json(names(guide=False)), "map.json": _json(map_of(surrogate))}
     for name, content in made.items():
         (parts / name).write_bytes(content)
-    text = (FOLDER / "index.html").read_text("utf-8")
+    text = (_FOLDER / "index.html").read_text("utf-8")
     for place, new in (
         ("<title>", f'<meta http-equiv="Content-Security-Policy" content="{html.escape(_POLICY)}">\n<title>'),
         ("<body>", '<body class="alone">'),
@@ -61,6 +64,10 @@ def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
     return surrogate
 
 
+def _json(content: Any) -> bytes:
+    return json.dumps(content, separators=(",", ":")).encode()
+
+
 def _about(surrogate: Surrogate) -> str:
     name = html.escape(f"{surrogate.id}, tolerance {surrogate.tolerance:g}, checksum {surrogate.checksum[:12]}")
     return (
@@ -70,14 +77,14 @@ def _about(surrogate: Surrogate) -> str:
 
 
 def main(words: list[str]) -> int:
-    """``python -m service.static_page TABLE MODULE FOLDER``."""
+    """``python -m builder.export_page TABLE MODULE FOLDER``."""
     if len(words) != 3:
         print(__doc__, file=sys.stderr)
         return 2
     try:
         write_page(*map(Path, words))
     except (MumacroError, OSError) as error:
-        print(f"service.static_page: {error}", file=sys.stderr)
+        print(f"builder.export_page: {error}", file=sys.stderr)
         return 1
     return 0
 

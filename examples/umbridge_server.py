@@ -1,0 +1,63 @@
+"""Serve mu_macro as a UM-Bridge model: ``python examples/umbridge_server.py PORT``; needs the package ``umbridge``.
+
+Inputs [[mu0, Fz, k, y0, omega, v0]] in SI units, output [[mu_macro]], with Gradient and ApplyJacobian.  The server of
+the package listens on every interface and has no key and no limits: use it in a trusted network only.
+"""
+
+import math
+import sys
+
+import umbridge
+
+from mumacro import Surrogate
+
+FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
+
+
+class Friction(umbridge.Model):
+    """The model ``mu_macro``."""
+
+    def __init__(self):
+        super().__init__("mu_macro")
+        self.surrogate = Surrogate.open()
+
+    def get_input_sizes(self, _config):
+        """Six inputs in one block."""
+        return [len(FIELDS)]
+
+    def get_output_sizes(self, _config):
+        """One output."""
+        return [1]
+
+    def supports_evaluate(self):
+        """Values."""
+        return True
+
+    def supports_gradient(self):
+        """Slopes from the table."""
+        return True
+
+    def supports_apply_jacobian(self):
+        """The same in a direction."""
+        return True
+
+    def __call__(self, parameters, _config):
+        """mu_macro; an illegal value raises InputError, which names it."""
+        return [[self.surrogate.evaluate(dict(zip(FIELDS, parameters[0], strict=True))).mu_macro]]
+
+    def gradient(self, _out, _inp, parameters, sens, _config):
+        """The slopes times ``sens``; an infinite one (v0 = 0 at y~ = 1) is an error."""
+        answer = self.surrogate.evaluate(dict(zip(FIELDS, parameters[0], strict=True)), gradient=True)
+        slopes = [answer.gradient[name] * sens[0] for name in FIELDS]
+        if not all(map(math.isfinite, slopes)):
+            raise ValueError("a slope is not finite at v0 = 0 and y~ = 1: choose another point")
+        return slopes
+
+    def apply_jacobian(self, out, inp, parameters, vec, config):
+        """The slope in the direction ``vec``."""
+        slopes = self.gradient(out, inp, parameters, [1.0], config)
+        return [math.fsum(slope * step for slope, step in zip(slopes, vec, strict=True))]
+
+
+if __name__ == "__main__":
+    umbridge.serve_models([Friction()], int(sys.argv[1]))

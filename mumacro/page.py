@@ -1,0 +1,69 @@
+"""What the interactive page is told: the inputs and their units, the formulas, and the map of mu~ over (v~, y~).
+
+The service serves it, and ``python -m builder.export_page`` writes it into a folder; the page itself is in
+``service/static/page``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mumacro.inputs import POSITIVE, SI, UNITS_OF, refusal
+from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, borders
+from mumacro.surrogate import Surrogate
+
+__all__ = ["POLICY", "map_of", "names"]
+
+#: the content security policy of the page: no inline script, no inline style, nothing from another host
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+# The range of the map [-]: from deep in creep to fast sliding, twenty points per decade.
+_PER_DECADE = 20
+_V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
+# Formulas of the paper for the border; "small_amplitude" is eq. (31) among the approximations, not among the borders.
+_PAPER_BORDERS = tuple(name for name in BORDERS if name in EQUATIONS.values() and name not in APPROXIMATIONS)
+_UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
+
+
+def names(guide: bool) -> dict[str, Any]:
+    """``names.json``: inputs, units, bounds, approximations and borders, and whether there is a guide."""
+    inputs = {
+        name: {
+            "unit": SI[name][0], "bound": refusal(name, -1.0).removeprefix("must be "), "positive": name in POSITIVE,
+            "units": {unit: [scale.times, scale.over] for unit, scale in known.items()},
+        }
+        for name, known in UNITS_OF.items()
+    }  # fmt: skip
+    about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
+    of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
+    return {"inputs": inputs, "approximations": about, "borders": of_paper, "guide": guide}
+
+
+def map_of(surrogate: Surrogate) -> dict[str, Any]:
+    """``map.json``: mu~ on a grid in whole numbers, rows of constant y~ from below, and borders by name."""
+    axes = {}
+    for name, (low, high) in {"v_tilde": _V_DECADES, "y_tilde": _Y_DECADES}.items():
+        axes[name] = {"start": 10.0**low, "stop": 10.0**high, "n": _PER_DECADE * (high - low) + 1}
+    v, y = (np.geomspace(axis["start"], axis["stop"], int(axis["n"])) for axis in axes.values())
+    ratio = surrogate.mu_ratio(v[None, :], y[:, None])
+    amplitudes = np.geomspace(y[0], y[-1], 4 * y.size)
+    rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
+    lines = {name: _line(column, amplitudes) for name, column in borders(amplitudes).items() if name in _PAPER_BORDERS}
+    border = _line(surrogate.v_tilde_crit(amplitudes), amplitudes)
+    return {**axes, "unit": _UNIT, "mu_ratio": rounded, "border": border, "borders": lines}
+
+
+def _equations(name: str) -> list[int]:
+    """Numbers of the paper's equations that an approximation stands for."""
+    return [number for number, found in EQUATIONS.items() if found == name]
+
+
+def _line(v: Any, y: Any) -> list[Any]:
+    """Points (v~, y~) of a curve, in six digits; without those at which it is not defined."""
+    places = np.column_stack((v, y))[np.isfinite(v)]
+    return [[float(f"{x:.6g}") for x in place] for place in places.tolist()]

@@ -1,0 +1,296 @@
+"""Limits: API keys, the head and the body of a request, slots for large requests, time.
+
+A request that may take longer than one case needs a slot and runs in a thread.  Batches and streams share the slots of
+``MUMACRO_MAX_BATCHES``; the questions of a person (law, solve-for, the page) have slots and threads of their own.
+"""
+
+import asyncio
+import os
+import secrets
+import sys
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager, suppress
+from typing import TypeVar
+
+from starlette.requests import ClientDisconnect
+from starlette.types import Receive, Scope
+
+from mumacro.processors import processors
+
+from .problems import (
+    CLOSE,
+    BodyTooLargeError,
+    MalformedBodyError,
+    OverloadedError,
+    SlowClientError,
+    TookTooLongError,
+    UnauthorizedError,
+    UnsupportedBodyError,
+)
+from .settings import Settings
+
+__all__ = [
+    "AT_ONCE",
+    "SMALL_BODY",
+    "Keys",
+    "Slots",
+    "Work",
+    "check_head",
+    "drained",
+    "media_type_of",
+    "read_body",
+    "wants_gzip",
+]
+
+T = TypeVar("T")
+SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
+AT_ONCE = 4000.0  # largest cost without a thread, in times of a plain case: under half a millisecond
+QUESTIONS = 8  # questions that are answered at the same time
+_NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
+_LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
+_PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
+_ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
+
+
+class Keys:
+    """API keys and the names of their holders; with none, the service is open to all.
+
+    Parameters
+    ----------
+    keys : mapping
+        API key -> name of its holder.
+    """
+
+    def __init__(self, keys: Mapping[str, str]) -> None:
+        self._keys = [(key.encode("ascii"), name) for key, name in keys.items()]
+
+    def __bool__(self) -> bool:
+        return bool(self._keys)
+
+    def holder(self, headers: Mapping[bytes, bytes]) -> str:
+        """The name of the holder of the request's key.
+
+        Raises
+        ------
+        UnauthorizedError
+        """
+        offered = headers.get(b"x-api-key")
+        if offered is None:
+            scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
+            offered = credentials.strip() if scheme.lower() == b"bearer" else b""
+        found = None
+        for key, name in self._keys:  # compares all keys: the time does not depend on the key sent
+            if secrets.compare_digest(offered, key):
+                found = name
+        if found is None:
+            raise UnauthorizedError(
+                "send the API key as X-API-Key or as Authorization: Bearer",
+                headers={"WWW-Authenticate": "Bearer", **CLOSE},
+            )
+        return found
+
+
+def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
+    """Refuse a head that says two things, or asks for another protocol.
+
+    Raises
+    ------
+    MalformedBodyError
+    """
+    if len(headers) != len(scope["headers"]):
+        names = [name for name, _ in scope["headers"]]
+        for name in _ONCE:
+            if names.count(name) > 1:
+                raise MalformedBodyError(f"the header {name.decode()} is given more than once", headers=CLOSE)
+    if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
+        # the body would be read as another protocol
+        raise MalformedBodyError("this service does not upgrade connections: send no Upgrade", headers=CLOSE)
+
+
+def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
+    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first.
+
+    Raises
+    ------
+    UnsupportedBodyError
+        Another media type, another charset than UTF-8, or a compressed body.
+    """
+    given = headers.get(b"content-type")
+    found = next(iter(known.values()))
+    if given is not None and given != b"application/json":
+        media, _, parameters = given.decode("latin-1").lower().partition(";")
+        charset = parameters.strip().removeprefix("charset=").strip('"') if "charset=" in parameters else "utf-8"
+        named = known.get(media.strip())
+        if named is None or charset.split(";")[0].strip() not in ("utf-8", "utf8", "us-ascii"):
+            offer = ", ".join(dict.fromkeys(known.values()))
+            shown = given.decode("latin-1")[:80]
+            raise UnsupportedBodyError(f"send {offer}, not {shown}", headers={"Accept-Post": offer, **CLOSE})
+        found = named
+    if headers.get(b"content-encoding", b"identity").lower() != b"identity":
+        raise UnsupportedBodyError(
+            "send the body without Content-Encoding", headers={"Accept-Encoding": "identity", **CLOSE}
+        )
+    return found
+
+
+def wants_gzip(offers: str) -> bool:
+    """Whether this value of Accept-Encoding accepts gzip."""
+    wanted = {}
+    for offer in offers.lower().split(","):
+        name, _, weight = offer.partition(";")
+        wanted[name.strip()] = weight.replace(" ", "").rstrip("0") not in ("q=", "q=0.")
+    return wanted.get("gzip", wanted.get("*", False))
+
+
+async def read_body(
+    headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
+) -> bytearray:
+    """The body of a request; ``large`` is called before more than SMALL_BODY is read.
+
+    Raises
+    ------
+    BodyTooLargeError, ClientDisconnect
+    """
+    length = headers.get(b"content-length", b"0")
+    if not length.isdigit() or len(length) > 18 or int(length) > limit:
+        raise _too_large(limit)
+    if int(length) > SMALL_BODY:
+        large()
+    body, more = bytearray(), True
+    while more:
+        message = await receive()
+        if message["type"] != "http.request":
+            raise ClientDisconnect
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+        if len(body) > limit:
+            raise _too_large(limit)
+        if len(body) > SMALL_BODY:
+            large()
+    return body
+
+
+def _too_large(limit: int) -> BodyTooLargeError:
+    # The rest of the body is not used: without "close" the server would read all of it.
+    return BodyTooLargeError(
+        f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
+        "Content-Length if they are more, and read the answer while you send",
+        headers=CLOSE, max_bytes=limit,
+    )  # fmt: skip
+
+
+async def drained(receive: Receive) -> None:
+    """Read and drop the rest of a body that is refused, for a while: else many clients see a reset and no reason."""
+    until, count, more = asyncio.get_running_loop().time() + _LINGER_S, 0, True
+    with suppress(TimeoutError):
+        while more and count < _LINGER:
+            async with asyncio.timeout(min(_PAUSE_S, until - asyncio.get_running_loop().time())):
+                message = await receive()
+            count += len(message.get("body", b""))
+            more = message.get("more_body", False)
+
+
+def _stand_back() -> None:
+    """Lower the priority of this thread.  Linux only."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            thread = threading.get_native_id()
+            own = os.getpriority(os.PRIO_PROCESS, thread)
+            os.setpriority(os.PRIO_PROCESS, thread, min(19, own + _NICENESS))
+
+
+class Slots:
+    """The right to run a large request: so many at the same time, and the threads that run them."""
+
+    def __init__(self, number: int, threads: int, name: str, behind: bool) -> None:
+        self.number = number
+        self.used = 0
+        self.threads = ThreadPoolExecutor(threads, name, initializer=_stand_back if behind else None)
+        self._name = name
+
+    def take(self) -> None:
+        """Take a slot; the code that called this gives it back.
+
+        Raises
+        ------
+        OverloadedError
+            No slot is free.
+        """
+        if self.used >= self.number:
+            raise OverloadedError(f"{self.used} {self._name} are being answered already", headers=CLOSE)
+        self.used += 1
+
+    def give_back(self) -> None:
+        """Give a slot back."""
+        self.used -= 1
+
+    async def run(self, work: Callable[[], T], cost: float = float("inf")) -> T:
+        """Do the work at once if it is small, else in a thread, so that it delays no other request."""
+        if cost <= AT_ONCE:
+            return work()
+        return await asyncio.get_running_loop().run_in_executor(self.threads, work)
+
+
+class Work:
+    """The slots of one process, and the time limits."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        count = processors()
+        self.batches = Slots(settings.max_batches, count, "batches", behind=True)
+        self.questions = Slots(QUESTIONS, count, "questions", behind=False)
+
+    def close(self) -> None:
+        """Let no thread keep the process alive."""
+        for slots in (self.batches, self.questions):
+            slots.threads.shutdown(wait=False, cancel_futures=True)
+
+    @asynccontextmanager
+    async def deadline(self) -> AsyncIterator[None]:
+        """One time limit for a whole answer: reading, computing and sending.
+
+        Raises
+        ------
+        TookTooLongError
+        """
+        limit = self.settings.time_limit_s
+        try:
+            async with asyncio.timeout(limit):
+                yield
+        except TimeoutError:
+            raise TookTooLongError(f"a request may take up to {limit} s", headers=CLOSE) from None
+
+    async def question(self, work: Callable[[], T]) -> T:
+        """Do the work of a question in a thread and a slot; the slot is held until it is done, even without a client.
+
+        Raises
+        ------
+        OverloadedError, TookTooLongError
+        """
+        self.questions.take()
+        task = asyncio.ensure_future(self.questions.run(work))
+
+        def done(task: "asyncio.Future[T]") -> None:
+            self.questions.give_back()
+            if not task.cancelled():
+                task.exception()
+
+        task.add_done_callback(done)
+        async with self.deadline():
+            return await asyncio.shield(task)
+
+    async def client(self, move: Awaitable[T]) -> T:
+        """Wait for the client to send or to read.
+
+        Raises
+        ------
+        SlowClientError
+        """
+        limit = self.settings.client_timeout_s
+        try:
+            async with asyncio.timeout(limit):
+                return await move
+        except TimeoutError:
+            raise SlowClientError(f"a client may take up to {limit} s", headers=CLOSE) from None

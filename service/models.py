@@ -1,0 +1,137 @@
+"""Models of answers, for OpenAPI: the columns come from the registry of :mod:`service.answers`."""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field, create_model
+
+from .answers import DEFAULT, QUANTITIES, Part
+
+__all__ = [
+    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
+    "TableLabel", "included",
+]  # fmt: skip
+
+
+class TableLabel(BaseModel):
+    """The table that an answer came from."""
+
+    id: str = Field(description="Name of the table")
+    tolerance: float = Field(description="The error of mu_macro/mu0 [-] that it was built to")
+
+
+class Answered(BaseModel):
+    """The fields of every answer."""
+
+    table: TableLabel
+    api_version: str
+
+
+class BatchFault(BaseModel):
+    """Why one case of a batch has no result."""
+
+    index: int = Field(description="Position in the batch, from 0")
+    field: str | None = Field(description="The bad field; null when the case as a whole is bad")
+    reason: str
+
+
+class _BatchEnd(Answered):
+    errors: list[BatchFault] = Field(description="One entry per bad case, in order; the first 1000 of them")
+    n_errors: int = Field(description="Number of bad cases, listed or not")
+
+
+def _kind(part: Part, listed: bool, null: bool) -> Any:
+    kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else part.kind
+    kind = kind | None if null else kind
+    return list[kind] if listed else kind
+
+
+def default(listed: bool) -> dict[str, Any]:
+    """The default outputs as members of a model."""
+    return {
+        part.path: (
+            _kind(part, listed, null=listed or part.path == "error_bound"),
+            Field(description=f"{part.text} [{part.unit}]"),
+        )
+        for part in DEFAULT.parts
+    }
+
+
+def included(listed: bool) -> dict[str, Any]:
+    """Members that ``include`` adds to a model of an answer."""
+    fields: dict[str, Any] = {}
+    for quantity in QUANTITIES.values():
+        inner: dict[str, dict[str, Any]] = {}
+        for part in quantity.parts:
+            name, _, key = part.path.partition(".")
+            kind, text = _kind(part, listed, null=True), f"{part.text} [{part.unit}]"
+            if key:
+                inner.setdefault(name, {})[key] = (kind, Field(description=text))
+            else:
+                fields[name] = (kind | None, Field(None, description=f"Only if requested. {text}"))
+        for name, members in inner.items():
+            title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
+            model: Any = create_model(title, __doc__=f"{quantity.text}.", **members)
+            fields[name] = (model | None, Field(None, description="Only if requested"))
+    return fields
+
+
+_made: Any = create_model
+Result: type[BaseModel] = _made("Result", __doc__="Answer to one case.", **default(False), **included(False))
+CaseAnswer: type[BaseModel] = _made("CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.")
+ColumnsAnswer: type[BaseModel] = _made(
+    "ColumnsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in columns, order kept; null: a bad case.",
+    **default(True), **included(True),
+)  # fmt: skip
+RowsAnswer: type[BaseModel] = _made(
+    "RowsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in rows, order kept; null where a case is bad.",
+    results=(list[Result | None], ...),  # type: ignore[valid-type]
+)  # fmt: skip
+
+
+class TableAnswer(Answered):
+    """Properties of a table."""
+
+    id: str
+    tolerance: float
+    checksum: str = Field(description="SHA-256 of the table's content")
+    file: str
+    size_bytes: int
+    max_abs_error: float | None = Field(description="Largest verified absolute error of mu_macro/mu0 [-]")
+    max_rel_error: float | None = Field(description="Largest verified relative error of mu_macro [-]")
+    attributes: dict[str, Any] = Field(description="Root attributes of the file")
+    blocks: list[dict[str, Any]]
+    loaded: list[TableLabel] = Field(description="All loaded tables, tightest first")
+    service_version: str
+
+
+class Health(BaseModel):
+    """Answer of a health endpoint."""
+
+    status: Literal["alive", "ready"]
+    tables: list[TableLabel] | None = None
+    api_version: str
+    service_version: str
+
+
+class FieldProblem(BaseModel):
+    """One bad field."""
+
+    pointer: str | None = Field(None, description="JSON pointer into the body")
+    parameter: str | None = Field(None, description="Query parameter")
+    field: str
+    value: Any = Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")
+    reason: str
+    bound: str | None = None
+
+
+class Problem(BaseModel):
+    """Problem details, RFC 9457."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    instance: str
+    request_id: str | None = None
+    errors: list[FieldProblem] | None = None
+    n_errors: int | None = None

@@ -1,0 +1,338 @@
+"""What is seen of a request from outside: its id, its log line, its counters, and the answer to an exception.
+
+Logs are JSON lines on standard output, written by a thread of ``logging.handlers.QueueListener``.  Counters are those
+of prometheus_client; several workers share them through its multiprocess mode, in a private folder that is made at
+the start.
+"""
+
+import atexit
+import itertools
+import logging
+import logging.handlers
+import os
+import queue
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import orjson
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from mumacro.errors import MumacroError
+
+from .limits import Keys, check_head, drained
+from .problems import CLOSE, OverloadedError, SlowClientError, TookTooLongError, problem_of
+from .routes import path_of
+from .tables import LoadedTable, Tables
+
+__all__ = ["JsonFormatter", "LogQueue", "Metrics", "Observe", "log_config", "shared_counters"]
+
+HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
+_METHODS = frozenset({"GET", "HEAD", "POST"})
+_SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
+_BUCKETS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+_ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs
+_MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
+_MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
+_WRITE_EVERY_S = 0.05
+
+request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
+_access = logging.getLogger("mumacro.access")
+_errors = logging.getLogger("mumacro.error")
+
+
+# --- logs ---------------------------------------------------------------------------------------------
+
+
+class JsonFormatter(logging.Formatter):
+    """One record, one line of JSON: time, level, logger, message, the record's ``fields``."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
+        line: dict[str, Any] = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **getattr(record, "fields", {}),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return orjson.dumps(line, default=str).decode()
+
+
+class _Writer(logging.handlers.QueueListener):
+    """Writes what is in the queue in one go, twenty times a second: no request wakes this thread."""
+
+    _lines: list[str]
+
+    def dequeue(self, block: bool) -> logging.LogRecord:
+        """The next record; before it waits for one, all lines are written."""
+        while True:
+            try:
+                record: logging.LogRecord = self.queue.get_nowait()  # type: ignore[attr-defined]
+                return record
+            except queue.Empty:
+                if not block:
+                    raise
+                self.flush()
+                time.sleep(_WRITE_EVERY_S)
+
+    def handle(self, record: logging.LogRecord) -> None:
+        """Keep a line."""
+        self._lines.append(self.handlers[0].format(record))
+
+    def flush(self) -> None:
+        """Write the lines by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
+        if self._lines:
+            rest = memoryview(("\n".join(self._lines) + "\n").encode("utf-8", "backslashreplace"))
+            self._lines.clear()
+            with suppress(OSError):  # the reader is gone
+                while rest:
+                    rest = rest[os.write(1, rest) :]
+
+
+class LogQueue(logging.handlers.QueueHandler):
+    """Hands records to the thread that writes them: a stalled reader of the log delays no request.
+
+    Lines that find the queue full are dropped, and counted in the next line that does not.
+    """
+
+    def __init__(self) -> None:
+        self._records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
+        super().__init__(self._records)
+        formatter = logging.NullHandler()
+        formatter.setFormatter(JsonFormatter())
+        self._writer = _Writer(self._records, formatter)
+        self._writer._lines = []
+        self._writer.start()
+        self._dropped = 0
+        atexit.register(self._finish)
+
+    def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
+        """The record as it is, with the id of its request: it stays in this process."""
+        current = request_id.get()
+        if current is not None:
+            record.fields = {"request_id": current, **getattr(record, "fields", {})}
+        return record
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        """Queue a record if there is room."""
+        if self._records.qsize() >= _MOST_WAITING:
+            self._dropped += 1
+            return
+        if self._dropped:
+            told = f"{self._dropped} lines of the log were dropped: standard output was not read in time"
+            fields = {"name": __name__, "levelno": logging.WARNING, "levelname": "WARNING", "msg": told}
+            self._records.put(logging.makeLogRecord(fields))
+            self._dropped = 0
+        self._records.put(record)
+
+    def _finish(self) -> None:
+        """Wait a second at most for the last lines."""
+        until = time.monotonic() + 1.0
+        while (not self._records.empty() or self._writer._lines) and time.monotonic() < until:
+            time.sleep(0.01)
+
+
+def log_config(level: str) -> dict[str, Any]:
+    """A ``logging.config.dictConfig`` for this process: everything to standard output, as JSON lines."""
+    # parts of a record that no line shows
+    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
+    return {
+        "version": 1,
+        "disable_existing_loggers": False,
+        "handlers": {"out": {"()": LogQueue}},
+        "root": {"level": "WARNING", "handlers": ["out"]},
+        "loggers": {name: {"level": level.upper()} for name in ("mumacro", "uvicorn")},
+    }
+
+
+# --- counters -----------------------------------------------------------------------------------------
+
+
+@contextmanager
+def shared_counters() -> Iterator[None]:
+    """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end."""
+    for place in ("/dev/shm", None):  # noqa: S108  (mkdtemp makes a folder of its own there)
+        try:
+            folder = tempfile.mkdtemp(prefix="mumacro-metrics-", dir=place)
+            break
+        except OSError:
+            continue
+    else:  # no writable folder: every worker reports its own counters
+        yield
+        return
+    os.environ[_SHARED] = folder
+    try:
+        yield
+    finally:
+        os.environ.pop(_SHARED, None)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+class Metrics:
+    """Counters of requests and cases."""
+
+    def __init__(self, paths: frozenset[str]) -> None:
+        from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics
+
+        disable_created_metrics()  # type: ignore[no-untyped-call]
+
+        self._paths = paths
+        self.registry = CollectorRegistry()
+        self._requests = Counter(
+            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=self.registry
+        )
+        self._durations = Histogram(
+            "mumacro_request_duration_seconds", "From the head of a request to the end of its answer", ["route"],
+            buckets=_BUCKETS_S, registry=self.registry,
+        )  # fmt: skip
+        self._cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=self.registry)
+        self._bad = Counter(
+            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=self.registry
+        )
+        self._info = Gauge(
+            "mumacro_table_info", "Loaded tables", ["id", "tolerance"], registry=self.registry,
+            multiprocess_mode="mostrecent",
+        )  # fmt: skip
+        self._known: dict[tuple[str, str, int], tuple[Any, Any]] = {}
+        self._sources: dict[tuple[str, int], Any] = {}
+
+    def start(self, tables: Tables) -> None:
+        """Name the loaded tables."""
+        for table in tables.loaded:
+            self._info.labels(table.id, format(table.surrogate.tolerance, "g")).set(1)
+            self._bad.labels(table.id)
+
+    def request(self, path: str, method: str, status: int, seconds: float) -> None:
+        """Count one request."""
+        key = path if path in self._paths else "other", method if method in _METHODS else "other", status
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = (
+                self._requests.labels(key[0], key[1], str(status)),
+                self._durations.labels(key[0]),
+            )
+        found[0].inc()
+        found[1].observe(seconds)
+
+    def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
+        """Count answered cases of one source code; -1 are bad ones."""
+        found = self._sources.get((table.id, source))
+        if found is None:
+            from .answers import REGIME_NAMES, SOURCES
+
+            names = (table.id, SOURCES[source], REGIME_NAMES[source])
+            found = self._sources[table.id, source] = (
+                self._bad.labels(table.id) if source < 0 else self._cases.labels(*names)
+            )
+        found.inc(number)
+
+    def cases(self, table: LoadedTable, source: Any) -> None:
+        """Count the cases of a batch by their source codes, bad ones among them."""
+        for code, number in enumerate(np.bincount(source + 1).tolist()):
+            if number:
+                self.case(table, code - 1, number)
+
+    def text(self) -> bytes:
+        """The exposition format of Prometheus; with several workers, the sum over all."""
+        from prometheus_client import CollectorRegistry, generate_latest
+        from prometheus_client.multiprocess import MultiProcessCollector
+
+        registry = self.registry
+        if _SHARED in os.environ:
+            registry = CollectorRegistry()
+            MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
+        return generate_latest(registry)
+
+
+# --- one request --------------------------------------------------------------------------------------
+
+
+class Observe:
+    """Middleware: id, key, log line, counters, and problem details for every exception."""
+
+    def __init__(
+        self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: frozenset[str], guide: bool = False
+    ) -> None:
+        self.app = app
+        self._metrics, self._keys, self._open_paths, self._guide = metrics, keys, open_paths, guide
+        self._stem, self._numbers = os.urandom(8).hex().encode(), itertools.count(int.from_bytes(os.urandom(6)))
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Run one request."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        started = time.perf_counter()
+        headers: dict[bytes, bytes] = dict(scope["headers"])
+        identity = headers.get(b"x-request-id", b"")
+        if not _ID.fullmatch(identity):
+            identity = b"%b%016x" % (self._stem, next(self._numbers))
+        shown = scope["request_id"] = identity.decode("ascii")
+        token = request_id.set(shown)
+        path, status, holder = path_of(scope), 0, None
+
+        async def send_marked(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                message["headers"] = [
+                    *message["headers"], (b"x-request-id", identity), (b"x-content-type-options", b"nosniff"),
+                ]  # fmt: skip
+            await send(message)
+
+        try:
+            if scope.get("state", {}).get("full") and path not in HEALTH_PATHS:
+                raise OverloadedError("too many connections are open", headers=CLOSE)
+            check_head(scope, headers)
+            guide = self._guide and (path == "/guide" or path.startswith("/guide/"))
+            if self._keys and path not in self._open_paths and not guide:
+                holder = self._keys.holder(headers)
+            await self.app(scope, receive, send_marked)
+        except ClientDisconnect:
+            status = 499  # the usual status for a client that disconnected before the answer
+        except Exception as error:
+            if not isinstance(error, (MumacroError, HTTPException, MemoryError)):
+                _errors.exception("unexpected error", extra={"fields": {"path": scope["path"]}})
+            if status:  # the answer has begun: end the connection without its end
+                status = 499
+                raise ClientDisconnect from error
+            answer = problem_of(error, scope)
+            unread = not isinstance(error, (SlowClientError, TookTooLongError)) and b"expect" not in headers
+            if answer.headers.get("connection") == "close" and unread:
+                await drained(receive)
+            await answer(scope, receive, send_marked)
+        finally:
+            seconds = time.perf_counter() - started
+            self._metrics.request(path, scope["method"], status, seconds)
+            self._log(scope, path, status, seconds, holder)
+            request_id.reset(token)
+
+    def _log(self, scope: Scope, path: str, status: int, seconds: float, holder: str | None) -> None:
+        level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
+        if not _access.isEnabledFor(level):
+            return
+        client = scope.get("client")
+        fields = {
+            "method": scope["method"], "path": path, "status": status, "duration_ms": round(1e3 * seconds, 3),
+            "client": client[0][:_MOST_SHOWN] if client else None,
+        }  # fmt: skip
+        if holder is not None:
+            fields["key"] = holder
+        _access.handle(
+            logging.makeLogRecord({
+                "name": "mumacro.access", "levelno": level, "levelname": logging.getLevelName(level),
+                "msg": "request", "fields": fields,
+            })
+        )  # fmt: skip

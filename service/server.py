@@ -1,0 +1,183 @@
+"""uvicorn's own protocol with limits: a time for every wait, the size of a head, one request at a time.
+
+uvicorn takes the class by its documented ``http`` parameter.  It uses parts of ``HttpToolsProtocol`` that have no
+promise of stability: pyproject.toml bounds the version, and the tests try every limit on a socket.
+"""
+
+import asyncio
+from typing import Any, ClassVar
+
+import orjson
+from starlette.types import Scope
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from .problems import HeadTooLargeError, MalformedBodyError, RequestError, SlowClientError, pieces_of_problem
+
+__all__ = ["Connection"]
+
+MAX_HEAD = 64 * 1024  # bytes of a request's head
+MAX_FIELDS = 100  # fields of a head
+_MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
+_TOO_LARGE = HeadTooLargeError(f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+
+
+class Connection(HttpToolsProtocol):
+    """One connection.  It is closed when the client is silent, slow to send or to read, or sends too large a head.
+
+    A second request that arrives before the first is answered is dropped, and the connection closes after the answer.
+    When all connections are open, the one that has waited longest for a request is closed in favour of a new one.
+    """
+
+    #: connections without a request, the longest waiting first
+    waiting: ClassVar[dict["Connection", None]] = {}
+    _clock: asyncio.TimerHandle | None = None  # for the next move of the client
+    _deadline: asyncio.TimerHandle | None = None  # for the whole answer
+    _arrived = _head = 0  # bytes of the last read; bytes since the head began
+    _in_head = _second = False
+    _refusal: RequestError | None = None
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._settings = self.app_state["settings"]
+
+    # --- time -----------------------------------------------------------------------------------------
+
+    @property
+    def _busy(self) -> bool:
+        return self.cycle is not None and not self.cycle.response_complete
+
+    def _watch(self) -> None:
+        if self._clock is None:
+            self._clock = self.loop.call_later(self._settings.client_timeout_s, self._late)
+
+    def _rest(self) -> None:
+        if self._clock is not None:
+            self._clock.cancel()
+            self._clock = None
+
+    def _late(self) -> None:
+        """Close, with 408 where a request has begun and its answer has not."""
+        self._clock = None
+        if self._in_head or (self._busy and not self.cycle.response_started):
+            self._refuse(SlowClientError(f"a client may take up to {self._settings.client_timeout_s} s"))
+        else:
+            self.transport.abort()
+
+    # --- the connection -------------------------------------------------------------------------------
+
+    def connection_made(self, transport: Any) -> None:
+        """Make room, and wait for a request."""
+        super().connection_made(transport)
+        if len(self.connections) > self._settings.max_connections and self.waiting:
+            oldest = next(iter(self.waiting))
+            del self.waiting[oldest]
+            self.connections.discard(oldest)
+            oldest.transport.abort()
+        self.waiting[self] = None
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget it."""
+        self._rest()
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self.waiting.pop(self, None)
+        super().connection_lost(exc)
+
+    def eof_received(self) -> bool:  # type: ignore[override]
+        """Answer a whole request of a client that has closed its own side."""
+        if not self._busy or self.cycle.more_body:
+            return False
+        self.cycle.keep_alive = False
+        return True
+
+    def data_received(self, data: bytes) -> None:
+        """Read some bytes, unless they follow a request that is not answered yet."""
+        if self._second or self.transport.is_closing():
+            return
+        self._arrived = len(data)
+        self._head += len(data)
+        super().data_received(data)
+        if self._in_head or not self._busy:
+            self._watch()
+        if self._in_head and self._head > MAX_HEAD and not self.transport.is_closing():
+            self._refuse(_TOO_LARGE)
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what the parser, or a limit here, has refused."""
+        if self._second:
+            return
+        if self._busy and self.cycle.response_started:
+            self.transport.abort()
+        else:
+            self._refuse(self._refusal or MalformedBodyError(msg))
+
+    def _refuse(self, error: RequestError) -> None:
+        scope: Scope = {"path": "", "method": "GET", **(self.scope or {})}
+        status, body, _ = pieces_of_problem(error, scope)
+        text = orjson.dumps(body)
+        self.transport.write(
+            b"HTTP/1.1 %d %b\r\ncontent-type: application/problem+json\r\ncontent-length: %d\r\nconnection: close\r\n"
+            b"\r\n%b" % (status, body["title"].encode(), len(text), text)
+        )
+        self.transport.close()
+
+    def pause_writing(self) -> None:
+        """Give the client its time to read."""
+        super().pause_writing()
+        self._watch()
+
+    def resume_writing(self) -> None:
+        """The client has read."""
+        super().resume_writing()
+        self._rest()
+
+    # --- calls of the parser; what they raise ends in send_400_response ---------------------------------
+
+    def on_message_begin(self) -> None:
+        """Begin a head, if the request before it is answered."""
+        if self._busy:
+            self._second, self.cycle.keep_alive = True, False
+            raise ValueError("a second request")
+        self._in_head, self._head = True, self._arrived
+        super().on_message_begin()
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Take a field of the head; those after a body are dropped."""
+        if self._in_head:
+            super().on_header(name, value)
+            if len(self.headers) > MAX_FIELDS:
+                self._refusal = _TOO_LARGE
+                raise self._refusal
+
+    def on_headers_complete(self) -> None:
+        """Begin a request."""
+        if len(self.url) + sum(len(name) + len(value) for name, value in self.headers) > MAX_HEAD:
+            self._refusal = _TOO_LARGE
+            raise self._refusal
+        hosts = sum(name == b"host" for name, _ in self.headers)
+        if hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
+            self._refusal = MalformedBodyError("a request has one Host")
+            raise self._refusal
+        self._in_head = False
+        self._rest()
+        self.waiting.pop(self, None)
+        if len(self.connections) > self._settings.max_connections:
+            self.scope["state"]["full"] = True
+        super().on_headers_complete()
+        self._deadline = self.loop.call_later(self._settings.time_limit_s + _MARGIN_S, self.transport.abort)
+        if not self.url.partition(b"?")[0].endswith(b"/batch"):  # there the application limits every wait
+            self._watch()
+
+    def on_message_complete(self) -> None:
+        """The client has sent its request."""
+        self._rest()
+        super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request."""
+        self._rest()
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self.waiting[self] = None
+        super().on_response_complete()

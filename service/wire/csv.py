@@ -1,0 +1,169 @@
+"""CSV: a head with the names of the inputs, one case per line; the answer likewise, with a text for a bad case."""
+
+import csv
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from mumacro.inputs import FIELDS, GAP, RAD_PER_CYCLE, SI, UNITS_OF, Scale, is_rigid, scale_of, split_unit, unknown_name
+
+from ..case import INPUTS, MAX_ERRORS, Columns, Reason, faults_in, number, too_large
+from ..problems import FieldFault, MalformedBodyError, refuse
+from . import Batch, Form
+
+__all__ = ["FORM"]
+
+_LONGEST_LINE = 64 * 1024  # characters
+_SLICE = 4096  # lines that are read or written at a time
+_DIGITS = b"0123456789.eE+-"
+
+
+def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
+    lines = csv.reader(_lines(text, max_batch), strict=True)
+    reasons: dict[int, Reason] = {}
+    parts: list[Any] = []
+    size = 0
+    try:
+        names, scales = _head(next(lines, []))
+        while rows := [row for _, row in zip(range(_SLICE), lines, strict=False)]:
+            rows = [row for row in rows if row]
+            parts.append(_values(rows, names, scales, size, reasons))
+            size += len(rows)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise MalformedBodyError(f"the body is not CSV: {error}") from None
+    if size > max_batch:
+        raise too_large(max_batch)
+    six = np.concatenate(parts, axis=1) if parts else np.empty((6, 0))
+    return Columns(size, list(six), reasons, "f" in names), {}
+
+
+def _lines(text: bytearray, max_batch: int) -> Iterator[str]:
+    """The lines, blank ones among them; at most as many as a batch may have."""
+    lines = io.TextIOWrapper(io.BytesIO(text), "utf-8-sig", newline="")
+    count = 0
+    while line := lines.readline(_LONGEST_LINE + 1):
+        count += 1
+        if len(line) > _LONGEST_LINE:
+            raise MalformedBodyError(f"line {count} of the body has more than {_LONGEST_LINE} characters")
+        if count > max_batch + 2:
+            raise too_large(max_batch)
+        yield line
+
+
+def _head(cells: list[str]) -> tuple[list[str], list[Scale]]:
+    """The inputs of the columns and their units."""
+    faults, names, scales = [], list[str](), []
+    for cell in cells[:100]:  # so many cannot all be valid, and no more faults are reported
+        name, unit = split_unit(cell)
+        scale = Scale() if unit is None else scale_of(name, unit) if name in SI else None
+        if name not in SI:
+            faults.append(FieldFault.of(cell, unknown_name(name, INPUTS)))
+        elif name in names:
+            faults.append(FieldFault.of(name, "is given more than once"))
+        elif scale is None:
+            known = ", ".join(UNITS_OF[name])[:300]
+            faults.append(FieldFault.of(cell, f"has a unit that {name} cannot have; known are {known}"))
+        names.append(name)
+        scales.append(scale or Scale())
+    faults += faults_in(names)
+    if faults:
+        refuse(faults)
+    return names, scales
+
+
+def _values(
+    rows: list[list[str]], names: list[str], scales: list[Scale], first: int, reasons: dict[int, Reason]
+) -> Any:
+    """The six columns of some lines, (6, n), NaN where a line cannot be read."""
+    out = np.full((6, len(rows)), np.nan)
+    short = {i for i, row in enumerate(rows) if len(row) != len(names)}
+    for i in short:
+        if len(reasons) < MAX_ERRORS:
+            reasons[first + i] = None, f"has {len(rows[i])} cells where the head has {len(names)}"
+    rows = [[""] * len(names) if i in short else row for i, row in enumerate(rows)]
+    for name, scale, cells in sorted(
+        zip(names, scales, zip(*rows, strict=True), strict=False), key=lambda entry: INPUTS.index(entry[0])
+    ):
+        column = out[FIELDS.index("omega" if name == "f" else name)]
+        if not "".join(cells).encode().translate(None, _DIGITS) and all(cells):
+            try:
+                column[:] = list(map(float, cells))
+            except ValueError:
+                _each(name, cells, column, short, first, reasons)
+        else:
+            _each(name, cells, column, short, first, reasons)
+        with np.errstate(over="ignore"):  # infinite, which is refused
+            if scale != Scale():
+                np.divide(column * scale.times, scale.over, out=column)
+            if name == "f":
+                column *= RAD_PER_CYCLE
+        if name != "k":
+            column[np.isinf(column)] = np.inf
+    return out
+
+
+def _each(
+    name: str, cells: tuple[str, ...], column: Any, short: set[int], first: int, reasons: dict[int, Reason]
+) -> None:
+    """Read the cells of a column one by one; the word rigid is infinite, a number of too many digits is refused."""
+    for i, cell in enumerate(cells):
+        if i in short:
+            continue
+        text = cell.strip()
+        value: Any = text
+        if name != "k" or not is_rigid(text):
+            try:
+                if text and not text.encode().translate(None, _DIGITS):
+                    value = float(text)
+            except ValueError:
+                pass
+        gap = not text or text.lower() == "nan"
+        column[i], reason = (np.nan, GAP if name == "k" else "is required") if gap else number(name, value)
+        if reason is not None and len(reasons) < MAX_ERRORS:
+            reasons.setdefault(first + i, (name, reason))
+
+
+def _write(batch: Batch) -> Iterator[bytes]:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow([*(part.path for part in batch.parts), "error"])
+    for start, found, source in batch.slices(_SLICE):
+        good = source >= 0
+        lists = []
+        for part in batch.parts:
+            column = found[part.path]
+            names = part.values(np.where(good, column, 0)) if part.names else part.values(column)
+            lists.append(
+                [name if fine else "" for name, fine in zip(names, good.tolist(), strict=True)]
+                if part.names
+                else ["" if value != value or value is None else value for value in names]
+            )
+        writer.writerows(zip(*lists, batch.texts(start, source), strict=True))
+        yield text.getvalue().encode()
+        text.seek(0)
+        text.truncate()
+
+
+FORM = Form(
+    "text/csv",
+    ("application/csv",),
+    _read,
+    _write,
+    body={
+        "schema": {
+            "type": "string",
+            "description": "RFC 4180 with a head: mu0, Fz, k, y0, omega or f, v0, each in SI or with a unit in "
+            "brackets; the word rigid in k is rigid contact, an empty cell is refused",
+        },
+        "example": "mu0,Fz,k [N/mm],y0 [um],f,v0\r\n0.3,10,1000,2,20690,0.01\r\n",
+    },
+    answer={
+        "schema": {
+            "type": "string",
+            "description": "One line per case: mu_macro, mu_ratio, regime, error_bound, source, what include adds, "
+            "error; the name of the table is in the header X-Table",
+        }
+    },
+)

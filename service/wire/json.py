@@ -1,0 +1,358 @@
+"""JSON in and out: columns, rows, and lines of either (NDJSON).
+
+simdjson reads long lists of numbers into arrays, and msgspec reads rows of numbers, both piece by piece, so that
+other threads run meanwhile.  Everything else, and whatever they refuse, is read by Python's ``json``, which gives
+the reasons.
+"""
+
+import json
+import math
+import re
+import secrets
+from array import array
+from collections.abc import Iterator, Mapping
+from itertools import chain
+from operator import attrgetter
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+import orjson
+import simdjson
+
+from mumacro.inputs import FIELDS, RAD_PER_CYCLE
+
+from ..answers import nested
+from ..case import INPUTS, MAX_ERRORS, OPTIONS, Columns, Reason, checked, columns_of, example, options_of, too_large
+from ..case import Options as OptionsModel
+from ..problems import FieldFault, InvalidFieldsError, MalformedBodyError, refuse
+from . import Batch, Form
+
+__all__ = ["FORMS", "decode", "dump", "read"]
+
+NAMES = (*INPUTS, *OPTIONS)
+_MEMBERS = 16  # of one object: the inputs and the options
+_READ = 256 * 1024  # bytes of rows, or of a list, that are read at a time
+_SHORT = 4096  # bytes of a list that json reads
+_TOKEN = secrets.token_hex(16).encode()  # stands in place of a list; nobody else knows it
+_ROWS, _CELLS = 8192, 65536  # rows, and entries of a column, that are written at a time
+
+
+# --- reading ------------------------------------------------------------------------------------------
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        refuse([FieldFault.of(name, "is given more than once") for name in found if names.count(name) > 1])
+    return found
+
+
+def _whole(digits: str) -> int | float:
+    return int(digits) if len(digits) < 4300 else float(digits)  # infinite, which is refused as a value
+
+
+_DECODER = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole)
+# Numbers are read by functions of Python, so that other threads run meanwhile.
+_PATIENT = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole, parse_float=lambda digits: float(digits))
+
+
+def decode(text: bytes | bytearray, large: bool = False) -> Any:
+    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
+
+    Raises
+    ------
+    MalformedBodyError, InvalidFieldsError
+        Not JSON; an object that names a member twice.
+    """
+    if not text:
+        raise MalformedBodyError("the body is empty")
+    try:
+        return (_PATIENT if large else _DECODER).decode(text.decode())
+    except RecursionError:
+        raise MalformedBodyError("the body is nested too deeply") from None
+    except ValueError as error:
+        raise MalformedBodyError(f"the body is not JSON: {error}") from None
+
+
+def read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
+    """The cases and the options of a body: columns or one case, or a list of rows.
+
+    Raises
+    ------
+    MalformedBodyError, InvalidFieldsError, BatchTooLargeError
+    """
+    _limit_values(text, max_batch)
+    if bytes(text[:4096]).lstrip()[:1] == b"[":
+        return _quick_rows(text, max_batch) or _rows(decode(text, large=True), max_batch), {}
+    given = _columns(text)
+    if given is None:
+        given = decode(text, large=True)
+        if not isinstance(given, dict):
+            refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
+    _, rest, faults = options_of(OptionsModel, given, NAMES)
+    options = {name: given[name] for name in OPTIONS if given.get(name) is not None}
+    return columns_of(rest, max_batch, NAMES, faults), options
+
+
+def _limit_values(text: bytearray, max_batch: int) -> None:
+    """Refuse a body that holds more values than a batch may have, before it is decoded.
+
+    Every value but the first of its list or object has a comma before it, every list or object a bracket, every member
+    of an object a colon.
+    """
+    room = max_batch + 64
+    objects = text.count(b"{")
+    if text.count(b",") > len(NAMES) * room or text.count(b"[") + objects > room:
+        raise too_large(max_batch)
+    if text.count(b":") > _MEMBERS * objects + 64:
+        raise InvalidFieldsError("the body has objects with more members than there are fields")
+
+
+def _columns(text: bytearray) -> dict[str, Any] | None:
+    """An object whose long lists of numbers became arrays; None where a list holds a list, and where this is no JSON.
+
+    Each long list is replaced by a text in what ``json`` reads, which finds names given twice and other faults.
+    """
+    kept, lists, at = list[bytes | bytearray](), list[Any](), 0
+    while (start := text.find(b"[", at)) >= 0:
+        end = text.find(b"]", start)
+        if end - start > _SHORT:
+            found = _numbers(text, start + 1, end)
+            if found is None:
+                return None
+            kept += [text[at:start], b'"%b%d"' % (_TOKEN, len(lists))]
+            lists.append(found)
+            at = end + 1
+        else:
+            kept.append(text[at : start + 1])
+            at = start + 1
+    given = decode(b"".join([*kept, text[at:]]))
+    if not isinstance(given, dict):
+        return None
+    token = _TOKEN.decode()
+    for name, value in given.items():
+        if isinstance(value, str) and value.startswith(token):
+            given[name] = lists[int(value[len(token) :])]
+    return given
+
+
+def _numbers(text: bytearray, start: int, end: int) -> Any:
+    """The list between two places, piece by piece: an array, or a list if it holds more than numbers; None: neither."""
+    parser, parts, at = simdjson.Parser(), [], start
+    while at <= end:
+        cut = text.find(b",", at + _READ, end) if end - at > _READ else -1
+        stop = end if cut < 0 else cut
+        try:
+            found: Any = parser.parse(b"[%b]" % bytes(text[at:stop]))
+            parts.append(np.frombuffer(found.as_buffer(of_type="d")))
+            del found
+        except (ValueError, TypeError, RuntimeError):  # a word, a null, no number at all; 1e400, which json reads
+            try:
+                values = decode(b"[%b]" % bytes(text[start:end]), large=True)
+            except MalformedBodyError:
+                return None
+            return None if any(isinstance(value, (list, dict)) for value in values) else values
+        at = stop + 1
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+class _Row(msgspec.Struct, forbid_unknown_fields=True, gc=False):
+    mu0: float
+    Fz: float
+    k: float | Literal["rigid"]
+    y0: float
+    v0: float
+    omega: float | None = None
+    f: float | None = None
+
+
+_decode_rows = msgspec.json.Decoder(list[_Row]).decode
+_BETWEEN = re.compile(rb"\}\s*,")
+
+
+def _quick_rows(text: bytearray, max_batch: int) -> Columns | None:
+    """Rows of numbers with the same six names; None for any other text.
+
+    The text is read piece by piece.  A piece that does not end between two objects is no JSON.
+    """
+    start, stop = text.find(b"[") + 1, text.rfind(b"]")
+    parts: list[np.ndarray[Any, Any]] = []
+    hertz: bool | None = None
+    size = 0
+    while start < stop:
+        cut = _BETWEEN.search(text, start + _READ, stop)
+        end = cut.start() + 1 if cut else stop
+        try:
+            rows = _decode_rows(b"[%b]" % bytes(text[start:end]))
+        except (msgspec.MsgspecError, ValueError, RecursionError):
+            return None
+        colons = text.count(b":", start, end)
+        start = cut.end() if cut else stop
+        if not rows or colons != 6 * len(rows):  # a member twice, or null
+            return None
+        given_f = rows[0].f is not None
+        if hertz is not None and hertz != given_f:
+            return None
+        hertz = given_f
+        size += len(rows)
+        if size > max_batch:
+            raise too_large(max_batch)
+        try:
+            parts.append(_arrays(rows, "f" if given_f else "omega"))
+        except TypeError:  # omega in one row, f in another
+            return None
+    if not text[: text.find(b"[")].strip() == b"" == text[stop + 1 :].strip() or not parts:
+        return None
+    six = np.concatenate(parts, axis=1)
+    if hertz:
+        with np.errstate(over="ignore"):
+            six[4] *= RAD_PER_CYCLE
+    return Columns(size, list(six), hertz=bool(hertz), rows=True)
+
+
+def _arrays(rows: list[_Row], frequency: str) -> np.ndarray[Any, Any]:
+    """The six columns of rows, (6, n)."""
+    try:
+        flat = array("d", chain.from_iterable(map(attrgetter("mu0", "Fz", "k", "y0", frequency, "v0"), rows)))
+        return np.frombuffer(flat).reshape(len(rows), 6).T
+    except TypeError:
+        for row in rows:
+            if row.k == "rigid":
+                row.k = math.inf
+        flat = array("d", chain.from_iterable(map(attrgetter("mu0", "Fz", "k", "y0", frequency, "v0"), rows)))
+        return np.frombuffer(flat).reshape(len(rows), 6).T
+
+
+def _rows(found: list[Any], max_batch: int) -> Columns:
+    """Rows one by one; a bad row gets the first reason."""
+    if len(found) > max_batch:
+        raise too_large(max_batch)
+    six = np.full((6, len(found)), np.nan)
+    reasons: dict[int, Reason] = {}
+    for i, row in enumerate(found):
+        if isinstance(row, dict):
+            values, faults = checked(row, null_is_rigid=False)
+            if not faults:
+                six[:, i] = [values[name] for name in FIELDS]
+                continue
+            fault = min(faults, key=lambda fault: INPUTS.index(fault.path[0]) if fault.path[0] in INPUTS else -1)
+            reason: Reason = str(fault.path[0])[:80], fault.reason
+        else:
+            reason = None, "must be an object"
+        if len(reasons) < MAX_ERRORS:
+            reasons[i] = reason
+    return Columns(len(found), list(six), reasons, rows=True)
+
+
+# --- writing ------------------------------------------------------------------------------------------
+
+
+def dump(values: Any) -> bytes:
+    """Write JSON; numbers that are not finite become null."""
+    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def write(batch: Batch) -> Iterator[bytes]:
+    """An object of lists, piece by piece."""
+    size, parts = batch.columns.size, batch.parts
+    whole: dict[str, Any] = {part.path: np.empty(size, np.int8 if part.names else np.float64) for part in parts}
+    for start, found, source in batch.slices(_ROWS):
+        for path, column in whole.items():
+            column[start : start + source.size] = found[path]
+    kinds = {part.path: part for part in parts}
+    opening = b"{"
+    for name, inner in nested({path: path for path in whole}).items():
+        yield opening + dump(name) + b":"
+        if isinstance(inner, str):
+            yield from _list_text(kinds[inner], whole[inner])
+        else:
+            opening = b"{"
+            for key, path in inner.items():
+                yield opening + dump(key) + b":"
+                yield from _list_text(kinds[path], whole[path])
+                opening = b","
+            yield b"}"
+        opening = b","
+    yield b"," + dump(batch.end)[1:]
+
+
+def _list_text(part: Any, column: Any) -> Iterator[bytes]:
+    # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
+    texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)]) if part.names else None
+    yield b"["
+    for start in range(0, column.size, _CELLS):
+        piece = column[start : start + _CELLS]
+        if texts is not None:
+            text = texts.take(piece).tobytes().translate(None, b"\0")[:-1]
+        else:
+            text = dump(piece if part.kind is float else part.values(piece))[1:-1]
+        yield b"," + text if start else text
+    yield b"]"
+
+
+def write_rows(batch: Batch) -> Iterator[bytes]:
+    """An object with the list of results, piece by piece."""
+    yield b'{"results":['
+    for start, found, source in batch.slices(_ROWS):
+        text = dump(objects(batch, found, source))[1:-1]
+        yield b"," + text if start else text
+    yield b"]," + dump(batch.end)[1:]
+
+
+def objects(batch: Batch, found: Mapping[str, Any], source: Any) -> list[Any]:
+    """Answers as objects; None for a bad case."""
+    bad = np.flatnonzero(source < 0).tolist()
+    if bad:
+        source = source.copy()
+        source[bad] = 0  # has a name; the whole object is dropped below
+        found = {**found, **{part.path: source for part in batch.parts if part.names}}
+    paths = [part.path for part in batch.parts]
+    made: list[Any] = [
+        dict(zip(paths, row, strict=True))
+        for row in zip(*(part.values(found[part.path]) for part in batch.parts), strict=True)
+    ]
+    if batch.include:
+        made = [nested(row) for row in made]
+    for i in bad:
+        made[i] = None
+    return made
+
+
+def _write_like(batch: Batch) -> Iterator[bytes]:
+    return write_rows(batch) if batch.columns.rows else write(batch)
+
+
+def _refs(*names: str) -> list[dict[str, Any]]:
+    return [{"$ref": f"#/components/schemas/{name}"} for name in names]
+
+
+_LIST = {"type": "array", "items": _refs("Case")[0]}
+FORMS = (
+    Form(
+        "application/json",
+        (),
+        read,
+        _write_like,
+        body={"schema": {"oneOf": [*_refs("CaseColumns"), _LIST]}, "example": {**example, "v0": [0.01, 0.1]}},
+        answer={"schema": {"oneOf": _refs("ColumnsAnswer", "RowsAnswer")}},
+    ),
+    Form(
+        "application/x-ndjson",
+        ("application/ndjson", "application/jsonl", "application/x-jsonlines"),
+        read,
+        _write_like,
+        body={
+            "schema": {"anyOf": [*_refs("CaseColumns", "Case"), _LIST], "description": "One of these per line"},
+            "example": {**example, "v0": [0.01, 0.1]},
+        },
+        answer={
+            "schema": {
+                "anyOf": _refs("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem"),
+                "description": "One of these per line, in the order of the lines",
+            }
+        },
+        streams=True,
+    ),
+)
