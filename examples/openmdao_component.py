@@ -1,5 +1,4 @@
 """Friction as a component of an OpenMDAO model, with exact partial derivatives; least_power.py uses it.
-
 A value out of bounds raises AnalysisError, so that a line search steps back.
 """
 
@@ -42,8 +41,8 @@ class Friction(om.ExplicitComponent):
         found, force, omega = self.answer(inputs)
         outputs["mu_macro"] = found.mu_macro
         if self.options["power"]:
-            unit = force * found.length_scale * omega
-            outputs["oscillation_power"] = unit * self.table.power(found.v_tilde, found.y_tilde)
+            share = self.table.power(found.v_tilde, found.y_tilde)
+            outputs["oscillation_power"] = force * found.length_scale * omega * share
 
     def compute_partials(self, inputs, partials):
         found, force, omega = self.answer(inputs, gradient=True)
