@@ -362,6 +362,6 @@ def test_a_head_of_csv_may_have_any_unit_of_its_column(client, case):
     )
     answer = client.post(PATH, content=text, headers={"Content-Type": "text/csv"}).text.splitlines()[1]
     expected = client.post("/v1/mu-macro", json=case).json()["mu_macro"]
-    assert float(answer.split(",")[0]) == pytest.approx(expected, rel=1e-13, abs=0.0)
+    assert float(answer.split(",")[0]) == close(expected, rel=1e-13)
     wrong = client.post(PATH, content="k [N/s]\r\n1\r\n", headers={"Content-Type": "text/csv"})
     assert "unit that k cannot have" in wrong.text
