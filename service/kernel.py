@@ -3,7 +3,6 @@
 Routes, formats and quantities also import names of inputs, units, bounds and codes from here.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
