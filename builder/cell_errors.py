@@ -24,10 +24,8 @@ __all__ = ["cell_errors", "finer"]
 Array = NDArray[np.float64]
 POINTS = 17  # along either side of a cell: a polynomial of that degree is what an error of T_8 to T_16 is
 _AT = -np.cos(np.arange(POINTS) * math.pi / (POINTS - 1))
-_TO_DERIVATIVE: Array = np.asarray(
-    chebyshev.chebvander(_AT, POINTS - 2) @ chebyshev.chebder(np.linalg.inv(chebyshev.chebvander(_AT, POINTS - 1))),
-    dtype=np.float64,
-)
+_TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_AT, POINTS - 1))
+_TO_DERIVATIVE = chebyshev.chebvander(_AT, POINTS - 2) @ chebyshev.chebder(_TO_COEFFICIENTS)
 
 
 def finer(shape: tuple[int, int]) -> tuple[int, int]:

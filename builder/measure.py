@@ -51,8 +51,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Ar
 def fast_from(s: Surrogate, y: Array) -> Array:
     """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
     crit = s.v_tilde_crit(y)
-    found: Array = np.where(y <= charts.Y_TAIL, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y))
-    return found
+    out: Array = np.where(y <= charts.Y_TAIL, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y))
+    return out
 
 
 SEAMS = (charts.Y_STICK_LO, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL)

@@ -211,9 +211,9 @@ def _fill(root: Any, table: Table) -> None:
         axes = (chart.a.name, chart.b.name)
         _put(group, axes[0], block.a, charts.COORDINATES[axes[0]])
         _put(group, axes[1], block.b, charts.COORDINATES[axes[1]])
-        for quantity in table.held(chart):
-            meaning = chart.quantity if quantity.name == "mu_ratio" else f"{quantity.meaning}, scaled for this block"
-            _put(group, quantity.variable, block.nodes[quantity.name], meaning, axes)
+        for about in table.held(chart):
+            meaning = chart.quantity if about.name == "mu_ratio" else f"{about.meaning}, scaled for this block"
+            _put(group, about.variable, block.nodes[about.name], meaning, axes)
         # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
         group.setncatts({
             **_geometry(chart), "cells": np.array(block.cells, dtype=np.int32),

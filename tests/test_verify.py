@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from builder.measure import SEAMS, block_errors, fast_from
+from builder.quantities import SOLVED, solver_noise
 from builder.sweep import Sweep
 from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, uncovered, verify
 from comparing import close
@@ -50,6 +51,15 @@ def test_drawn_points_are_legal_and_repeatable(sound: Surrogate, case: str) -> N
     assert np.array_equal(v, again[0])
     assert np.array_equal(y, again[1])
     assert not np.array_equal(v, draw(case, 500, sound, seed=2)[0])
+
+
+def test_the_builder_knows_every_quantity_of_the_kernel(sweep: Sweep) -> None:
+    assert tuple(SOLVED) == QUANTITY_NAMES
+    solved = sweep.solve("full", np.array([0.1, 2.0]), np.array([0.5, 0.5]))
+    for name, about in SOLVED.items():
+        noise = solver_noise(name, np.array([0.1, 2.0]), np.array([0.5, 0.5]), solved, np.array([False, True]))
+        assert np.all((noise > 0.0) & (noise < 1e-14))
+        assert not about.complement or np.all(np.abs(solved[about.complement] + solved[name] - 1.0) <= 3e-16)
 
 
 def test_unknown_case_is_refused_with_the_known_ones(sound: Surrogate) -> None:
