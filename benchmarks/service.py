@@ -35,7 +35,7 @@ PAGE = ROOT / "docs" / "service.md"
 TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 BATCH = "/v1/mu-macro/batch"
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
-ROUNDS, REQUESTS, CLIENTS = 7, 1600, 16
+ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
 KINDS = {
     "columns": "application/json", "rows": "application/json", "lines": "application/x-ndjson", "csv": "text/csv",
     "arrow": "application/vnd.apache.arrow.stream",

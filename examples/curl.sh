@@ -15,6 +15,3 @@ ask "$base/v1/solve-for" --json '{"unknown": "y0", "target": 0.15, "mu0": 0.3, "
 
 echo "The friction law as a table:"
 ask "$base/v1/law.csv?along=v0&start=1e-4&stop=10&points=6&mu0=0.3&Fz=10&k=1e6&y0=2e-6&omega=1.3e5"
-
-echo "The same case by UM-Bridge:"
-ask "$base/Evaluate" --json '{"name": "mu_macro", "input": [[0.3, 10, 1e6, 2e-6, 1.3e5, 0.01]]}'

@@ -1,5 +1,7 @@
 """Uncertain inputs through UM-Bridge by QMCPy:  python examples/quasi_monte_carlo.py [ADDRESS]
 
+ADDRESS is that of a running `python examples/umbridge_server.py 4242`.
+
 All six inputs are known to a few percent, log-normally.  QMCPy's own UM-Bridge client takes the model, and its stopping
 rule asks for as many points as the wanted accuracy needs: for the mean, and for the mean of the square.
 """
@@ -11,7 +13,7 @@ import numpy as np
 import qmcpy as qp
 import umbridge
 
-BASE = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:8000"
+BASE = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:4242"
 MEAN = np.log10([0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01])  # mu0, Fz, k, y0, omega, v0
 SPREAD = np.log10([1.03, 1.02, 1.05, 1.05, 1.001, 1.02])  # one standard deviation: a factor
 TOLERANCE = 2e-5

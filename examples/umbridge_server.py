@@ -1,7 +1,8 @@
 """Serve mu_macro as a UM-Bridge model: ``python examples/umbridge_server.py PORT``; needs the package ``umbridge``.
 
-Inputs [[mu0, Fz, k, y0, omega, v0]] in SI units, output [[mu_macro]], with Gradient and ApplyJacobian.  The server of
-the package listens on every interface and has no key and no limits: use it in a trusted network only.
+Inputs [[mu0, Fz, k, y0, omega, v0]] in SI units, output [[mu_macro]], with Gradient and ApplyJacobian.  The model
+mu_macro_log10 takes the decimal logarithms of the inputs, for samplers.  The server of the package listens on every
+interface and has no key and no limits: use it in a trusted network only.
 """
 
 import math
@@ -15,11 +16,17 @@ FIELDS = ("mu0", "Fz", "k", "y0", "omega", "v0")
 
 
 class Friction(umbridge.Model):
-    """The model ``mu_macro``."""
+    """The model ``mu_macro``, or that of the logarithms."""
 
-    def __init__(self):
-        super().__init__("mu_macro")
+    def __init__(self, log10=False):
+        super().__init__("mu_macro_log10" if log10 else "mu_macro")
+        self.log10 = log10
         self.surrogate = Surrogate.open()
+
+    def case(self, parameters):
+        """The six inputs by name."""
+        values = [10.0**value for value in parameters[0]] if self.log10 else parameters[0]
+        return dict(zip(FIELDS, values, strict=True))
 
     def get_input_sizes(self, _config):
         """Six inputs in one block."""
@@ -43,12 +50,15 @@ class Friction(umbridge.Model):
 
     def __call__(self, parameters, _config):
         """mu_macro; an illegal value raises InputError, which names it."""
-        return [[self.surrogate.evaluate(dict(zip(FIELDS, parameters[0], strict=True))).mu_macro]]
+        return [[self.surrogate.evaluate(self.case(parameters)).mu_macro]]
 
     def gradient(self, _out, _inp, parameters, sens, _config):
         """The slopes times ``sens``; an infinite one (v0 = 0 at y~ = 1) is an error."""
-        answer = self.surrogate.evaluate(dict(zip(FIELDS, parameters[0], strict=True)), gradient=True)
-        slopes = [answer.gradient[name] * sens[0] for name in FIELDS]
+        case = self.case(parameters)
+        answer = self.surrogate.evaluate(case, gradient=True)
+        slopes = [
+            answer.gradient[name] * sens[0] * (math.log(10.0) * case[name] if self.log10 else 1.0) for name in FIELDS
+        ]
         if not all(map(math.isfinite, slopes)):
             raise ValueError("a slope is not finite at v0 = 0 and y~ = 1: choose another point")
         return slopes
@@ -60,4 +70,4 @@ class Friction(umbridge.Model):
 
 
 if __name__ == "__main__":
-    umbridge.serve_models([Friction()], int(sys.argv[1]))
+    umbridge.serve_models([Friction(), Friction(log10=True)], int(sys.argv[1]))

@@ -1,5 +1,7 @@
 """Uncertain inputs through UM-Bridge:  python examples/uncertainty.py [ADDRESS]
 
+ADDRESS is that of a running `python examples/umbridge_server.py 4242`.
+
 The amplitude, the normal force and the friction coefficient are known to a few percent.  512 Sobol points through the
 model, taken by its logarithms, against the first-order estimate from one gradient.
 """
@@ -11,7 +13,7 @@ import numpy as np
 import umbridge
 from scipy.stats import norm, qmc
 
-BASE = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:8000"
+BASE = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:4242"
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 MEAN = np.log10([0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01])
 SPREAD = np.log10([1.03, 1.02, 1.0, 1.05, 1.0, 1.0])  # one standard deviation: a factor

@@ -6,8 +6,10 @@ import io
 import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
+import time
 import urllib.request
 from xml.sax.saxutils import escape
 
@@ -21,7 +23,7 @@ pytestmark = pytest.mark.slow
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
-    "least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "c",
+    "least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py", "c",
 }  # fmt: skip
 
 
@@ -64,8 +66,7 @@ def test_curl(repository, live_server, surrogate):
     text = run(repository, "sh", "examples/curl.sh", live_server.url)
     expected = surrogate.evaluate(**CASE).mu_macro
     assert number(r'^\{"mu_macro":([0-9.e-]+)', text.split("\n", 1)[1]) == expected
-    assert number(r'"output": \[\[([0-9.e-]+)\]\]', text) == expected
-    assert number(r'"roots":\[\{"value":([0-9.e-]+)', text) == close(2.857e-6, rel=1e-3)
+    "least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py", "c",
     rows = [line for line in text.splitlines() if line.endswith(("_low", "corner"))]
     assert [float(row.split(",")[0]) for row in rows] == [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0]
 
@@ -172,9 +173,34 @@ def test_octave(repository, live_server, surrogate):
     assert 0.02 < number(r"steepest near ([\d.]+) m/s", text) < 0.04
 
 
-def test_uncertainty(repository, live_server, surrogate):
+@pytest.fixture(scope="module")
+def bridge(repository):
+    """The address of the example server for UM-Bridge."""
+    need(None, "umbridge")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    process = subprocess.Popen([sys.executable, "examples/umbridge_server.py", str(port)], cwd=repository,
+                               env={**os.environ, "PYTHONPATH": str(repository)})  # fmt: skip
+    try:
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", port), timeout=1).close()
+                break
+            except OSError:
+                assert process.poll() is None
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        process.terminate()
+        process.wait(timeout=30)
+
+
+def test_uncertainty(repository, bridge, surrogate):
     need(None, "umbridge", "scipy")
-    text = run(repository, sys.executable, "examples/uncertainty.py", live_server.url)
+    text = run(repository, sys.executable, "examples/uncertainty.py", bridge)
     sampled = number(r"points: mean [\d.]+, standard deviation ([\d.]+)", text)
     first_order = number(r"first order: standard deviation ([\d.]+)", text)
     gradient = surrogate.evaluate(**CASE, gradient=True).gradient
@@ -184,9 +210,9 @@ def test_uncertainty(repository, live_server, surrogate):
     assert sampled == close(first_order, rel=0.02)
 
 
-def test_quasi_monte_carlo(repository, live_server, surrogate):
+def test_quasi_monte_carlo(repository, bridge, surrogate):
     need(None, "qmcpy", "umbridge")
-    text = run(repository, sys.executable, "examples/quasi_monte_carlo.py", live_server.url)
+    text = run(repository, sys.executable, "examples/quasi_monte_carlo.py", bridge)
     # the same inputs by plain sampling of the table itself
     mean = np.log10(list(CASE.values()))
     spread = np.log10([1.03, 1.02, 1.05, 1.05, 1.001, 1.02])
