@@ -223,7 +223,13 @@ def batches() -> str:
                 speeds.append(0.1 / (own.busy() - before))
             waits = [longest(own, kind, body, 5)]
             waits.append(longest(own, kind, body_of(form, 1_000_000), 1) if form != "csv" else math.nan)
-            rows.append((form, f"{statistics.median(speeds):.2g}", *(f"{1e3 * wait:.0f}" for wait in waits)))
+            rows.append(
+                (
+                    form,
+                    f"{statistics.median(speeds):.2g}",
+                    *("-" if math.isnan(wait) else f"{1e3 * wait:.0f}" for wait in waits),
+                )
+            )
     head = ("as", "million cases per processor second", "longest wait [ms]", "beside a million cases [ms]")
     return markdown(head, rows)
 

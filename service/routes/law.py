@@ -183,8 +183,7 @@ class _More(BaseModel):
     mu_static: list[float] = Field(description="Static limit (v0 -> 0) of each case [-]")
     border: list[BorderMark] = Field(description="Up to two points inside the range")
     approximations: dict[str, list[float | None]] | None = Field(
-        None,
-        description=f"Only if requested [-]; null: outside the range of the formula. {_listed(APPROXIMATIONS)}",
+        None, description=f"Only if requested [-]; null: outside the range of the formula. {_listed(APPROXIMATIONS)}"
     )
     border_speeds: dict[str, list[float | None]] | None = Field(
         None,
