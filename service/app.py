@@ -10,17 +10,18 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
-from starlette.datastructures import State
+from fastapi import FastAPI
+from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
-from starlette.responses import RedirectResponse
-from starlette.routing import BaseRoute, Mount, Route, Router
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .limits import Keys, Work
 from .observe import Metrics, Observe
 from .openapi import describe
-from .routes import Routes, batch, case, docs, health, law, nothing_here, page, solve_for, table
+from .problems import problem_of
+from .routes import Routes, batch, case, docs, health, law, page, solve_for, table
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 from .wire.json import dump
@@ -46,8 +47,15 @@ async def _lifespan(app: Any) -> AsyncIterator[dict[str, Any]]:
     app.state.work.close()
 
 
-class Application:
-    """The whole service as an ASGI application.
+async def _problem(request: Request, error: Exception) -> Response:
+    return problem_of(error, request.scope)
+
+
+class Application(FastAPI):
+    """The whole service.
+
+    The endpoints are plain functions behind one route: FastAPI's solving of dependencies takes longer than an answer
+    (docs/decisions/0011-wire.md).
 
     Attributes
     ----------
@@ -56,38 +64,36 @@ class Application:
     """
 
     def __init__(self, settings: Settings) -> None:
+        super().__init__(
+            openapi_url=None, docs_url=None, redoc_url=None, lifespan=_lifespan,
+            exception_handlers={HTTPException: _problem},
+        )  # fmt: skip
         keys = Keys(settings.keys())
-        state = self.state = State()
+        state = self.state
         state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
         state.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
         state.openapi = dump(self.openapi())
-        others: list[BaseRoute] = []
         if settings.guide is not None:
-            others.append(Route("/guide", lambda _: RedirectResponse("guide/")))
-            others.append(Mount("/guide", StaticFiles(directory=settings.guide, html=True)))
-        self.router = Router(others, redirect_slashes=False, default=nothing_here, lifespan=_lifespan)
+            self.add_route("/guide", lambda _: RedirectResponse("guide/"))
+            self.mount("/guide", StaticFiles(directory=settings.guide, html=True))
+        self.mount("", Routes(ENDPOINTS))
         # The pages are the same for everyone and hold no number.  They ask for the key and send it with every request.
         opened = frozenset(endpoint.path for endpoint in ENDPOINTS if endpoint.open)
-        app: ASGIApp = Observe(
-            Routes(ENDPOINTS, self.router), state.metrics, keys, opened, guide=settings.guide is not None
+        self.add_middleware(
+            Observe, metrics=state.metrics, keys=keys, open_paths=opened, guide=settings.guide is not None
         )
         if settings.cors_origins:
-            app = CORSMiddleware(
-                app, allow_origins=list(settings.cors_origins), allow_methods=["GET", "HEAD", "POST"],
+            self.add_middleware(
+                CORSMiddleware,
+                allow_origins=list(settings.cors_origins), allow_methods=["GET", "HEAD", "POST"],
                 allow_headers=["Content-Type", "X-API-Key", "Authorization", "If-None-Match", "X-Request-ID"],
                 expose_headers=["ETag", "X-Request-ID", "Retry-After"],
             )  # fmt: skip
-        self._app = app
 
     def openapi(self) -> dict[str, Any]:
         """The description of the interface."""
         settings: Settings = self.state.settings
         return describe(ENDPOINTS, settings.root_path, bool(settings.keys()))
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, start or stop."""
-        scope["app"] = self
-        await self._app(scope, receive, send)
 
 
 def create_app(settings: Settings | None = None) -> Application:

@@ -15,7 +15,6 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
-from starlette.routing import Router
 from starlette.types import Message, Receive, Scope, Send
 
 from mumacro.inputs import NAMES as INPUTS
@@ -27,7 +26,7 @@ from ..tables import Tables
 from ..wire.json import decode
 
 __all__ = [
-    "JSON", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "nothing_here", "path_of", "reply",
+    "JSON", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "path_of", "reply",
     "tables_of", "work_of",
 ]  # fmt: skip
 
@@ -78,12 +77,11 @@ class Endpoint:
 class Routes:
     """The application inside the middleware: finds the endpoint of a path and a method, and answers.
 
-    Paths have no parameters, so a look-up finds them.  ``others`` gets the paths that are no endpoint, such as /guide.
+    Paths have no parameters, so a look-up finds them.
     """
 
-    def __init__(self, endpoints: Iterable[Endpoint], others: Router) -> None:
+    def __init__(self, endpoints: Iterable[Endpoint]) -> None:
         self._found: dict[str, dict[str, Endpoint]] = {}
-        self._others = others
         for endpoint in endpoints:
             methods = self._found.setdefault(endpoint.path, {})
             methods[endpoint.method] = endpoint
@@ -91,11 +89,10 @@ class Routes:
                 methods["HEAD"] = endpoint
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or pass on what is none."""
+        """Answer a request."""
         methods = self._found.get(path_of(scope)) if scope["type"] == "http" else None
         if methods is None:
-            await self._others(scope, receive, send)
-            return
+            raise HTTPException(404, "There is nothing at this path.")
         endpoint = methods.get(scope["method"])
         if endpoint is None:
             allowed = ", ".join(sorted(methods))
@@ -103,11 +100,6 @@ class Routes:
             raise HTTPException(405, detail, headers={"Allow": allowed})
         response = await endpoint.answer(Request(scope, receive, send))
         await response(scope, receive, send)
-
-
-async def nothing_here(_scope: Scope, _receive: Receive, _send: Send) -> None:
-    """Answer 404."""
-    raise HTTPException(404, "There is nothing at this path.")
 
 
 def path_of(scope: Scope) -> str:
