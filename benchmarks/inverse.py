@@ -106,7 +106,6 @@ def main() -> None:
     parser.add_argument("--write", action="store_true")
     chosen = parser.parse_args()
     surrogate = Surrogate.open(chosen.table, threads=1)
-    surrogate.warm_up()
     found, note = rows(surrogate, chosen.rounds, COUNTS[:2] if chosen.quick else COUNTS)
     header = [
         "unknown", "targets", "solve_for [ms]", "bits [ms]", "times", "brentq [ms]", "times", "scipy newton [ms]",

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from validation import orbit
 
 from builder.blocks import tabulated
-from builder.steady import border, solve, solve_raw, workspace
+from builder.steady import REGIME, STICK_SLIP, border, solve, solve_raw, workspace
 from builder.sweep import Sweep
 from mumacro import Surrogate, closed_forms
 from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
@@ -248,7 +248,7 @@ def settle() -> str:
         found = settling(s, mu0=1.0, Fz=1.0, k=1.0, y0=y, omega=1.0, v0=v)
         w, out, orbit_, res = workspace()
         solve_raw(v, y, y - 1.0, w, out, orbit_, res)
-        sticks = res[2] == 1.0
+        sticks = res[REGIME] == STICK_SLIP
         turned = "1"
         if sticks:
             moved = y * (math.cos(orbit_[4] + orbit_[0]) - math.cos(orbit_[4]))

@@ -242,7 +242,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     Parameters
     ----------
     v, y : float
-        Dimensionless speed and amplitude [-], in :data:`.limits.V_RANGE` and :data:`.limits.Y_RANGE`.
+        Dimensionless speed and amplitude [-], in ``builder.limits.V_RANGE`` and ``builder.limits.Y_RANGE``.
     eta : float, optional
         y~ - 1 [-], to be given where it is known better than ``y`` in double precision.
 
@@ -274,7 +274,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
 
 
 def border(y: float) -> tuple[float, float]:
-    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in :data:`.limits.Y_RANGE`.
+    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in ``builder.limits.Y_RANGE``.
 
     Raises
     ------

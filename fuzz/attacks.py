@@ -206,11 +206,12 @@ def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float,
 
 def attacks(share: float) -> str:
     """All of them."""
-    rows = []
+    rows, started = [], time.perf_counter()
     for attack in ATTACKS:
         memory, wait = tried(attack, share)
         rows.append((str(attack.__doc__).rstrip("."), f"{memory:.0f}", f"{1e3 * wait:.0f}"))
-    return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
+    table = markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
+    return f"{table}\n\n{reporting.took(started)}"
 
 
 SECTIONS = {"attacks": attacks}

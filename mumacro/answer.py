@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -12,7 +12,12 @@ from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 __all__ = ["Answer", "AnswerWithGradient"]
 
 #: float for one case; an array of float64 for many, or what holds labels in its place
-Number = TypeVar("Number")
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Number = TypeVar("Number", default=Any)
+else:
+    Number = TypeVar("Number")
 
 # by code; the last entry is that of -1, an illegal case
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)

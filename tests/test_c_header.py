@@ -58,7 +58,8 @@ WebAssembly.instantiate(fs.readFileSync("mumacro.wasm")).then(({ instance: { exp
 OTHER = '#include "mumacro.h"\ndouble elsewhere(double v, double y) { return mumacro_mu_ratio(v, y); }\n'
 OTHER_DECLARED = OTHER.replace("double else", "double elsewhere(double v, double y);\ndouble else", 1)
 #: instruction levels of the library by the number of doubles that go together, and one double at a time
-LANES = {1: ["-DMUMACRO_ONE_LANE"], 2: [], 4: ["-mavx2", "-mfma"], 8: ["-march=x86-64-v4"]}
+AVX2 = ["-mavx2", "-mfma"]
+LANES = {1: ["-DMUMACRO_ONE_LANE"], 2: [], 4: AVX2, 8: [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl"]}
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
 LANGUAGES = {
     "gcc": "-std=c99", "clang": "-std=c99", "zig cc": "-std=c99", "g++": "-std=c++17", "clang++": "-std=c++17"

@@ -220,11 +220,11 @@ assert np.all(found.error_bound[legal] >= 0.0)
 for i in range(0, 50_000, 25):
     case = [float(c[i]) for c in columns]
     one = s.evaluate_case(*case)
-    assert one[2] == found.source_code[i]
+    assert one[3] == found.source_code[i]
     try:
         answer = s.evaluate(dict(zip(names, case)), gradient=True)
     except InputError:
-        assert one[2] == -1
+        assert one[3] == -1
     else:
         assert (answer.mu_macro, answer.error_bound) == (found.mu_macro[i], found.error_bound[i])
         for name in names:

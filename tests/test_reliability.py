@@ -94,7 +94,8 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
     assert len(images) > 30
     found = [tables.outcome(image, Path(f"{start}.nc")) for start, image in images.items()]
     assert {one.what for one in found} <= {tables.REFUSED, tables.SAME}, found
-    assert sum(one.what == tables.REFUSED for one in found) > 0.7 * len(found)
+    # the rest is in room that HDF5 leaves empty
+    assert sum(one.what == tables.REFUSED for one in found) > 0.6 * len(found)
 
 
 # --- answers ------------------------------------------------------------------------------------------
