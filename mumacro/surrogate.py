@@ -25,7 +25,8 @@ __all__ = ["Surrogate"]
 
 Array = NDArray[np.float64]
 _KERNEL = kernels[-1]
-_RATIO = _KERNEL.ratio
+_ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the bits are the same
+_RATIO = _ONE.ratio
 _CODES = {name: code for code, name in enumerate(charts.QUANTITY_NAMES)}
 #: types of one real number, which take the short way
 _NUMBERS = frozenset((float, int, bool, np.bool_, *(np.dtype(kind).type for kind in "efdbhilqBHILQ")))
@@ -432,7 +433,7 @@ class Surrogate:
 
         An illegal case gives NaN and -1.
         """
-        mu_macro, mu_ratio, bound, _, _, _, source = _KERNEL.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
+        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
         return mu_macro, mu_ratio, bound, int(source)
 
     def evaluate_columns(
@@ -454,7 +455,7 @@ class Surrogate:
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
         """The answer to one case; None where it is illegal."""
         try:
-            found = _KERNEL.one(self._data, six, 19 if gradient else 7)
+            found = _ONE.one(self._data, six, 19 if gradient else 7)
         except OverflowError:  # a whole number beyond double range
             return None
         if found[6] < 0.0:
