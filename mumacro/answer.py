@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     Number = TypeVar("Number", default=Any)
 else:
+    from typing import TypeVar
+
     Number = TypeVar("Number")
 
 # by code; the last entry is that of -1, an illegal case
