@@ -639,7 +639,10 @@ def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
 
 def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
     """Both broadcast together, flat and contiguous, and their shape."""
-    v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
+    if type(v_tilde) is np.ndarray is type(y_tilde) and v_tilde.dtype == y_tilde.dtype == _FLOAT:
+        v, y = v_tilde, y_tilde
+    else:
+        v, y = real("v_tilde", v_tilde), real("y_tilde", y_tilde)
     try:
         shape = _common_shape((v, y))
     except ValueError as error:
