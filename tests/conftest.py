@@ -6,6 +6,7 @@ import importlib
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -31,7 +32,7 @@ if TYPE_CHECKING:  # tests of the library need neither the service nor its depen
 
     from service.app import Application
 
-START_S = 180  # a first start compiles the kernels
+START_S = 180
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
@@ -114,7 +115,7 @@ def live_server(
     with log.open("wb") as sink:
         process = subprocess.Popen(command, cwd=repository, env=variables, stdout=sink, stderr=subprocess.STDOUT)
     try:
-        deadline = time.monotonic() + 180  # a first start compiles the kernels
+        deadline = time.monotonic() + START_S
         while (found := re.search(r"running on (http://[^ ]+:\d+) ", log.read_text("utf-8"))) is None:
             assert process.poll() is None, log.read_text("utf-8")
             assert time.monotonic() < deadline, log.read_text("utf-8")
@@ -137,6 +138,31 @@ def wait_until_ready(url: str) -> None:
             if time.monotonic() > deadline:
                 raise
             time.sleep(0.05)
+
+
+@pytest.fixture(scope="session")
+def bridge(repository: Path) -> Iterator[str]:
+    """The address of the example server for UM-Bridge."""
+    pytest.importorskip("umbridge", reason="the PyPI package umbridge is not installed")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    process = subprocess.Popen([sys.executable, "examples/umbridge_server.py", str(port)], cwd=repository,
+                               env={**os.environ, "PYTHONPATH": str(repository)}, stdout=-3, stderr=-3)  # fmt: skip
+    try:
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", port), timeout=1).close()
+                break
+            except OSError:
+                assert process.poll() is None
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        process.terminate()
+        process.wait(timeout=30)
 
 
 class Server:

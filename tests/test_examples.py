@@ -6,10 +6,8 @@ import io
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
-import time
 import urllib.request
 from xml.sax.saxutils import escape
 
@@ -171,31 +169,6 @@ def test_octave(repository, live_server, surrogate):
     assert number(r"from ([\d.]+) at 0.0001 m/s", text) == close(low, abs=1e-6)
     assert number(r"to ([\d.]+) at 10 m/s", text) == close(high, abs=1e-6)
     assert 0.02 < number(r"steepest near ([\d.]+) m/s", text) < 0.04
-
-
-@pytest.fixture(scope="module")
-def bridge(repository):
-    """The address of the example server for UM-Bridge."""
-    need(None, "umbridge")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    process = subprocess.Popen([sys.executable, "examples/umbridge_server.py", str(port)], cwd=repository,
-                               env={**os.environ, "PYTHONPATH": str(repository)})  # fmt: skip
-    try:
-        deadline = time.monotonic() + 60
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", port), timeout=1).close()
-                break
-            except OSError:
-                assert process.poll() is None
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
-        yield f"http://127.0.0.1:{port}"
-    finally:
-        process.terminate()
-        process.wait(timeout=30)
 
 
 def test_uncertainty(repository, bridge, surrogate):

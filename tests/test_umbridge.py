@@ -1,10 +1,5 @@
 """The example server for UM-Bridge, asked by the client of the package."""
 
-import socket
-import subprocess
-import sys
-import time
-
 import pytest
 
 from comparing import close
@@ -17,26 +12,8 @@ POINT = [0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]
 
 
 @pytest.fixture(scope="module")
-def model(repository):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "examples/umbridge_server.py", str(port)]
-    process = subprocess.Popen(command, cwd=repository, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
-    try:
-        deadline = time.monotonic() + 60
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", port), timeout=1).close()
-                break
-            except OSError:
-                assert process.poll() is None
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
-        yield umbridge.HTTPModel(f"http://127.0.0.1:{port}", "mu_macro")
-    finally:
-        process.terminate()
-        process.wait(timeout=30)
+def model(bridge):
+    return umbridge.HTTPModel(bridge, "mu_macro")
 
 
 def test_values_and_slopes_are_those_of_the_library(model):
