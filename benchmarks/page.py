@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PICTURE = ROOT / "docs" / "img" / "page.png"
 SHOWN = "#approximations=1&family=y0&curves=1e-6;3e-6&mu0.std=0.01&y0.std=1e-7"
 SIZES = {1440: 900, 1024: 768, 390: 844}
-READY_S = 300.0  # a first start compiles the kernels
+READY_S = 300.0
 
 
 @contextmanager

@@ -9,12 +9,8 @@ y~ in the range of the table; and a share of inputs at the ends of the double ra
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,12 +24,12 @@ from builder.sweep import Sweep
 from builder.verify import _both_sides
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
+from mumacro.library import kernels
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
 N = 1_000_000  # cases for each property in the full run
 ENDS = np.array([5e-324, 2.2250738585072014e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300, 1.7976931348623157e308])
-CPU = "x86-64-v2"  # without AVX, AVX-512 and fused multiply-add
 
 
 def any_bits(rng: np.random.Generator, n: int) -> Array:
@@ -259,27 +255,14 @@ def promises(share: float) -> str:
 # --- another processor --------------------------------------------------------------------------------
 
 
-def dump(path: str, n: str, tolerance: str) -> None:
-    """Answers to the drawn cases, written for another process."""
-    a = Surrogate.open(float(tolerance)).evaluate_columns(*draw(int(n), 99).values())
-    np.save(path, np.stack(a))
-
-
 def across_processors(n: int, tolerance: float) -> tuple[Array, Array]:
-    """(mu_macro, mu~, bound, source) of n drawn cases, rows (4, n), here and compiled for a basic processor."""
+    """(mu_macro, mu~, bound, source) of n drawn cases, rows (4, n): best kernel of this processor, and basic one."""
+    table, columns = Surrogate.open(tolerance), list(draw(n, 99).values())
     found = []
-    with tempfile.TemporaryDirectory() as folder:
-        for name in ("", CPU):
-            environment = {
-                **os.environ,
-                "PYTHONPATH": str(reporting.ROOT),
-                # a processor name without a feature list gets the features of this machine
-                **({"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} if name else {}),
-            }
-            path = Path(folder) / f"{name}.npy"
-            command = [sys.executable, __file__, "dump", str(path), str(n), str(tolerance)]
-            subprocess.run(command, env=environment, check=True, timeout=1800)
-            found.append(np.load(path))
+    for kernel in (kernels[-1], kernels[0]):
+        rows, source = np.empty((3, n)), np.empty(n, np.int8)
+        kernel.cases(table._data, n, columns, rows, source)
+        found.append(np.vstack([rows, source]))
     return found[0], found[1]
 
 
@@ -307,7 +290,4 @@ def processors(share: float) -> str:
 SECTIONS = {"promises": promises, "processors": processors}
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["dump"]:
-        dump(*sys.argv[2:])
-    else:
-        reporting.report(__doc__ or "", SECTIONS)
+    reporting.report(__doc__ or "", SECTIONS)

@@ -221,47 +221,9 @@ def killed_eval(folder: Path, n: int = 400_000, kills: int = 10) -> str:
     return f"killed {kills} times each; then the same command gives the same bytes; CSV, Parquet"
 
 
-# --- kernel cache, home, clock ------------------------------------------------------------------------
+# --- home, clock --------------------------------------------------------------------------------------
 
 ASK = ("-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01", "--json", "--table", "1e-4")
-
-
-def damaged_kernels(folder: Path) -> str:
-    kernels = folder / "kernels"
-    sound = run(*ASK, NUMBA_CACHE_DIR=str(kernels))
-    files = sorted(kernels.rglob("*.kernel"))
-    assert files
-    for i, path in enumerate(files):
-        whole = path.read_bytes()
-        damaged = (b"", whole[: len(whole) // 2], whole[:-1], whole[:40] + bytes([whole[40] ^ 4]) + whole[41:])
-        path.write_bytes(damaged[i % len(damaged)])
-    assert run(*ASK, NUMBA_CACHE_DIR=str(kernels)) == sound
-    sizes = {path: path.stat().st_size for path in files}
-    assert all(sizes.values())
-    stamps = {path: path.stat().st_mtime_ns for path in files}
-    assert run(*ASK, NUMBA_CACHE_DIR=str(kernels)) == sound
-    assert stamps == {path: path.stat().st_mtime_ns for path in files}  # replaced: nothing was compiled again
-    return f"{len(files)} files empty, cut or with a flipped bit: the same answer; the files are replaced"
-
-
-def kernels_written_by_several(folder: Path, processes: int = 4) -> str:
-    variables = {**os.environ, "PYTHONPATH": str(reporting.ROOT), "NUMBA_CACHE_DIR": str(folder / "kernels")}
-    started = [
-        subprocess.Popen([sys.executable, *ASK], cwd=reporting.ROOT, env=variables, stdout=-1, stderr=-3)
-        for _ in range(processes)
-    ]
-    said = {process.communicate(timeout=1800)[0] for process in started}
-    assert len(said) == 1, said
-    assert not [name for name in left(folder) if not name.endswith(".kernel")], left(folder)
-    return f"{processes} processes with one empty folder: the same answer from all, complete files"
-
-
-def kernels_that_cannot_be_kept(folder: Path) -> str:
-    kernels = closed(folder)
-    sound = run(*ASK)
-    assert run(*ASK, nobody=True, NUMBA_CACHE_DIR=str(kernels)) == sound
-    assert left(kernels) == []
-    return "the same answer, compiled for this process"
 
 
 def no_home(folder: Path) -> str:
@@ -270,12 +232,12 @@ def no_home(folder: Path) -> str:
     (folder / "tmp").mkdir(mode=0o777)
     (folder / "tmp").chmod(0o777)
     closed(folder)
-    variables = dict.fromkeys(("HOME", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME"), "")
+    variables = dict.fromkeys(("HOME", "XDG_CACHE_HOME"), "")
     for home in ("", "/nonexistent"):
         said = run(*ASK, nobody=True, **{**variables, "HOME": home, "TMPDIR": str(folder / "tmp")})
         assert said == run(*ASK)
     assert left(folder / "tmp") == []
-    return "the same answer; no kernel in a folder of temporary files"
+    return "the same answer; no file in a folder of temporary files"
 
 
 def clock_steps(folder: Path) -> str:
@@ -305,9 +267,6 @@ FAULTS: dict[str, Callable[..., str]] = {
     "no permission to write eval's output": lost_permission_in_eval,
     "two builds to one output": two_builds_to_one_output,
     "SIGKILL of eval": killed_eval,
-    "damaged kernel cache": damaged_kernels,
-    "kernel cache written by several processes": kernels_written_by_several,
-    "kernel cache that cannot be written": kernels_that_cannot_be_kept,
     "no home, and an unwritable one": no_home,
     "a clock that steps": clock_steps,
 }

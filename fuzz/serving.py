@@ -23,7 +23,7 @@ import reporting
 
 __all__ = ["CASE", "FAULT", "Caller", "Question", "Reply", "Server", "open_files", "questions", "serving"]
 
-START_S = 180.0  # a first start compiles the kernels
+START_S = 180.0
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 FAULT = (OSError, EOFError, asyncio.IncompleteReadError, ValueError)  # connection ended, or response not valid
 
