@@ -11,7 +11,6 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.writers.html5 import HTML5Translator
 
-
 # What docutils leaves to be said: the index of an accented letter stands at its side, not below as that of a sum, and a
 # thin space follows the name of a function.
 REPAIRS = [
