@@ -72,7 +72,7 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate) -> 
         seen.add(column)
         low, high = (1e-4, 1.0) if r"\le 1" in given else (1.0, 1e8) if r"\ge 1" in given else (1e-4, 1e8)
         for told in errors.split("; "):
-            inner = re.search(r"(up to|from) \$\\tilde y = ([\d.]+)\$", told)
+            inner = re.search(r"(up to|from) \$\\tilde\{y\} = ([\d.]+)\$", told)
             ends = low, high
             if inner is not None:
                 ends = (low, float(inner[2])) if inner[1] == "up to" else (float(inner[2]), high)
@@ -85,7 +85,7 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate) -> 
 
 def test_the_folds_along_k_are_those_on_the_page(surrogate) -> None:
     page = (DOCS / "http.md").read_text("utf-8")
-    pattern = r"above ([\d.]+) it has a minimum \(\$\\tilde y\$ from ([\d.]+) to ([\d.]+)\)"
+    pattern = r"above ([\d.]+) it has a minimum \(\$\\tilde\{y\}\$ from ([\d.]+) to ([\d.]+)\)"
     born, first, last = map(float, re.findall(pattern, page)[0])
     y = np.geomspace(2.0, 20.0, 4001)
 

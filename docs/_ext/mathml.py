@@ -14,7 +14,7 @@ from sphinx.writers.html5 import HTML5Translator
 # What docutils leaves to be said: the index of an accented letter stands at its side, not below as that of a sum, and a
 # thin space follows the name of a function.
 REPAIRS = [
-    (re.compile(r"(\\(?:tilde|hat|bar) \w)(?=[_^])"), r"\1{}"),
+    (re.compile(r"(\\tilde(?: \w|\{\w\}|\\\w+))(?=[_^])"), r"\1{}"),
     (re.compile(r"(\\(?:sin|cos|tan|ln|arccos|exp))(?= ?\\| [a-zA-Z])"), r"\1\,"),
 ]
 
