@@ -191,7 +191,7 @@ class Surrogate:
             if mu == mu:
                 return mu
         v, y, shape = _points(v_tilde, y_tilde)
-        found = batch.ratios(self._data, v, y, self.threads)
+        found = batch.alone(charts.MU, self._data, v, y, self.threads)
         if not shape and math.isnan(found[0]):
             _refuse_illegal(-1, v, y, "finite and >= 0")
         return _shaped(found, shape)
@@ -307,6 +307,12 @@ class Surrogate:
             if quantity not in self.table.quantities:
                 raise TableError(self.path, f"holds no {quantity}: build it anew, python -m builder build")
             self._data.put(code, *quantity_cells(self.table.blocks, code))
+        return self._data
+
+    def prepared(self) -> Data:
+        """What the kernel reads, with the cells of every quantity."""
+        for name in self.table.quantities:
+            self._with(name)
         return self._data
 
     def quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
