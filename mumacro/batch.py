@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mumacro.library import Data, kernels
 
-__all__ = ["alone", "cases", "share_out", "slopes", "values"]
+__all__ = ["alone", "cases", "derivatives", "share_out", "slopes", "values"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -62,6 +62,11 @@ def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array
     rows = np.empty((5, v.size))
     share_out(v.size, threads, lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start))
     return rows
+
+
+def derivatives(quantity: int, data: Data, v: Array, y: Array, order: int) -> Array:
+    """First or second derivatives along v~ and y~ at (n,) points, (2, n) or (3, n), on the calling thread."""
+    return (_KERNEL.partials if order == 1 else _KERNEL.bends)(data, quantity, v, y)
 
 
 def cases(data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int) -> tuple[Array, Codes]:

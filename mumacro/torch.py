@@ -11,7 +11,7 @@ from mumacro.charts import QUANTITY_NAMES
 from mumacro.extras import missing
 from mumacro.inputs import FIELDS
 from mumacro.interop.derivatives import NO_THIRD, DifferentiableFriction, slopes_by_groups
-from mumacro.library import Data, kernels
+from mumacro.library import Data
 from mumacro.surrogate import Surrogate
 
 try:
@@ -80,9 +80,7 @@ def _evaluated(table: int, code: int, order: int, arrays: list[Any]) -> Iterable
     v, y = arrays
     if order == 0:
         return [batch.alone(code, data, v, y, surrogate.threads)]
-    kernel = kernels[-1]
-    found: Iterable[Any] = (kernel.partials if order == 1 else kernel.bends)(data, code, v, y)
-    return found
+    return batch.derivatives(code, data, v, y, order)
 
 
 def _operator(name: str, inputs: int, results: int, order: int, rule: Callable[..., Any]) -> Any:

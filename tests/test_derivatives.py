@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import MumacroError, Surrogate
+from mumacro import InputError, MumacroError, Surrogate
 from mumacro.inputs import FIELDS
-from mumacro.library import kernels
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 QUANTITIES = ("mu_ratio", "power", "stick_fraction")
@@ -35,12 +34,12 @@ def table() -> Surrogate:
 
 def partials(table: Surrogate, name: str, v: Any, y: Any) -> Any:
     """d/dv~ and d/dy~ of a quantity, (2, n)."""
-    return kernels[-1].partials(table.prepared(), QUANTITIES.index(name), np.array(v, float), np.array(y, float))
+    return np.array(table.derivatives(np.asarray(v), np.asarray(y), name))
 
 
 def bends(table: Surrogate, name: str, v: Any, y: Any) -> Any:
     """d2/dv~2, d2/dv~ dy~, d2/dy~2 of a quantity, (3, n)."""
-    return kernels[-1].bends(table.prepared(), QUANTITIES.index(name), np.array(v, float), np.array(y, float))
+    return np.array(table.derivatives(np.asarray(v), np.asarray(y), name, 2))
 
 
 # --- first and second derivatives of the table, for all libraries --------------------------------------
@@ -87,6 +86,13 @@ def test_second_derivatives_are_those_of_the_finest_table(name: str, tolerance: 
     assert clear.mean() > 0.8
     assert np.all(np.isfinite(found))
     assert np.abs((found - truth) / largest)[:, clear].max() < most
+
+
+def test_a_quantity_or_an_order_that_is_not_there_is_refused(table: Surrogate) -> None:
+    with pytest.raises(InputError, match="of must be one of mu_ratio"):
+        table.derivatives(0.1, 0.5, "heat")
+    with pytest.raises(InputError, match="order must be 1 or 2"):
+        table.derivatives(0.1, 0.5, order=3)
 
 
 def test_second_derivatives_at_the_ends(table: Surrogate) -> None:
