@@ -108,6 +108,7 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
         for level, flags in levels(platform).items()
     }
     objects["dispatch.o"] = [f"{sources / 'dispatch.c'}", *(f"-DMUMACRO_HAS_{x.upper()}" for x in levels(platform))]
+    objects["xla.o"] = [f"{sources / 'xla.c'}", f"-I{ROOT / 'third_party'}", "-std=c11"]
     with tempfile.TemporaryDirectory(dir=folder) as place:
         run_together([[*command, *FLAGS, *words, "-c", "-o", made] for made, words in objects.items()], place)
         run_together([[*command, *FLAGS, "-shared", *objects, "-o", name, *libraries]], place)

@@ -7,7 +7,6 @@ import openmdao.api as om
 
 from mumacro import InputError, Surrogate
 from mumacro.inputs import FIELDS, UNITS
-from mumacro.interop.derivatives import quantities
 
 
 class Friction(om.ExplicitComponent):
@@ -50,7 +49,7 @@ class Friction(om.ExplicitComponent):
             partials["mu_macro", name] = slope
         if self.options["power"]:
             p, along_v, along_y = self.table.slopes(found.v_tilde, found.y_tilde, "power")
-            by_speed, by_amplitude = quantities(self.table)["power"].slopes(found.v_tilde, found.y_tilde)
+            by_speed, by_amplitude = self.table.derivatives(found.v_tilde, found.y_tilde, "power")
             unit, by_force = force * found.length_scale, 2.0 * p - along_v - along_y
             for name in ("mu0", "Fz"):
                 partials["oscillation_power", name] = omega * unit * by_force / inputs[name]

@@ -12,10 +12,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro.charts import MU
 from mumacro.library import Data, kernels
 
-__all__ = ["cases", "ratios", "share_out", "slopes", "values"]
+__all__ = ["alone", "cases", "derivatives", "share_out", "slopes", "values"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -51,11 +50,11 @@ def values(quantity: int, data: Data, v: Array, y: Array, threads: int) -> tuple
     return value, bound, source
 
 
-def ratios(data: Data, v: Array, y: Array, threads: int) -> Array:
-    """mu~ alone at (n,) points; NaN where illegal."""
-    mu = np.empty(v.size)
-    share_out(v.size, threads, lambda part: _KERNEL.values(data, MU, v[part], y[part], mu[part], None, None))
-    return mu
+def alone(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
+    """A quantity at (n,) points without its bound; NaN where illegal."""
+    value = np.empty(v.size)
+    share_out(v.size, threads, lambda part: _KERNEL.values(data, quantity, v[part], y[part], value[part], None, None))
+    return value
 
 
 def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array:
@@ -63,6 +62,11 @@ def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array
     rows = np.empty((5, v.size))
     share_out(v.size, threads, lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start))
     return rows
+
+
+def derivatives(quantity: int, data: Data, v: Array, y: Array, order: int) -> Array:
+    """First or second derivatives along v~ and y~ at (n,) points, (2, n) or (3, n), on the calling thread."""
+    return (_KERNEL.partials if order == 1 else _KERNEL.bends)(data, quantity, v, y)
 
 
 def cases(data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int) -> tuple[Array, Codes]:

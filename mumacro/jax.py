@@ -1,15 +1,18 @@
-"""Friction inside JAX programs: values by callback, first derivatives from the table.  Needs the extra ``jax``."""
+"""Friction inside JAX programs: the compiled kernel, called by XLA itself.  Needs the extra ``jax``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
+from mumacro.charts import QUANTITY_NAMES
 from mumacro.errors import MumacroError
 from mumacro.extras import missing
-from mumacro.interop.derivatives import NO_SECOND, DifferentiableFriction, Quantity
+from mumacro.interop.derivatives import NO_THIRD, DifferentiableFriction, slopes_by_groups
+from mumacro.library import Data, open_for_xla, xla_handler
+from mumacro.surrogate import Surrogate
 
 try:
     import jax
@@ -19,25 +22,30 @@ except ModuleNotFoundError as error:
 
 __all__ = ["Friction"]
 
+_OPENED: dict[int, Data] = {}  # compiled programs may outlive every Friction
+_OPENING = Lock()
+
 
 class Friction(DifferentiableFriction):
-    """The table's quantities as JAX functions: ``jit``, ``vmap``, ``grad``, ``jvp``, ``jacfwd`` and ``jacrev`` work.
+    """The table's quantities as JAX functions: ``jit``, ``vmap``, ``grad``, ``jvp``, ``hessian``, ``scan`` work.
 
     Parameters
     ----------
     surrogate : Surrogate, optional
         The table; left out, the tightest one that comes with the library.
 
-    Notes
-    -----
-    Arguments broadcast together; results are float64 of the broadcast shape, NaN where a case is illegal.  The table
-    is read on the host, also from a program on another device.  Second derivatives raise NotImplementedError.  Where a
-    slope is infinite (v0 = 0 at y~ = 1, and for rigid contact), ``jacfwd`` gives NaN along every input.
-
     Raises
     ------
     MumacroError
         When a function is called while JAX has no double precision.
+
+    Notes
+    -----
+    Arguments broadcast together; results are float64 of the broadcast shape, NaN where a case is illegal.  Programs run
+    on the CPU.  First derivatives are those of the table.  Second ones are differences of them: right to 1e-5 of the
+    largest one with the tables 1e-12 and 1e-10, to 1e-2 with 1e-7; NaN at v~ = 0, and for mu_macro where v~ or y~ is
+    zero or infinite.  Third ones raise NotImplementedError.  Where a slope is infinite (v0 = 0 at y~ = 1, and for rigid
+    contact), ``jacfwd`` gives NaN along every input.
 
     Examples
     --------
@@ -50,41 +58,72 @@ class Friction(DifferentiableFriction):
     1.325086
     """
 
-    def _made(self, quantity: Quantity) -> Any:
-        return _differentiable(quantity)
+    def __init__(self, surrogate: Surrogate | None = None) -> None:
+        table = _opened(Surrogate.open() if surrogate is None else surrogate)
+        slopes = [_slopes_of_plane(table, code) for code in range(len(QUANTITY_NAMES))]
+        self._known = {name: _value(table, code, slopes[code]) for code, name in enumerate(QUANTITY_NAMES)}
+        self._known["mu_macro"] = _value(table, 0, _slopes_of_six(table, self._known["mu_ratio"], slopes[0]))
 
-    def _call(self, quantity: Any, *arguments: Any) -> Any:
+    def _call(self, quantity: str, *arguments: Any) -> Any:
         if not jax.config.jax_enable_x64:
             raise MumacroError('mumacro.jax needs double precision: jax.config.update("jax_enable_x64", True)')
-        return quantity(*jnp.broadcast_arrays(*(jnp.asarray(x, jnp.float64) for x in arguments)))
+        return self._known[quantity](*jnp.broadcast_arrays(*(jnp.asarray(x, jnp.float64) for x in arguments)))
 
 
-def _differentiable(quantity: Quantity) -> Any:
-    """``quantity`` as a JAX function with a rule for its derivative."""
+def _opened(surrogate: Surrogate) -> int:
+    """The number by which compiled programs find the table: it comes from the table's checksum."""
+    table = int(surrogate.checksum[:15], 16)
+    with _OPENING:
+        if table not in _OPENED:
+            if not _OPENED:
+                handler = jax.ffi.pycapsule(xla_handler())
+                jax.ffi.register_ffi_target("mumacro", handler, platform="cpu")
+            _OPENED[table] = open_for_xla(table, surrogate.prepared())
+    return table
 
-    def ask(function: Callable[..., Any], trailing: tuple[int, ...], arguments: tuple[Any, ...]) -> Any:
-        def on_the_host(*given: Any) -> Any:
-            found = function(*(np.asarray(x) for x in given))
-            return np.moveaxis(found, 0, -1) if trailing else found  # axes of vmap come first, slopes last
 
-        shape = jax.ShapeDtypeStruct((*jnp.shape(arguments[0]), *trailing), jnp.float64)
-        return jax.pure_callback(on_the_host, shape, *arguments, vmap_method="broadcast_all")
+def _ask(table: int, code: int, order: int, results: int, arguments: tuple[Any, ...]) -> Any:
+    shape = jax.ShapeDtypeStruct(jnp.shape(arguments[0]), jnp.float64)
+    call = jax.ffi.ffi_call("mumacro", [shape] * results, vmap_method="broadcast_all")
+    return call(*arguments, order=np.int64(order), quantity=np.int64(code), table=np.int64(table))
 
-    def no_second(*_: Any) -> Any:
-        raise NotImplementedError(NO_SECOND)
 
-    slopes = jax.custom_jvp(lambda *arguments: ask(quantity.slopes, (len(quantity.inputs),), arguments))
-    slopes.defjvp(no_second)
-    value = jax.custom_jvp(lambda *arguments: ask(quantity.value, (), arguments))
+def _along(slopes: Any, tangents: Any) -> Any:
+    """The derivative along tangents; an infinite slope times a zero tangent is zero."""
+    zero = jax.custom_derivatives.SymbolicZero
+    return sum(slope * tangent for slope, tangent in zip(slopes, tangents, strict=True) if type(tangent) is not zero)
 
-    def rule(primals: Any, tangents: Any) -> Any:
-        gradient = slopes(*primals)
-        moved = [
-            gradient[..., i] * tangent
-            for i, tangent in enumerate(tangents)
-            if type(tangent) is not jax.custom_derivatives.SymbolicZero  # infinite slope times zero tangent is zero
-        ]
-        return value(*primals), sum(moved)
 
-    value.defjvp(rule, symbolic_zeros=True)
+def _value(table: int, code: int, slopes: Any) -> Any:
+    value = jax.custom_jvp(lambda *arguments: _ask(table, code, 0, 1, arguments)[0])
+    value.defjvp(lambda at, moved: (value(*at), _along(slopes(*at), moved)), symbolic_zeros=True)
     return value
+
+
+def _slopes_of_plane(table: int, code: int) -> Any:
+    """d/dv~ and d/dy~ of a quantity, with their derivatives."""
+
+    def no_third(*_: Any) -> Any:
+        raise NotImplementedError(NO_THIRD)
+
+    def rule(at: Any, moved: Any) -> Any:
+        vv, vy, yy = bends(*at)
+        return slopes(*at), [_along((vv, vy), moved), _along((vy, yy), moved)]
+
+    bends = jax.custom_jvp(lambda *point: _ask(table, code, 2, 3, point))
+    bends.defjvp(no_third)
+    slopes = jax.custom_jvp(lambda *point: _ask(table, code, 1, 2, point))
+    slopes.defjvp(rule, symbolic_zeros=True)
+    return slopes
+
+
+def _slopes_of_six(table: int, ratio: Any, slopes_of_ratio: Any) -> Any:
+    """d mu_macro / d input, with their derivatives by the chain rule."""
+
+    def rule(at: Any, moved: Any) -> Any:
+        _, bent = jax.jvp(lambda *six: slopes_by_groups(ratio, slopes_of_ratio, six), at, moved)
+        return slopes(*at), list(bent)
+
+    slopes = jax.custom_jvp(lambda *six: _ask(table, 0, 1, 6, six))
+    slopes.defjvp(rule)
+    return slopes

@@ -16,7 +16,7 @@ import numpy as np
 from cffi import FFI
 from numpy.typing import NDArray
 
-__all__ = ["BLOCK_COLUMNS", "PIECE_COLUMNS", "Data", "Kernel", "kernels"]
+__all__ = ["BLOCK_COLUMNS", "PIECE_COLUMNS", "Data", "Kernel", "kernels", "open_for_xla", "xla_handler"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -24,7 +24,7 @@ Codes = NDArray[np.int8]
 BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
 _HERE = Path(__file__).resolve().parent
-_SHARED = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
+_SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel.so")
 _DECLARED = "".join((_HERE / "kernel" / name).read_text("ascii") for name in ("data.h", "records.h", "library.h"))
 _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
@@ -143,6 +143,18 @@ class Kernel:
         found: list[float] = _FFI.unpack(out, numbers)
         return found
 
+    def partials(self, data: Data, quantity: int, v: Array, y: Array) -> Array:
+        """d/dv~ and d/dy~ of a quantity at points (n,), one-sided at v~ = 0: (2, n)."""
+        out = np.empty((2, v.size))
+        self._found.partials(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1])))
+        return out
+
+    def bends(self, data: Data, quantity: int, v: Array, y: Array) -> Array:
+        """d2/dv~2, d2/dv~ dy~, d2/dy~2 of a quantity at points (n,), NaN at v~ = 0: (3, n)."""
+        out = np.empty((3, v.size))
+        self._found.bends(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1], out[2])))
+        return out
+
     def border(self, data: Data, y: Array) -> Array:
         """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
         out = np.empty(y.size)
@@ -190,17 +202,31 @@ class Kernel:
         return out
 
 
-def _open() -> list[Kernel]:
+def _shared() -> Any:
     try:
-        shared: Any = _FFI.dlopen(str(_SHARED))
+        return _FFI.dlopen(str(_SHARED_OBJECT))
     except OSError as error:
         raise ImportError(
-            f"mumacro: the compiled kernel {_SHARED.name} is missing or does not fit this machine ({error}): "
+            f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing or does not fit this machine ({error}): "
             "install a wheel for this platform, or build one with a C compiler or the package ziglang: pip install ."
         ) from None
-    found = (shared.mumacro_kernel_at(level) for level in range(3))
-    return [Kernel(one) for one in found if one != _NOTHING]
 
 
+_LIBRARY = _shared()
 #: the kernels that this processor can run, the best one last
-kernels = _open()
+kernels = [Kernel(one) for one in map(_LIBRARY.mumacro_kernel_at, range(3)) if one != _NOTHING]
+
+
+def open_for_xla(table: int, data: Data) -> Data:
+    """Let compiled programs of JAX find a table by a number; ``data`` must live as long as the process.
+
+    Raises RuntimeError beyond 64 tables.
+    """
+    if _LIBRARY.mumacro_xla_open(table, data.pointer):
+        raise RuntimeError("mumacro.jax: more than 64 tables are open in this process")
+    return data
+
+
+def xla_handler() -> int:
+    """The address of the handler that compiled programs of JAX call."""
+    return int(_FFI.cast("intptr_t", _LIBRARY.mumacro_xla_handler()))

@@ -21,7 +21,8 @@ pytestmark = pytest.mark.slow
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
-    "least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py", "c",
+    "least_power.py", "casadi_least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py",
+    "c",
 }  # fmt: skip
 
 
@@ -54,6 +55,13 @@ def test_every_example_is_listed_and_tested(repository):
     assert there == EXAMPLES
     readme = (repository / "examples" / "README.md").read_text("utf-8")
     assert all(f"`{name}" in readme for name in EXAMPLES - {"README.md"})
+
+
+def test_casadi_finds_the_least_power_that_openmdao_finds(repository):
+    need("cc", "casadi")
+    out = run(repository, sys.executable, repository / "examples" / "casadi_least_power.py")
+    assert number(r"y0 = (\S+) um", out) == close(3.6842, rel=1e-4)
+    assert number(r"power (\S+) mW", out) == close(47.085, rel=1e-4)
 
 
 def test_curl(repository, live_server, surrogate):

@@ -129,7 +129,8 @@ def test_a_platform_without_a_wheel_is_refused_by_name(repository):
 @pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
 def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository, tmp_path):
     checkout = tmp_path / "checkout"
-    shutil.copytree(repository / "mumacro" / "kernel", checkout / "mumacro" / "kernel")
+    for folder in ("mumacro/kernel", "third_party"):
+        shutil.copytree(repository / folder, checkout / folder)
     for name in ("hatch_build.py", "pyproject.toml"):
         shutil.copy(repository / name, checkout)
     assert _build(checkout).returncode == 0

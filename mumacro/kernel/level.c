@@ -1,5 +1,6 @@
 /* The shared object's functions for one instruction level; compiled once for each. */
 #include "kernel.c"
+#include "derivatives.c"
 #include "library.h"
 
 static void mu_borders(const mumacro_data *data, int64_t n, const double *y, double *crit) {
@@ -70,5 +71,6 @@ static const mumacro_atlas MU_ATLAS = {
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio_alone, mu_one,
+    mu_partials, mu_bends,
     mu_borders, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares, mu_roots, mu_outers,
 };

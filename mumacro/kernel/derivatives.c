@@ -1,0 +1,81 @@
+/* Derivatives along v~ and y~ themselves, for automatic differentiation.
+ *
+ * First ones: the slopes along ln v~ and ln y~ over v~ and y~, one-sided at v~ = 0.  Second ones: differences of those
+ * slopes over steps of MU_STEP in the logarithms, of fourth order, all on one side of the border. */
+
+#define MU_STEP 2e-3
+
+static void mu_partials(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
+                        double *along_v, double *along_y) {
+    for (int64_t i = 0; i < n; i += MU_CHUNK) {
+        const int few = mu_few(n - i);
+        double rows[5][MU_CHUNK];
+        mu_slopes_of_points(data, quantity, few, v + i, y + i, rows[0], MU_CHUNK);
+        for (int j = 0; j < few; ++j) {
+            const double speed = v[i + j], amplitude = y[i + j], by_v = rows[1][j], by_y = rows[2][j];
+            const int rest = speed == 0.0 && by_v == by_v;
+            along_v[i + j] = rest ? MU_QUANTITY[quantity].from_rest(data, amplitude) : by_v / speed;
+            along_y[i + j] = amplitude == 0.0 ? 0.0 * by_y : by_y / amplitude; /* even in y~ */
+        }
+    }
+}
+
+/* Slopes along ln v~ and ln y~ where both are moved by so many steps. */
+static void mu_slopes_beside(const mumacro_data *data, int quantity, double v, double y, double step_v, double step_y,
+                             double *slopes) {
+    const mu_slopes at = mu_slopes_at(data, quantity, v * (1.0 + step_v), y * (1.0 + step_y));
+    slopes[0] = at.along_v;
+    slopes[1] = at.along_y;
+}
+
+/* Derivatives of both slopes along one logarithm: central, or towards `side` where the border is near. */
+static void mu_bend(const mumacro_data *data, int quantity, double v, double y, double step_v, double step_y, int side,
+                    double *out) {
+    static const double central[5] = {1.0 / 12.0, -2.0 / 3.0, 0.0, 2.0 / 3.0, -1.0 / 12.0};
+    static const double forward[5] = {-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -0.25};
+    const double step = step_v + step_y, sign = side ? (double)side : 1.0;
+    out[0] = out[1] = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        const double weight = (side ? sign * forward[i] : central[i]) / step;
+        const double at = side ? sign * i : i - 2;
+        double slopes[2];
+        if (weight == 0.0) continue;
+        mu_slopes_beside(data, quantity, v, y, expm1(at * step_v), expm1(at * step_y), slopes);
+        out[0] += weight * slopes[0];
+        out[1] += weight * slopes[1];
+    }
+}
+
+/* The direction of a step that stays on this side of the border; 0 where both do. */
+static int mu_free_side(const mumacro_data *data, double v, double y, double step_v, double step_y) {
+    const int here = v < mu_border_at(data, y);
+    const int up = here == (v * exp(2.0 * step_v) < mu_border_at(data, y * exp(2.0 * step_y)));
+    const int down = here == (v * exp(-2.0 * step_v) < mu_border_at(data, y * exp(-2.0 * step_y)));
+    return up && down ? 0 : up ? 1 : -1;
+}
+
+/* d2/dv~2, d2/dv~ dy~, d2/dy~2; NaN where v~ = 0, or a point is illegal or infinite. */
+static void mu_bends_at(const mumacro_data *data, int quantity, double v, double given, double *out) {
+    /* at y~ = 0 the limit y~ -> 0; next to the corner v~ -> 0, y~ = 1 all changes over |y~ - 1| + v~^(2/3) */
+    const double y = mu_max(given, 1e-6), scale = mu_min(1.0, fabs(y - 1.0) + cbrt(v * v)), step = MU_STEP * scale;
+    double along_v[2], along_y[2], here[2];
+    out[0] = out[1] = out[2] = NAN;
+    if (!(v > 0.0 && v < HUGE_VAL && given >= 0.0 && given < HUGE_VAL)) return;
+    mu_slopes_beside(data, quantity, v, y, 0.0, 0.0, here);
+    mu_bend(data, quantity, v, y, MU_STEP, 0.0, mu_free_side(data, v, y, MU_STEP, 0.0), along_v);
+    mu_bend(data, quantity, v, y, 0.0, step, mu_free_side(data, v, y, 0.0, step), along_y);
+    out[0] = given == 0.0 ? 0.0 : (along_v[0] - here[0]) / v / v;
+    out[1] = given == 0.0 ? 0.0 : along_v[1] / v / y;
+    out[2] = (along_y[1] - here[1]) / y / y;
+}
+
+static void mu_bends(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *vv,
+                     double *vy, double *yy) {
+    for (int64_t i = 0; i < n; ++i) {
+        double bends[3];
+        mu_bends_at(data, quantity, v[i], y[i], bends);
+        vv[i] = bends[0];
+        vy[i] = bends[1];
+        yy[i] = bends[2];
+    }
+}
