@@ -49,12 +49,6 @@ def test_designs_and_reductions() -> None:
     assert bool(enough.isel(found["place"]))
 
 
-def test_polars(expected: Any) -> None:
-    out = run("Polars", "polars", "pyarrow")["out"]
-    assert out["mu_macro"].to_list() == [*expected, None]
-    assert out["regime"].to_list() == ["stick_slip", "stick_slip", None]
-
-
 def test_duckdb(expected: Any) -> None:
     assert run("DuckDB", "duckdb", "pyarrow")["out"] == [(expected[0],), (expected[1],), (None,)]
 
@@ -72,4 +66,4 @@ def test_files_over_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, e
 
 def test_every_recipe_has_a_test() -> None:
     recipes = {line.removeprefix("### ") for line in PAGE.splitlines() if line.startswith("### ")}
-    assert recipes == {"Polars", "DuckDB", "Files over a cluster"}
+    assert recipes == {"DuckDB", "Files over a cluster"}
