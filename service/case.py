@@ -10,11 +10,13 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Annotated, Any, Literal, Self, TypeVar
+from types import NoneType
+from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
+from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
 from mumacro.inputs import (
@@ -409,11 +411,16 @@ CaseRequest: Any = create_model(
 
 def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
     """The model of a query with the same members as a body; ``std`` becomes std_mu0, std_Fz, ... unless ``changed``."""
-    fields: dict[str, Any] = {key: (info.annotation, info) for key, info in base.model_fields.items() if key != "std"}
+    fields: dict[str, Any] = {}
+    for key, info in base.model_fields.items():
+        kinds = get_args(info.annotation)
+        kind = Union[(*(kind for kind in kinds if kind is not NoneType), SkipJsonSchema[None])]  # noqa: UP007
+        fields[key] = (kind if NoneType in kinds else info.annotation, info)
+    fields.pop("std", None)
     if not changed:
         for key, (unit, _) in SI.items():
             kind = Hertz if key == "f" else NotNegative
-            fields[f"std_{key}"] = (kind | None, bounded("finite and >= 0", f"Standard deviation [{unit}]", None))
+            fields[f"std_{key}"] = (kind | SkipJsonSchema[None], bounded("finite and >= 0", f"Standard deviation [{unit}]", None))
     return create_model(name, __config__=_STRICT, **{**fields, **changed})
 
 

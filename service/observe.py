@@ -16,8 +16,8 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from contextlib import contextmanager, suppress
-from contextvars import ContextVar
 from datetime import UTC, datetime
 from typing import Any
 
@@ -44,8 +44,8 @@ _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and int
 _MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
 _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
 _WRITE_EVERY_S = 0.05
+_NO_SNIFF = (b"x-content-type-options", b"nosniff")
 
-request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 _access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
 
@@ -73,7 +73,9 @@ class JsonFormatter(logging.Formatter):
 class _Writer(logging.handlers.QueueListener):
     """Writes what is in the queue in one go, twenty times a second: no request wakes this thread."""
 
-    _lines: list[str]
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.lines: list[str] = []
 
     def dequeue(self, block: bool) -> logging.LogRecord:
         """The next record; before it waits for one, all lines are written."""
@@ -89,13 +91,13 @@ class _Writer(logging.handlers.QueueListener):
 
     def handle(self, record: logging.LogRecord) -> None:
         """Keep a line."""
-        self._lines.append(self.handlers[0].format(record))
+        self.lines.append(self.handlers[0].format(record))
 
     def flush(self) -> None:
         """Write the lines by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
-        if self._lines:
-            rest = memoryview(("\n".join(self._lines) + "\n").encode("utf-8", "backslashreplace"))
-            self._lines.clear()
+        if self.lines:
+            rest = memoryview(("\n".join(self.lines) + "\n").encode("utf-8", "backslashreplace"))
+            self.lines.clear()
             with suppress(OSError):  # the reader is gone
                 while rest:
                     rest = rest[os.write(1, rest) :]
@@ -113,16 +115,12 @@ class LogQueue(logging.handlers.QueueHandler):
         formatter = logging.NullHandler()
         formatter.setFormatter(JsonFormatter())
         self._writer = _Writer(self._records, formatter)
-        self._writer._lines = []
         self._writer.start()
         self._dropped = 0
         atexit.register(self._finish)
 
     def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
-        """The record as it is, with the id of its request: it stays in this process."""
-        current = request_id.get()
-        if current is not None:
-            record.fields = {"request_id": current, **getattr(record, "fields", {})}
+        """The record as it is: it stays in this process."""
         return record
 
     def enqueue(self, record: logging.LogRecord) -> None:
@@ -140,14 +138,24 @@ class LogQueue(logging.handlers.QueueHandler):
     def _finish(self) -> None:
         """Wait a second at most for the last lines."""
         until = time.monotonic() + 1.0
-        while (not self._records.empty() or self._writer._lines) and time.monotonic() < until:
+        while (not self._records.empty() or self._writer.lines) and time.monotonic() < until:
             time.sleep(0.01)
+
+
+class AccessRecord(logging.LogRecord):
+    """The record of a request.  It has no place in a source file: finding that takes longer than all the rest."""
+
+    def __init__(self, level: int, fields: dict[str, Any]) -> None:
+        own = {"levelno": level, "levelname": _LEVELS[level], "created": time.time(), "fields": fields}
+        self.__dict__ = {**_SAME, **own}
+
+
+_LEVELS = {logging.DEBUG: "DEBUG", logging.INFO: "INFO"}
+_SAME = vars(logging.LogRecord("mumacro.access", logging.INFO, "", 0, "request", None, None))
 
 
 def log_config(level: str) -> dict[str, Any]:
     """A ``logging.config.dictConfig`` for this process: everything to standard output, as JSON lines."""
-    # parts of a record that no line shows
-    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
     return {
         "version": 1,
         "disable_existing_loggers": False,
@@ -260,51 +268,45 @@ class Metrics:
 
 
 class Observe:
-    """Middleware: id, key, log line, counters, and problem details for every exception."""
+    """Middleware: id, key, log line, counters, and problem details for every exception.
 
-    def __init__(
-        self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: frozenset[str], guide: bool = False
-    ) -> None:
+    ``open_paths`` need no key; ``/guide`` among them opens all that is below it.
+    """
+
+    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: AbstractSet[str]) -> None:
         self.app = app
-        self._metrics, self._keys, self._open_paths, self._guide = metrics, keys, open_paths, guide
-        self._stem, self._numbers = os.urandom(8).hex().encode(), itertools.count(int.from_bytes(os.urandom(6)))
+        self._metrics, self._keys, self._open_paths = metrics, keys, open_paths
+        self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
         started = time.perf_counter()
         headers: dict[bytes, bytes] = dict(scope["headers"])
-        identity = headers.get(b"x-request-id", b"")
-        if not _ID.fullmatch(identity):
-            identity = b"%b%016x" % (self._stem, next(self._numbers))
-        shown = scope["request_id"] = identity.decode("ascii")
-        token = request_id.set(shown)
+        offered = headers.get(b"x-request-id", b"")
+        identity = offered.decode() if _ID.fullmatch(offered) else f"{self._stem}{next(self._numbers):016x}"
+        scope["request_id"] = identity
         path, status, holder = path_of(scope), 0, None
 
         async def send_marked(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [
-                    *message["headers"], (b"x-request-id", identity), (b"x-content-type-options", b"nosniff"),
-                ]  # fmt: skip
+                message["headers"] = [*message["headers"], (b"x-request-id", identity.encode()), _NO_SNIFF]
             await send(message)
 
         try:
-            if scope.get("state", {}).get("full") and path not in HEALTH_PATHS:
+            if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
                 raise OverloadedError("too many connections are open", headers=CLOSE)
             check_head(scope, headers)
-            guide = self._guide and (path == "/guide" or path.startswith("/guide/"))
-            if self._keys and path not in self._open_paths and not guide:
+            if self._keys and not self._is_open(path):
                 holder = self._keys.holder(headers)
             await self.app(scope, receive, send_marked)
         except ClientDisconnect:
             status = 499  # the usual status for a client that disconnected before the answer
         except Exception as error:
             if not isinstance(error, (MumacroError, HTTPException, MemoryError)):
-                _errors.exception("unexpected error", extra={"fields": {"path": scope["path"]}})
+                fields = {"request_id": identity, "path": scope["path"]}
+                _errors.exception("unexpected error", extra={"fields": fields})
             if status:  # the answer has begun: end the connection without its end
                 status = 499
                 raise ClientDisconnect from error
@@ -316,23 +318,16 @@ class Observe:
         finally:
             seconds = time.perf_counter() - started
             self._metrics.request(path, scope["method"], status, seconds)
-            self._log(scope, path, status, seconds, holder)
-            request_id.reset(token)
+            level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
+            if _access.isEnabledFor(level):
+                client = scope.get("client")
+                fields = {
+                    "request_id": identity, "method": scope["method"], "path": path, "status": status,
+                    "duration_ms": round(1e3 * seconds, 3), "client": client[0][:_MOST_SHOWN] if client else None,
+                }  # fmt: skip
+                if holder is not None:
+                    fields["key"] = holder
+                _access.handle(AccessRecord(level, fields))
 
-    def _log(self, scope: Scope, path: str, status: int, seconds: float, holder: str | None) -> None:
-        level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
-        if not _access.isEnabledFor(level):
-            return
-        client = scope.get("client")
-        fields = {
-            "method": scope["method"], "path": path, "status": status, "duration_ms": round(1e3 * seconds, 3),
-            "client": client[0][:_MOST_SHOWN] if client else None,
-        }  # fmt: skip
-        if holder is not None:
-            fields["key"] = holder
-        _access.handle(
-            logging.makeLogRecord({
-                "name": "mumacro.access", "levelno": level, "levelname": logging.getLevelName(level),
-                "msg": "request", "fields": fields,
-            })
-        )  # fmt: skip
+    def _is_open(self, path: str) -> bool:
+        return path in self._open_paths or (path.startswith("/guide/") and "/guide" in self._open_paths)

@@ -28,7 +28,7 @@ from ..problems import (
 )
 from ..wire import Batch, Form, forms
 from ..wire.json import decode, dump
-from . import Endpoint, given_in_query, tables_of
+from . import Endpoint, given_in_query
 
 __all__ = ["ENDPOINTS"]
 
@@ -98,7 +98,7 @@ class _Answer(Response):
         options, _, faults = options_of(Options, {**self._query, **given}, OPTIONS)
         if options is None:
             refuse(faults)
-        table = tables_of(self._request).pick(options.tolerance, "tolerance" in self._query)
+        table = self._state.tables.pick(options.tolerance, "tolerance" in self._query)
         count = self._state.metrics.cases
         return Batch(table, columns, options.names(), options.deviations(), count=count)
 
@@ -153,7 +153,7 @@ class _Answer(Response):
         if not more:
             text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
         options, _, _ = options_of(Options, self._query, OPTIONS)
-        tables_of(self._request).pick(options.tolerance if options else None, parameter=True)
+        self._state.tables.pick(options.tolerance if options else None, parameter=True)
         head = [(b"content-type", form.media_type.encode("ascii")), (b"x-accel-buffering", b"no")]
         await send({"type": "http.response.start", "status": 200, "headers": head})
         number = 0
@@ -204,7 +204,7 @@ class _Answer(Response):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
         self._only_once(given)
         options, case = read_form(Options, {**given, **self._query}, null_is_rigid=False)
-        table = tables_of(self._request).pick(options.tolerance)
+        table = self._state.tables.pick(options.tolerance)
         values, source = answer_case(table.surrogate, case, options.names(), options.deviations())
         self._state.metrics.case(table, source)
         return dump({**values, **table.signature})
@@ -248,7 +248,7 @@ def _packed(pieces: Iterator[bytes], packer: Any) -> Iterator[bytes]:
         yield b"".join(gathered)
 
 
-async def post_batch(request: Request) -> Response:
+async def post_mu_macro_batch(request: Request) -> Response:
     """Answer in the form of the request, order kept.  A bad case has the result null and an entry in ``errors``.
 
     A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
@@ -258,8 +258,8 @@ async def post_batch(request: Request) -> Response:
 
 ENDPOINTS = [
     Endpoint(
-        PATH, "POST", post_batch, "post_mu_macro_batch", "Macroscopic friction of many cases",
-        query=OptionsQuery, statuses=(400, 401, 408, 413, 415, 422, 503),
+        PATH, "POST", post_mu_macro_batch, "Macroscopic friction of many cases",
+        query=OptionsQuery,
         request={"required": True, "content": {form.media_type: form.body for form in forms().values()}},
         content={
             200: {

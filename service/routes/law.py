@@ -21,7 +21,7 @@ from ..problems import FieldFault, refuse
 from ..quantities import INCLUDES
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, given_in_query, reply, tables_of, work_of
+from . import Endpoint, given_in_body, given_in_query, reply
 from .solve_for import FIVE, FIVE_QUERY, Name, in_si, per_value
 
 __all__ = ["ENDPOINTS"]
@@ -79,8 +79,8 @@ def _read(given: Mapping[str, Any]) -> tuple[LawOptions, dict[str, float]]:
 async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
     form, case = _read(await given_in_body(request))
-    table = tables_of(request).pick(form.tolerance)
-    return await work_of(request).question(lambda: reply(dump(_answer(table, form, case)), request=request))
+    table = request.app.state.tables.pick(form.tolerance)
+    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case)), request=request))
 
 
 async def get_law_csv(request: Request) -> Response:
@@ -93,13 +93,13 @@ async def get_law_csv(request: Request) -> Response:
         refuse(
             [FieldFault.of("include", "must be approximations; POST /v1/law has the other quantities", form.names()[0])]
         )
-    table = tables_of(request).pick(form.tolerance)
+    table = request.app.state.tables.pick(form.tolerance)
     headers = {
         "Content-Disposition": f'attachment; filename="friction-law-{form.along}.csv"',
         "Cache-Control": "no-cache",
     }
     kind = "text/csv; charset=utf-8; header=present"
-    return await work_of(request).question(
+    return await request.app.state.work.question(
         lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind, request)
     )
 
@@ -221,12 +221,12 @@ class LawFamilyAnswer(_Swept):
 
 ENDPOINTS = [
     Endpoint(
-        "/v1/law", "POST", post_law, "post_law", "mu_macro over a range of one input",
-        body=LawRequest, model=LawAnswer | LawFamilyAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+        "/v1/law", "POST", post_law, "mu_macro over a range of one input",
+        body=LawRequest, model=LawAnswer | LawFamilyAnswer,
     ),
     Endpoint(
-        "/v1/law.csv", "GET", get_law_csv, "get_law_csv", "mu_macro over a range of one input, as a table",
-        query=LawQuery, statuses=(400, 401, 422, 503),
+        "/v1/law.csv", "GET", get_law_csv, "mu_macro over a range of one input, as a table",
+        query=LawQuery,
         content={200: {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}},
     ),
 ]  # fmt: skip

@@ -15,7 +15,7 @@ from ..case import INPUTS, NotNegative, Options, bounded, example, input_fields,
 from ..models import Answered, included
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, reply, tables_of, work_of
+from . import Endpoint, given_in_body, reply
 
 __all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "Name", "in_si", "per_value"]
 
@@ -53,8 +53,8 @@ async def post_solve_for(request: Request) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
     given = await given_in_body(request)
     form, case = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in INPUTS else [])
-    table = tables_of(request).pick(form.tolerance)
-    return await work_of(request).question(lambda: reply(dump(_answer(table, form, case)), request=request))
+    table = request.app.state.tables.pick(form.tolerance)
+    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case)), request=request))
 
 
 def in_si(name: str) -> str:
@@ -187,8 +187,8 @@ class SolveForAnswer(Answered):
 
 ENDPOINTS = [
     Endpoint(
-        "/v1/solve-for", "POST", post_solve_for, "post_solve_for",
+        "/v1/solve-for", "POST", post_solve_for,
         "The value of one input that gives a wanted mu_macro",
-        body=SolveForRequest, model=SolveForAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+        body=SolveForRequest, model=SolveForAnswer,
     )
 ]  # fmt: skip

@@ -14,7 +14,7 @@ from ..models import TableAnswer
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, file_answer, given_in_query, reply, tables_of
+from . import Endpoint, file_answer, given_in_query, reply
 
 __all__ = ["ENDPOINTS"]
 
@@ -42,7 +42,7 @@ def _chosen(request: Request) -> LoadedTable:
         choice = TableChoice.model_validate(given)
     except ValidationError as error:
         refuse(faults_of(error, TableChoice, TableChoice.model_fields))
-    tables = tables_of(request)
+    tables = request.app.state.tables
     return tables.pick(choice.tolerance) if choice.id is None else tables.named(choice.id)
 
 
@@ -60,7 +60,7 @@ async def get_table(request: Request) -> Response:
         "max_rel_error": surrogate.max_rel_error,
         "attributes": surrogate.attributes,
         "blocks": surrogate.blocks,
-        "loaded": [other.label for other in tables_of(request).loaded],
+        "loaded": [other.label for other in request.app.state.tables.loaded],
         "service_version": __version__,
         **table.signature,
     }
@@ -82,12 +82,12 @@ async def get_table_file(request: Request) -> Response:
 _FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
 ENDPOINTS = [
     Endpoint(
-        "/v1/table", "GET", get_table, "get_table", "Properties of a table",
-        query=TableChoice, model=TableAnswer, statuses=(400, 401, 422, 503), tag="table",
+        "/v1/table", "GET", get_table, "Properties of a table",
+        query=TableChoice, model=TableAnswer, tag="table",
     ),
     Endpoint(
-        "/v1/table.nc", "GET", get_table_file, "get_table_file", "The table as a netCDF-4 file",
-        query=TableChoice, statuses=(400, 401, 416, 422, 503), tag="table",
+        "/v1/table.nc", "GET", get_table_file, "The table as a netCDF-4 file",
+        query=TableChoice, statuses=(416,), tag="table",
         content={
             200: {"description": "The file", "content": _FILE},
             206: {"description": "The part of it that Range requests", "content": _FILE},
