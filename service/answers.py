@@ -19,6 +19,7 @@ from mumacro.inputs import FIELDS
 __all__ = [
     "DEFAULT", "QUANTITIES", "REGIME_NAMES", "SOURCES", "Cases", "Part", "Quantity", "answer_case",
     "answer_columns", "cost_of", "nested", "parts_of", "register",
+    "where",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ class Part:
 
 @dataclass
 class Cases:
-    """Legal cases that quantities are computed for: arrays (n,), k = inf is rigid contact.
+    """Legal cases that quantities are computed for: arrays (n,), or numbers of numpy for one; k = inf is rigid contact.
 
     The groups are those of the library; the slopes, by name of the input, are there if a requested quantity needs them.
     """
@@ -75,24 +76,24 @@ class Cases:
 
     def __post_init__(self) -> None:
         answer = self.answer
-        one = [answer.mu_macro, answer.error_bound, answer.v_tilde, answer.y_tilde, answer.length_scale]
-        self.mu_macro, self.error_bound, self.v_tilde, self.y_tilde, self.length_scale = (
-            np.array([x]) if isinstance(x, float) else x for x in one
-        )
-        self.at_rest: NDArray[np.bool_] = (self.columns["y0"] == 0.0) | (self.columns["omega"] == 0.0)
+        found = [answer.mu_macro, answer.error_bound, answer.v_tilde, answer.y_tilde, answer.length_scale]
+        if isinstance(found[0], float):
+            found = list(map(np.float64, found))
+        self.mu_macro, self.error_bound, self.v_tilde, self.y_tilde, self.length_scale = found
+        self.at_rest: Any = (self.columns["y0"] == 0.0) | (self.columns["omega"] == 0.0)
         #: elastic, oscillating, with groups within double range
-        self.usable: NDArray[np.bool_] = np.isfinite(self.y_tilde) & ~self.at_rest
+        self.usable: Any = np.isfinite(self.y_tilde) & ~self.at_rest
 
     def slopes(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """d mu_macro / d input and the bounds, NaN along k where contact is rigid."""
-        rigid = np.isinf(self.columns["k"])
-        slopes, bounds = (
-            {name: np.atleast_1d(slope) for name, slope in found.items()}
-            for found in (self.answer.gradient, self.answer.gradient_bound)
-        )
-        for found in (slopes, bounds):
-            found["k"] = np.where(rigid, np.nan, found["k"])
-        return slopes, bounds
+        no_slope = where(np.isinf(self.columns["k"]), np.nan, 0.0)
+        slopes, bounds = self.answer.gradient, self.answer.gradient_bound
+        return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}
+
+
+def where(condition: Any, one: Any, other: Any) -> Any:
+    """``np.where``, which takes a microsecond for a single number."""
+    return np.where(condition, one, other) if isinstance(condition, np.ndarray) else one if condition else other
 
 
 @dataclass(frozen=True)
@@ -176,9 +177,9 @@ def answer_case(
     values = dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[source], bound, SOURCES[source]), strict=True))
     if include and source >= 0:
         answer = surrogate.evaluate(**case, gradient=_need_slopes(include))
-        cases = Cases(surrogate, {name: np.array([case[name]]) for name in FIELDS}, answer, std or {})
+        cases = Cases(surrogate, {name: np.float64(case[name]) for name in FIELDS}, answer, std or {})
         for part, column in zip(parts_of(include)[len(values) :], _computed(cases, include), strict=True):
-            values[part.path] = part.value(column.item())
+            values[part.path] = part.value(float(column))
         values = nested(values)
     return values, source
 

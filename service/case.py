@@ -420,7 +420,10 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
     if not changed:
         for key, (unit, _) in SI.items():
             kind = Hertz if key == "f" else NotNegative
-            fields[f"std_{key}"] = (kind | SkipJsonSchema[None], bounded("finite and >= 0", f"Standard deviation [{unit}]", None))
+            fields[f"std_{key}"] = (
+                kind | SkipJsonSchema[None],
+                bounded("finite and >= 0", f"Standard deviation [{unit}]", None),
+            )
     return create_model(name, __config__=_STRICT, **{**fields, **changed})
 
 

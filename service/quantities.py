@@ -5,7 +5,7 @@ Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of fr
 """
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, reduce
 from statistics import NormalDist
 
 import numpy as np
@@ -14,7 +14,7 @@ from mumacro.charts import ROUNDING
 from mumacro.inputs import FIELDS, SI
 from mumacro.settling import settling
 
-from .answers import QUANTITIES, Array, Cases, Part, register
+from .answers import QUANTITIES, Array, Cases, Part, register, where
 
 __all__ = ["INCLUDES"]
 
@@ -50,17 +50,17 @@ def _groups(cases: Cases) -> Sequence[Array]:
 def _limits(cases: Cases) -> Sequence[Array]:
     # Rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0, with mu_crit -> 0.
     mu0, omega, surrogate = cases.columns["mu0"], cases.columns["omega"], cases.surrogate
-    y = np.where(cases.usable, cases.y_tilde, 1.0)
-    v = np.asarray(surrogate.v_tilde_crit(y))
+    y = where(cases.usable, cases.y_tilde, 1.0)
+    v = surrogate.v_tilde_crit(y)
     below = np.minimum(cases.y_tilde, 1.0)
     static = mu0 * np.sqrt((1.0 - below) * (1.0 + below))  # keeps the digits that 1 - y^2 loses near y~ = 1
     rest, rigid = cases.at_rest, np.isinf(cases.columns["k"])
-    speed = np.where(cases.usable, cases.length_scale * v * omega, np.nan)
-    crit = np.where(cases.usable, mu0 * np.asarray(surrogate.mu_ratio(v, y)), np.nan)
+    speed = where(cases.usable, cases.length_scale * v * omega, np.nan)
+    crit = where(cases.usable, mu0 * surrogate.mu_ratio(v, y), np.nan)
     return (
-        np.where(rest, mu0, np.where(rigid, 0.0, static)),
-        np.where(rest | rigid, 0.0, speed),
-        np.where(rest, mu0, np.where(rigid, 0.0, crit)),
+        where(rest, mu0, where(rigid, 0.0, static)),
+        where(rest | rigid, 0.0, speed),
+        where(rest, mu0, where(rigid, 0.0, crit)),
     )
 
 
@@ -115,11 +115,12 @@ def _sampled(cases: Cases) -> Array:
     deviations = np.array([cases.std.get(name, 0.0) for name in FIELDS])
     for point in _normal_samples():
         six = [cases.columns[name] + shift for name, shift in zip(FIELDS, point * deviations, strict=True)]
-        off = cases.surrogate.evaluate_columns(*six, n=n)[0] - cases.mu_macro
+        off = cases.surrogate.evaluate_columns(*map(np.atleast_1d, six), n=n)[0] - cases.mu_macro
         total += np.nan_to_num(off)
         squares += np.nan_to_num(off * off)
         count += ~np.isnan(off)
-    return np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
+    spread: Array = np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
+    return spread.reshape(cases.mu_macro.shape)
 
 
 @register(
@@ -145,12 +146,11 @@ def _std(cases: Cases) -> Sequence[Array]:
         for name in FIELDS
     }
     terms, doubts = (
-        [np.where(exact[name], 0.0, found[name] * cases.std.get(name, 0.0)) for name in FIELDS]
-        for found in cases.slopes()
+        [where(exact[name], 0.0, found[name] * cases.std.get(name, 0.0)) for name in FIELDS] for found in cases.slopes()
     )
-    std, doubt = np.hypot.reduce(terms), np.hypot.reduce(doubts)
-    shares = [np.where(std > 0.0, (term / std) ** 2, 0.0) for term in terms]
-    sampled = _sampled(cases) if any(cases.std.values()) else np.zeros(std.size)
+    std, doubt = (reduce(np.hypot, found, 0.0 * cases.mu_macro) for found in (terms, doubts))
+    shares = [where(std > 0.0, (term / std) ** 2, 0.0) for term in terms]
+    sampled = _sampled(cases) if any(cases.std.values()) else 0.0 * std
     enough = np.abs(sampled - std) <= ENOUGH * sampled + np.nan_to_num(doubt) + 4.0 * cases.error_bound
     return [std, doubt, *shares, sampled, enough.astype(np.float64)]
 
@@ -171,7 +171,7 @@ def _stick_fraction(cases: Cases) -> Sequence[Array]:
     value, bound = cases.surrogate.stick_fraction_with_bound(cases.v_tilde, cases.y_tilde)
     # y~ below double range: the groups do not show whether such a contact sticks
     lost = (cases.y_tilde == 0.0) & (cases.v_tilde < np.inf) & ~cases.at_rest
-    return value, np.where(lost, 1.0, bound)
+    return value, where(lost, 1.0, bound)
 
 
 @register(
@@ -188,13 +188,14 @@ def _stick_fraction(cases: Cases) -> Sequence[Array]:
 def _power(cases: Cases) -> Sequence[Array]:
     columns = cases.columns
     mu0, load, omega, v0 = (columns[name] for name in ("mu0", "Fz", "omega", "v0"))
-    unit = np.where(cases.usable, mu0 * load * (cases.length_scale * omega), np.nan)
-    value, bound = cases.surrogate.power_with_bound(cases.v_tilde, cases.y_tilde)
+    unit = where(cases.usable, mu0 * load * (cases.length_scale * omega), np.nan)
+    v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
+    value, bound = cases.surrogate.power_with_bound(v, y)
     saved = (mu0 - cases.mu_macro) * load * v0
     return (
-        np.where(cases.at_rest, 0.0, value * unit),
+        where(cases.at_rest, 0.0, value * unit),
         saved,
-        np.where(cases.at_rest, 0.0, bound * unit),
+        where(cases.at_rest, 0.0, bound * unit),
         cases.error_bound * load * v0 + ROUNDING * np.abs(saved),
     )
 
