@@ -36,7 +36,7 @@ from mumacro.inputs import (
 from mumacro.inputs import NAMES as INPUTS
 
 from .answers import QUANTITIES
-from .problems import BatchTooLargeError, FieldFault, faults_of, refuse
+from .problems import FieldFault, Kind, RequestError, faults_of, refuse
 from .quantities import INCLUDES
 
 __all__ = [
@@ -175,9 +175,10 @@ class Columns:
         return None, "is no legal case"
 
 
-def too_large(max_batch: int) -> BatchTooLargeError:
+def too_large(max_batch: int) -> RequestError:
     """The error for a batch with more cases than the settings allow."""
-    return BatchTooLargeError(
+    return RequestError(
+        Kind.BATCH_TOO_LARGE,
         f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON",
         max_batch=max_batch,
     )
@@ -193,7 +194,7 @@ def columns_of(
 
     Raises
     ------
-    InvalidFieldsError, BatchTooLargeError
+    RequestError
     """
     lists = {name: value for name, value in given.items() if isinstance(value, (list, np.ndarray)) and name in _LEAST}
     if any(len(value) > max_batch for value in lists.values()):
@@ -353,7 +354,7 @@ NO_OPTIONS = Options()
 
 
 def options_of(
-    model: type[Model], given: Mapping[str, Any], known: Iterable[str]
+    model: type[Model], given: Mapping[str, Any], known: Iterable[str], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
     """The options of a request, checked by their model; the rest of it, which is its case; and faults.
 
@@ -367,7 +368,7 @@ def options_of(
     try:
         return model.model_validate(own), rest, []
     except ValidationError as error:
-        return None, rest, faults_of(error, model, known)
+        return None, rest, faults_of(error, model, known, parameter)
 
 
 @cache
@@ -382,7 +383,7 @@ def read_form(
 
     Raises
     ------
-    InvalidFieldsError
+    RequestError
         With all faults of both.
     """
     known = _known(model)
@@ -414,7 +415,7 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
     fields: dict[str, Any] = {}
     for key, info in base.model_fields.items():
         kinds = get_args(info.annotation)
-        kind = Union[(*(kind for kind in kinds if kind is not NoneType), SkipJsonSchema[None])]  # noqa: UP007
+        kind = Union[(*(kind for kind in kinds if kind is not NoneType), SkipJsonSchema[None])]
         fields[key] = (kind if NoneType in kinds else info.annotation, info)
     fields.pop("std", None)
     if not changed:

@@ -30,7 +30,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from mumacro.errors import MumacroError
 
 from .limits import Keys, check_head, drained
-from .problems import CLOSE, OverloadedError, SlowClientError, TookTooLongError, problem_of
+from .problems import CLOSE, Kind, RequestError, problem_of
 from .routes import path_of
 from .tables import LoadedTable, Tables
 
@@ -296,7 +296,7 @@ class Observe:
 
         try:
             if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
-                raise OverloadedError("too many connections are open", headers=CLOSE)
+                raise RequestError(Kind.OVERLOADED, "too many connections are open", headers=CLOSE)
             check_head(scope, headers)
             if self._keys and not self._is_open(path):
                 holder = self._keys.holder(headers)
@@ -311,8 +311,8 @@ class Observe:
                 status = 499
                 raise ClientDisconnect from error
             answer = problem_of(error, scope)
-            unread = not isinstance(error, (SlowClientError, TookTooLongError)) and b"expect" not in headers
-            if answer.headers.get("connection") == "close" and unread:
+            late = getattr(error, "kind", None) in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
+            if answer.headers.get("connection") == "close" and not late and b"expect" not in headers:
                 await drained(receive)
             await answer(scope, receive, send_marked)
         finally:

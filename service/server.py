@@ -11,14 +11,14 @@ import orjson
 from starlette.types import Scope
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from .problems import HeadTooLargeError, MalformedBodyError, RequestError, SlowClientError, pieces_of_problem
+from .problems import Kind, RequestError, document_of
 
 __all__ = ["Connection"]
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
-_TOO_LARGE = HeadTooLargeError(f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+_TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
 
 
 class Connection(HttpToolsProtocol):
@@ -59,7 +59,7 @@ class Connection(HttpToolsProtocol):
         """Close, with 408 where a request has begun and its answer has not."""
         self._clock = None
         if self._in_head or (self._busy and not self.cycle.response_started):
-            self._refuse(SlowClientError(f"a client may take up to {self._settings.client_timeout_s} s"))
+            self._refuse(RequestError(Kind.SLOW_CLIENT, f"a client may take up to {self._settings.client_timeout_s} s"))
         else:
             self.transport.abort()
 
@@ -110,15 +110,15 @@ class Connection(HttpToolsProtocol):
         if self._busy and self.cycle.response_started:
             self.transport.abort()
         else:
-            self._refuse(self._refusal or MalformedBodyError(msg))
+            self._refuse(self._refusal or RequestError(Kind.MALFORMED_BODY, msg))
 
     def _refuse(self, error: RequestError) -> None:
         scope: Scope = {"path": "", "method": "GET", **(self.scope or {})}
-        status, body, _ = pieces_of_problem(error, scope)
+        body = document_of(error, scope)
         text = orjson.dumps(body)
         self.transport.write(
             b"HTTP/1.1 %d %b\r\ncontent-type: application/problem+json\r\ncontent-length: %d\r\nconnection: close\r\n"
-            b"\r\n%b" % (status, body["title"].encode(), len(text), text)
+            b"\r\n%b" % (body["status"], body["title"].encode(), len(text), text)
         )
         self.transport.close()
 
@@ -157,7 +157,7 @@ class Connection(HttpToolsProtocol):
             raise self._refusal
         hosts = sum(name == b"host" for name, _ in self.headers)
         if hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
-            self._refusal = MalformedBodyError("a request has one Host")
+            self._refusal = RequestError(Kind.MALFORMED_BODY, "a request has one Host")
             raise self._refusal
         self._in_head = False
         self._rest()

@@ -11,7 +11,7 @@ from typing import Any, Self
 from mumacro import Surrogate, TableError
 
 from . import API_VERSION
-from .problems import FieldFault, NotReadyError, refuse
+from .problems import FieldFault, Kind, RequestError, refuse
 
 __all__ = ["LoadedTable", "Tables", "table_files"]
 
@@ -135,19 +135,19 @@ class Tables:
             _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in tables]}})
 
     def check(self) -> None:
-        """Raise NotReadyError if a table does not give its known answer or its file was changed."""
+        """Raise RequestError if a table does not give its known answer or its file was changed."""
         try:
             for table in self._ready():
                 table.check()
         except TableError as error:
-            raise NotReadyError(f"table {error.path.name}: {error.reason}") from error
+            raise RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}") from error
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
         """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-]).
 
         Raises
         ------
-        NotReadyError, InvalidFieldsError
+        RequestError
             No table is loaded; none is tight enough.
         """
         tables = self._ready()
@@ -165,7 +165,7 @@ class Tables:
 
         Raises
         ------
-        NotReadyError, InvalidFieldsError
+        RequestError
             No table is loaded; none has that name.
         """
         found = {table.id: table for table in self._ready()}
@@ -175,5 +175,5 @@ class Tables:
 
     def _ready(self) -> tuple[LoadedTable, ...]:
         if self.fault is not None:
-            raise NotReadyError(self.fault)
+            raise RequestError(Kind.NOT_READY, self.fault)
         return self.loaded

@@ -4,7 +4,6 @@ FastAPI describes them; requests reach them through a look-up (:class:`Routes`):
 answer.  What is refused is raised, see :mod:`service.problems`.
 """
 
-import gzip
 import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -22,15 +21,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from mumacro.inputs import NAMES as INPUTS
 
 from ..case import split_names
-from ..limits import SMALL_BODY, media_type_of, read_body, wants_gzip
-from ..problems import FieldFault, MalformedBodyError, refuse
+from ..limits import SMALL_BODY, media_type_of, read_body
+from ..problems import FieldFault, Kind, RequestError, refuse
 from ..wire.json import decode
 
 __all__ = ["JSON", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "path_of", "reply"]
 
 JSON = "application/json"
 _JSON_ONLY = {JSON: JSON}
-_COMPRESS_FROM = 16 * 1024  # bytes
 _WHY = {
     400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
     401: "The service needs an API key, and none or a wrong one was sent",
@@ -160,7 +158,7 @@ async def given_in_body(request: Request) -> dict[str, Any]:
 
     Raises
     ------
-    UnsupportedBodyError, BodyTooLargeError, MalformedBodyError, InvalidFieldsError
+    RequestError
     """
     headers = dict(request.scope["headers"])
     media_type_of(headers, _JSON_ONLY)
@@ -179,14 +177,14 @@ def given_in_query(request: Request) -> dict[str, Any]:
 
     Raises
     ------
-    MalformedBodyError, InvalidFieldsError
+    RequestError
         Not a query; a name is given twice.
     """
     text = request.scope["query_string"].decode("latin-1")
     try:
         pairs = parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
     except (ValueError, UnicodeDecodeError) as error:
-        raise MalformedBodyError(f"the query cannot be read: {error}") from None
+        raise RequestError(Kind.MALFORMED_BODY, f"the query cannot be read: {error}") from None
     found: dict[str, Any] = {}
     names: list[str] = []
     twice: dict[str, None] = {}
@@ -199,7 +197,7 @@ def given_in_query(request: Request) -> dict[str, Any]:
         else:
             place[inner] = _number(value)
     if twice:
-        refuse([FieldFault.of(name, "is given more than once") for name in twice])
+        refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
     if names:
         found["include"] = split_names(names)
     return found
@@ -222,15 +220,8 @@ def _number(text: str) -> Any:
 # --- responses ------------------------------------------------------------------------------------------
 
 
-def reply(
-    content: bytes, headers: Mapping[str, str] | None = None, media_type: str = JSON, request: Request | None = None
-) -> Response:
-    """A complete answer; a large one to ``request`` is compressed if that accepts gzip, so this runs in a thread."""
-    if request is not None and len(content) >= _COMPRESS_FROM:
-        headers = {**(headers or {}), "Vary": "Accept-Encoding"}
-        if wants_gzip(request.headers.get("accept-encoding", "")):
-            content = gzip.compress(content, 1)
-            headers["Content-Encoding"] = "gzip"
+def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = JSON) -> Response:
+    """A complete answer."""
     return Response(content, headers=headers, media_type=media_type)
 
 

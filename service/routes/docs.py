@@ -33,7 +33,7 @@ async def _docs(request: Request) -> Response:
 
 
 async def _description(request: Request) -> Response:
-    return await request.app.state.work.question(lambda: reply(request.app.state.openapi, request=request))
+    return await request.app.state.work.question(lambda: reply(request.app.state.openapi))
 
 
 ENDPOINTS = [

@@ -80,7 +80,7 @@ async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
     form, case = _read(await given_in_body(request))
     table = request.app.state.tables.pick(form.tolerance)
-    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case)), request=request))
+    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case))))
 
 
 async def get_law_csv(request: Request) -> Response:
@@ -100,7 +100,7 @@ async def get_law_csv(request: Request) -> Response:
     }
     kind = "text/csv; charset=utf-8; header=present"
     return await request.app.state.work.question(
-        lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind, request)
+        lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind)
     )
 
 

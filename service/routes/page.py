@@ -45,7 +45,7 @@ async def _map(request: Request) -> Response:
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return await request.app.state.work.question(lambda: reply(dump(map_of(surrogate)), headers, request=request))
+    return await request.app.state.work.question(lambda: reply(dump(map_of(surrogate)), headers))
 
 
 ENDPOINTS = [

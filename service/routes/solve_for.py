@@ -54,7 +54,7 @@ async def post_solve_for(request: Request) -> Response:
     given = await given_in_body(request)
     form, case = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in INPUTS else [])
     table = request.app.state.tables.pick(form.tolerance)
-    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case)), request=request))
+    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case))))
 
 
 def in_si(name: str) -> str:

@@ -11,7 +11,7 @@ import pyarrow as pa
 from mumacro.inputs import GAP, unknown_name
 
 from ..case import INPUTS, MAX_ERRORS, Columns, Reason, columns_of, faults_in, too_large
-from ..problems import FieldFault, MalformedBodyError, refuse
+from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 from .json import dump
 
@@ -33,7 +33,7 @@ def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
                 message.type == "record batch" and _is_compressed(message.metadata)
                 for message in pa.ipc.MessageReader.open_stream(buffer)
             ):
-                raise MalformedBodyError("the body is a compressed Arrow stream: send it uncompressed")
+                raise RequestError(Kind.MALFORMED_BODY, "the body is a compressed Arrow stream: send it uncompressed")
             for batch in reader:
                 batch.validate()
                 for name in sorted(parts, key=INPUTS.index):
@@ -43,7 +43,7 @@ def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
                     raise too_large(max_batch)
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OSError, ValueError) as fault:
         reason = (str(fault).splitlines() or [type(fault).__name__])[0][:200]
-        raise MalformedBodyError(f"the body is not an Arrow stream: {reason}") from None
+        raise RequestError(Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}") from None
     columns = {name: found[1] if len(found) == 2 else np.concatenate(found) for name, found in parts.items()}
     made = columns_of(columns, max_batch)
     made.reasons = reasons

@@ -10,7 +10,7 @@ import numpy as np
 from mumacro.inputs import FIELDS, GAP, RAD_PER_CYCLE, SI, UNITS_OF, Scale, is_rigid, scale_of, split_unit, unknown_name
 
 from ..case import INPUTS, MAX_ERRORS, Columns, Reason, faults_in, number, too_large
-from ..problems import FieldFault, MalformedBodyError, refuse
+from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
 __all__ = ["FORM"]
@@ -32,7 +32,7 @@ def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
             parts.append(_values(rows, names, scales, size, reasons))
             size += len(rows)
     except (UnicodeDecodeError, csv.Error) as error:
-        raise MalformedBodyError(f"the body is not CSV: {error}") from None
+        raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {error}") from None
     if size > max_batch:
         raise too_large(max_batch)
     six = np.concatenate(parts, axis=1) if parts else np.empty((6, 0))
@@ -46,7 +46,9 @@ def _lines(text: bytearray, max_batch: int) -> Iterator[str]:
     while line := lines.readline(_LONGEST_LINE + 1):
         count += 1
         if len(line) > _LONGEST_LINE:
-            raise MalformedBodyError(f"line {count} of the body has more than {_LONGEST_LINE} characters")
+            raise RequestError(
+                Kind.MALFORMED_BODY, f"line {count} of the body has more than {_LONGEST_LINE} characters"
+            )
         if count > max_batch + 2:
             raise too_large(max_batch)
         yield line
