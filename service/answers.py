@@ -70,7 +70,7 @@ class Cases:
     """
 
     surrogate: Surrogate
-    columns: Mapping[str, Array]
+    columns: Mapping[str, Any]
     answer: Any
     std: Mapping[str, float]
 
@@ -173,15 +173,17 @@ def answer_case(
     surrogate: Surrogate, case: Mapping[str, float], include: Sequence[str] = (), std: Mapping[str, float] | None = None
 ) -> tuple[dict[str, Any], int]:
     """The answer to one legal case as plain Python values, and the code of its source; -1: the case is not legal."""
-    macro, ratio, bound, source = surrogate.evaluate_case(*(case[name] for name in FIELDS))
-    values = dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[source], bound, SOURCES[source]), strict=True))
-    if include and source >= 0:
-        answer = surrogate.evaluate(**case, gradient=_need_slopes(include))
-        cases = Cases(surrogate, {name: np.float64(case[name]) for name in FIELDS}, answer, std or {})
-        for part, column in zip(parts_of(include)[len(values) :], _computed(cases, include), strict=True):
-            values[part.path] = part.value(float(column))
-        values = nested(values)
-    return values, source
+    if not include:
+        macro, ratio, bound, source = surrogate.evaluate_case(*(case[name] for name in FIELDS))
+        return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[source], bound, SOURCES[source]), strict=True)), source
+    inputs: dict[str, Any] = {**case}
+    found = surrogate.evaluate(**inputs, gradient=_need_slopes(include))
+    numbers = found.mu_macro, found.mu_ratio, found.regime, found.error_bound, found.source
+    values = dict(zip(_NAMES, numbers, strict=True))
+    cases = Cases(surrogate, {name: np.float64(case[name]) for name in FIELDS}, found, std or {})
+    for part, column in zip(parts_of(include)[len(values) :], _computed(cases, include), strict=True):
+        values[part.path] = part.value(float(column))
+    return nested(values), found.source_code
 
 
 def _need_slopes(include: Sequence[str]) -> bool:
@@ -201,12 +203,12 @@ def answer_columns(
 
     ``six`` has n cases in columns of shape (n,) or (1,), in the order of FIELDS; k = inf is rigid contact.
     """
-    macro, ratio, bound, source = surrogate.evaluate_columns(*six, n=n)
+    macro, ratio, bound, source = surrogate.evaluate_columns(six[0], six[1], six[2], six[3], six[4], six[5], n)
     parts = parts_of(include)
     found: dict[str, Any] = {part.path: np.full(n, np.nan) for part in parts[len(DEFAULT) :]}
     where = np.flatnonzero(source >= 0)
     if include and where.size:
-        legal = {
+        legal: dict[str, Any] = {
             name: column[where] if column.size == n else np.full(where.size, column[0])
             for name, column in zip(FIELDS, six, strict=True)
         }

@@ -20,10 +20,10 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from . import __version__
-from .case import Case, CaseColumns
 from .limits import Keys, Work
 from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .observe import Metrics, Observe
+from .options import Case, CaseColumns
 from .problems import problem_of
 from .routes import Routes, batch, case, docs, health, law, page, solve_for, table
 from .settings import Settings, load_settings, unknown_variables

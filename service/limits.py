@@ -50,12 +50,7 @@ class Keys:
         return bool(self._keys)
 
     def holder(self, headers: Mapping[bytes, bytes]) -> str:
-        """The name of the holder of the request's key.
-
-        Raises
-        ------
-        RequestError
-        """
+        """The name of the holder of the request's key."""
         offered = headers.get(b"x-api-key")
         if offered is None:
             scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
@@ -72,12 +67,7 @@ class Keys:
 
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
-    """Refuse a head that says two things, or asks for another protocol.
-
-    Raises
-    ------
-    RequestError
-    """
+    """Refuse a head that says two things, or asks for another protocol."""
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
@@ -91,13 +81,7 @@ def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
 
 
 def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
-    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first.
-
-    Raises
-    ------
-    RequestError
-        Another media type, another charset than UTF-8, or a compressed body.
-    """
+    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first."""
     given = headers.get(b"content-type", b"").decode("latin-1")
     media, _, parameters = given.lower().partition(";")
     found = known.get(media.strip()) if given else next(iter(known.values()))
@@ -115,12 +99,7 @@ def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> s
 async def read_body(
     headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
 ) -> bytearray:
-    """The body of a request; ``large`` is called before more than SMALL_BODY is read.
-
-    Raises
-    ------
-    RequestError, ClientDisconnect
-    """
+    """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
     length = headers.get(b"content-length", b"0")
     if not length.isdigit() or len(length) > 18 or int(length) > limit:
         raise _too_large(limit)
@@ -179,13 +158,7 @@ class Slots:
         self._name = name
 
     def take(self) -> None:
-        """Take a slot; the code that called this gives it back.
-
-        Raises
-        ------
-        RequestError
-            No slot is free.
-        """
+        """Take a slot; the code that called this gives it back."""
         if self.used >= self.number:
             raise RequestError(Kind.OVERLOADED, f"{self.used} {self._name} are being answered already", headers=CLOSE)
         self.used += 1
@@ -217,12 +190,7 @@ class Work:
 
     @asynccontextmanager
     async def deadline(self) -> AsyncIterator[None]:
-        """One time limit for a whole answer: reading, computing and sending.
-
-        Raises
-        ------
-        RequestError
-        """
+        """One time limit for a whole answer: reading, computing and sending."""
         limit = self.settings.time_limit_s
         try:
             async with asyncio.timeout(limit):
@@ -231,12 +199,7 @@ class Work:
             raise RequestError(Kind.TOOK_TOO_LONG, f"a request may take up to {limit} s", headers=CLOSE) from None
 
     async def question(self, work: Callable[[], T]) -> T:
-        """Do the work of a question in a thread and a slot; the slot is held until it is done, even without a client.
-
-        Raises
-        ------
-        RequestError
-        """
+        """Do the work of a question in a thread; its slot is held until it is done, even without a client."""
         self.questions.take()
         task = asyncio.ensure_future(self.questions.run(work))
 
@@ -250,12 +213,7 @@ class Work:
             return await asyncio.shield(task)
 
     async def client(self, move: Awaitable[T]) -> T:
-        """Wait for the client to send or to read.
-
-        Raises
-        ------
-        RequestError
-        """
+        """Wait for the client to send or to read."""
         limit = self.settings.client_timeout_s
         try:
             async with asyncio.timeout(limit):

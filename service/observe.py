@@ -1,23 +1,21 @@
 """What is seen of a request from outside: its id, its log line, its counters, and the answer to an exception.
 
-Logs are JSON lines on standard output, written by a thread of ``logging.handlers.QueueListener``.  Counters are those
+Logs are JSON lines on standard output, kept by ``logging.handlers.BufferingHandler`` for a thread.  Counters are those
 of prometheus_client; several workers share them through its multiprocess mode, in a private folder that is made at
 the start.
 """
 
-import atexit
 import itertools
 import logging
 import logging.handlers
 import os
-import queue
 import re
-import shutil
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from typing import Any
 
@@ -29,12 +27,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.errors import MumacroError
 
+from .answers import REGIME_NAMES, SOURCES
 from .limits import Keys, check_head, drained
 from .problems import CLOSE, Kind, RequestError, problem_of
 from .routes import path_of
 from .tables import LoadedTable, Tables
 
-__all__ = ["JsonFormatter", "LogQueue", "Metrics", "Observe", "log_config", "shared_counters"]
+__all__ = ["JsonFormatter", "LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
 
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})
@@ -70,75 +69,46 @@ class JsonFormatter(logging.Formatter):
         return orjson.dumps(line, default=str).decode()
 
 
-class _Writer(logging.handlers.QueueListener):
-    """Writes what is in the queue in one go, twenty times a second: no request wakes this thread."""
+class LogLines(logging.handlers.BufferingHandler):
+    """Keeps records for a thread that writes them twenty times a second: a stalled reader delays no request.
 
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.lines: list[str] = []
-
-    def dequeue(self, block: bool) -> logging.LogRecord:
-        """The next record; before it waits for one, all lines are written."""
-        while True:
-            try:
-                record: logging.LogRecord = self.queue.get_nowait()  # type: ignore[attr-defined]
-                return record
-            except queue.Empty:
-                if not block:
-                    raise
-                self.flush()
-                time.sleep(_WRITE_EVERY_S)
-
-    def handle(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
-        self.lines.append(self.handlers[0].format(record))
-
-    def flush(self) -> None:
-        """Write the lines by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
-        if self.lines:
-            rest = memoryview(("\n".join(self.lines) + "\n").encode("utf-8", "backslashreplace"))
-            self.lines.clear()
-            with suppress(OSError):  # the reader is gone
-                while rest:
-                    rest = rest[os.write(1, rest) :]
-
-
-class LogQueue(logging.handlers.QueueHandler):
-    """Hands records to the thread that writes them: a stalled reader of the log delays no request.
-
-    Lines that find the queue full are dropped, and counted in the next line that does not.
+    Records that find the buffer full are dropped, and counted in a line that follows.
     """
 
     def __init__(self) -> None:
-        self._records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
-        super().__init__(self._records)
-        formatter = logging.NullHandler()
-        formatter.setFormatter(JsonFormatter())
-        self._writer = _Writer(self._records, formatter)
-        self._writer.start()
-        self._dropped = 0
-        atexit.register(self._finish)
+        super().__init__(_MOST_WAITING)
+        self.setFormatter(JsonFormatter())
+        self._dropped, self._writes = 0, False
+        threading.Thread(target=self._write, name="log", daemon=True).start()
 
-    def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
-        """The record as it is: it stays in this process."""
-        return record
-
-    def enqueue(self, record: logging.LogRecord) -> None:
-        """Queue a record if there is room."""
-        if self._records.qsize() >= _MOST_WAITING:
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a record if there is room."""
+        if len(self.buffer) < self.capacity:
+            self.buffer.append(record)
+        else:
             self._dropped += 1
-            return
-        if self._dropped:
-            told = f"{self._dropped} lines of the log were dropped: standard output was not read in time"
-            fields = {"name": __name__, "levelno": logging.WARNING, "levelname": "WARNING", "msg": told}
-            self._records.put(logging.makeLogRecord(fields))
-            self._dropped = 0
-        self._records.put(record)
 
-    def _finish(self) -> None:
-        """Wait a second at most for the last lines."""
+    def _write(self) -> None:
+        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
+        while True:
+            time.sleep(_WRITE_EVERY_S)
+            with self.lock or nullcontext():
+                records, self.buffer, dropped, self._dropped = self.buffer, [], self._dropped, 0
+                self._writes = bool(records)
+            if dropped:
+                told = f"{dropped} lines of the log were dropped: standard output was not read in time"
+                fields = {"name": __name__, "levelno": logging.WARNING, "levelname": "WARNING", "msg": told}
+                records.append(logging.makeLogRecord(fields))
+            rest = memoryview("".join(f"{self.format(record)}\n" for record in records).encode())
+            with suppress(OSError):  # the reader is gone
+                while rest:
+                    rest = rest[os.write(1, rest) :]
+            self._writes = False
+
+    def flush(self) -> None:
+        """At the end, wait a second at most for the last lines."""
         until = time.monotonic() + 1.0
-        while (not self._records.empty() or self._writer.lines) and time.monotonic() < until:
+        while (self.buffer or self._writes) and time.monotonic() < until:
             time.sleep(0.01)
 
 
@@ -159,7 +129,7 @@ def log_config(level: str) -> dict[str, Any]:
     return {
         "version": 1,
         "disable_existing_loggers": False,
-        "handlers": {"out": {"()": LogQueue}},
+        "handlers": {"out": {"()": LogLines}},
         "root": {"level": "WARNING", "handlers": ["out"]},
         "loggers": {name: {"level": level.upper()} for name in ("mumacro", "uvicorn")},
     }
@@ -170,22 +140,18 @@ def log_config(level: str) -> dict[str, Any]:
 
 @contextmanager
 def shared_counters() -> Iterator[None]:
-    """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end."""
-    for place in ("/dev/shm", None):  # noqa: S108  (mkdtemp makes a folder of its own there)
-        try:
-            folder = tempfile.mkdtemp(prefix="mumacro-metrics-", dir=place)
-            break
-        except OSError:
-            continue
-    else:  # no writable folder: every worker reports its own counters
+    """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end.
+
+    Without a writable folder every worker reports its own counters.
+    """
+    with ExitStack() as stack:
+        for place in ("/dev/shm", None):  # noqa: S108  (a folder of its own is made there)
+            with suppress(OSError):
+                made = tempfile.TemporaryDirectory(prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True)
+                os.environ[_SHARED] = stack.enter_context(made)
+                break
         yield
-        return
-    os.environ[_SHARED] = folder
-    try:
-        yield
-    finally:
         os.environ.pop(_SHARED, None)
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 class Metrics:
@@ -195,24 +161,17 @@ class Metrics:
         from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics
 
         disable_created_metrics()  # type: ignore[no-untyped-call]
-
         self._paths = paths
-        self.registry = CollectorRegistry()
-        self._requests = Counter(
-            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=self.registry
-        )
+        self.registry = own = CollectorRegistry()
+        self._requests = Counter("mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own)
+        told = "From the head of a request to the end of its answer"
         self._durations = Histogram(
-            "mumacro_request_duration_seconds", "From the head of a request to the end of its answer", ["route"],
-            buckets=_BUCKETS_S, registry=self.registry,
-        )  # fmt: skip
-        self._cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=self.registry)
-        self._bad = Counter(
-            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=self.registry
+            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
         )
-        self._info = Gauge(
-            "mumacro_table_info", "Loaded tables", ["id", "tolerance"], registry=self.registry,
-            multiprocess_mode="mostrecent",
-        )  # fmt: skip
+        self._cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own)
+        self._bad = Counter("mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own)
+        labels = ["id", "tolerance"]
+        self._info = Gauge("mumacro_table_info", "Loaded tables", labels, registry=own, multiprocess_mode="mostrecent")
         self._known: dict[tuple[str, str, int], tuple[Any, Any]] = {}
         self._sources: dict[tuple[str, int], Any] = {}
 
@@ -225,26 +184,19 @@ class Metrics:
     def request(self, path: str, method: str, status: int, seconds: float) -> None:
         """Count one request."""
         key = path if path in self._paths else "other", method if method in _METHODS else "other", status
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = (
-                self._requests.labels(key[0], key[1], str(status)),
-                self._durations.labels(key[0]),
-            )
-        found[0].inc()
-        found[1].observe(seconds)
+        if key not in self._known:
+            self._known[key] = self._requests.labels(*key), self._durations.labels(key[0])
+        count, durations = self._known[key]
+        count.inc()
+        durations.observe(seconds)
 
     def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
         """Count answered cases of one source code; -1 are bad ones."""
-        found = self._sources.get((table.id, source))
-        if found is None:
-            from .answers import REGIME_NAMES, SOURCES
-
-            names = (table.id, SOURCES[source], REGIME_NAMES[source])
-            found = self._sources[table.id, source] = (
-                self._bad.labels(table.id) if source < 0 else self._cases.labels(*names)
-            )
-        found.inc(number)
+        key = table.id, source
+        if key not in self._sources:
+            names = table.id, SOURCES[source], REGIME_NAMES[source]
+            self._sources[key] = self._bad.labels(table.id) if source < 0 else self._cases.labels(*names)
+        self._sources[key].inc(number)
 
     def cases(self, table: LoadedTable, source: Any) -> None:
         """Count the cases of a batch by their source codes, bad ones among them."""

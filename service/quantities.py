@@ -114,8 +114,9 @@ def _sampled(cases: Cases) -> Array:
     total, squares, count = np.zeros(n), np.zeros(n), np.zeros(n)
     deviations = np.array([cases.std.get(name, 0.0) for name in FIELDS])
     for point in _normal_samples():
-        six = [cases.columns[name] + shift for name, shift in zip(FIELDS, point * deviations, strict=True)]
-        off = cases.surrogate.evaluate_columns(*map(np.atleast_1d, six), n=n)[0] - cases.mu_macro
+        pairs = zip(FIELDS, point * deviations, strict=True)
+        a, b, c, d, e, f = (np.atleast_1d(cases.columns[name] + shift) for name, shift in pairs)
+        off = cases.surrogate.evaluate_columns(a, b, c, d, e, f, n)[0] - cases.mu_macro
         total += np.nan_to_num(off)
         squares += np.nan_to_num(off * off)
         count += ~np.isnan(off)
@@ -213,7 +214,7 @@ def _power(cases: Cases) -> Sequence[Array]:
     cost=5,
 )
 def _settling(cases: Cases) -> Sequence[Array]:
-    found = settling(cases.surrogate, **dict(cases.columns))  # type: ignore[arg-type]
+    found = settling(cases.surrogate, **dict(cases.columns))
     return found.periods, found.periods_any, found.time, found.slip_path, found.error_bound
 
 

@@ -4,7 +4,6 @@ import logging
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -45,7 +44,7 @@ def _stamp(path: Path) -> tuple[int, int, int]:
     return status.st_size, status.st_mtime_ns, status.st_ino
 
 
-@dataclass(frozen=True)
+@dataclass
 class LoadedTable:
     """A table in memory, and the state of its file when it was read."""
 
@@ -69,25 +68,13 @@ class LoadedTable:
         surrogate.self_check()
         return cls(surrogate, stamp)
 
-    @cached_property
-    def id(self) -> str:
-        """The table's name."""
-        return self.surrogate.id
-
-    @cached_property
-    def label(self) -> dict[str, object]:
-        """The table's label in every answer."""
-        return {"id": self.id, "tolerance": self.surrogate.tolerance}
-
-    @cached_property
-    def signature(self) -> dict[str, Any]:
-        """Fields of every answer: the table and the version of the interface."""
-        return {"table": self.label, "api_version": API_VERSION}
-
-    @property
-    def size_bytes(self) -> int:
-        """Size of the file when it was read."""
-        return self.stamp[0]
+    def __post_init__(self) -> None:
+        self.id = self.surrogate.id
+        #: the table's label in every answer
+        self.label = {"id": self.id, "tolerance": self.surrogate.tolerance}
+        #: fields of every answer: the table and the version of the interface
+        self.signature: dict[str, Any] = {"table": self.label, "api_version": API_VERSION}
+        self.size_bytes = self.stamp[0]
 
     def check(self) -> None:
         """Check the known answer again, and whether the file is unchanged.
@@ -143,13 +130,7 @@ class Tables:
             raise RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}") from error
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
-        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-]).
-
-        Raises
-        ------
-        RequestError
-            No table is loaded; none is tight enough.
-        """
+        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-])."""
         tables = self._ready()
         if tolerance is None:
             return tables[0]
@@ -161,13 +142,7 @@ class Tables:
         return min(fit, key=lambda table: (table.size_bytes, -table.surrogate.tolerance))
 
     def named(self, identity: str) -> LoadedTable:
-        """The table of that name.
-
-        Raises
-        ------
-        RequestError
-            No table is loaded; none has that name.
-        """
+        """The table of that name."""
         found = {table.id: table for table in self._ready()}
         if identity not in found:
             refuse([FieldFault.of("id", f"must be one of {', '.join(found)}", identity)])

@@ -342,32 +342,6 @@ def test_a_range_is_a_part_of_the_file(client):
     assert (kept.status_code, kept.content) == (200, whole.content)
 
 
-OFFERS = {
-    "gzip": True, "GZIP": True, "*": True, "br, gzip;q=0.5": True, "gzip;q=0.001": True, "identity;q=0, *": True,
-    "gzip;q=0": False, "gzip; q=0": False, "gzip;q=0.000": False, "*;q=0": False, "gzip;q=0, *": False,
-    "*, gzip;q=0": False, "identity": False, "": False, "xgzip": False,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("offer", OFFERS)
-def test_large_answers_are_compressed_for_clients_that_accept_gzip(client, case, offer):
-    v0 = [1e-6 * i for i in range(1, 3001)]
-    law = {**{name: case[name] for name in case if name != "v0"}, "start": 1e-4, "stop": 1.0, "points": 3000}
-    asked = {"Accept-Encoding": offer}
-    answers = [client.get("/openapi.json", headers=asked)]
-    answers += [
-        client.get("/static/page/map.json", headers=asked),
-        client.get("/v1/law.csv", params=law, headers=asked),
-    ]
-    answers.append(client.post("/v1/law", json=law, headers=asked))
-    answers.append(client.post("/v1/mu-macro/batch", json={**case, "v0": v0}, headers=asked))
-    answers.append(client.post("/v1/mu-macro/batch", json=[{**case, "v0": x} for x in v0], headers=asked))
-    for answer in answers:
-        assert answer.status_code == 200, answer.text
-        assert ("content-encoding" in answer.headers) == OFFERS[offer], answer.request.url
-    assert "content-encoding" not in client.get("/v1/table.nc", headers=asked).headers
-
-
 def test_every_answer_has_the_security_headers(client, case):
     policies = {}
     for path in ("/", "/docs"):

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from mumacro import TableError
 from service.app import create_app
-from service.problems import InvalidFieldsError, NotReadyError
+from service.problems import RequestError
 from service.settings import Settings
 from service.tables import LoadedTable, Tables, table_files
 
@@ -202,11 +202,11 @@ def test_the_smallest_table_that_is_tight_enough_is_picked(tables, tolerance, na
 
 
 def test_no_table_is_tight_enough(tables):
-    with pytest.raises(InvalidFieldsError) as caught:
+    with pytest.raises(RequestError) as caught:
         tables.pick(1e-13)
     assert caught.value.members == {"tightest_available": 1e-12}
 
 
 def test_an_unloaded_tables_picks_nothing():
-    with pytest.raises(NotReadyError):
+    with pytest.raises(RequestError):
         Tables(()).pick()

@@ -20,12 +20,22 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.inputs import NAMES as INPUTS
 
-from ..case import split_names
 from ..limits import SMALL_BODY, media_type_of, read_body
+from ..options import split_names
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..wire.json import decode
 
-__all__ = ["JSON", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "path_of", "reply"]
+__all__ = [
+    "JSON",
+    "Endpoint",
+    "Routes",
+    "file_answer",
+    "given_in_body",
+    "given_in_query",
+    "in_thread",
+    "path_of",
+    "reply",
+]
 
 JSON = "application/json"
 _JSON_ONLY = {JSON: JSON}
@@ -76,7 +86,7 @@ class Endpoint:
     body: type[BaseModel] | None = None
     model: Any = None
     statuses: tuple[int, ...] = ()
-    content: Mapping[int, Any] = field(default_factory=dict)
+    content: Mapping[int | str, Any] = field(default_factory=dict)
     request: Mapping[str, Any] | None = None
     tag: str = "answers"
     open: bool = False
@@ -91,15 +101,15 @@ class Endpoint:
         responses: dict[int | str, dict[str, Any]] = {200: {}, **self.content}
         for status in sorted(statuses):
             responses[status] = {"description": _WHY[status], "content": _PROBLEM}
-        for status, response in responses.items():
-            headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if status == 503 else {})}
-            responses[status] = {**response, "headers": headers}
+        for code, response in responses.items():
+            headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if code == 503 else {})}
+            responses[code] = {**response, "headers": headers}
 
         async def answer(request: Request, **_: Any) -> Response:
             return await self.answer(request)
 
         keyword = inspect.Parameter.KEYWORD_ONLY
-        kinds = {"request": Request}
+        kinds: dict[str, Any] = {"request": Request}
         kinds |= {"query": Annotated[self.query, Query()]} if self.query else {}
         kinds |= {"body": Annotated[self.body, Body()]} if self.body else {}
         answer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -154,12 +164,7 @@ def path_of(scope: Scope) -> str:
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:
-    """The members of a small JSON body.
-
-    Raises
-    ------
-    RequestError
-    """
+    """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
     media_type_of(headers, _JSON_ONLY)
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
@@ -173,13 +178,7 @@ async def given_in_body(request: Request) -> dict[str, Any]:
 
 
 def given_in_query(request: Request) -> dict[str, Any]:
-    """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within ``std``.
-
-    Raises
-    ------
-    RequestError
-        Not a query; a name is given twice.
-    """
+    """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within ``std``."""
     text = request.scope["query_string"].decode("latin-1")
     try:
         pairs = parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
@@ -223,6 +222,12 @@ def _number(text: str) -> Any:
 def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = JSON) -> Response:
     """A complete answer."""
     return Response(content, headers=headers, media_type=media_type)
+
+
+async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
+    """The answer to the question of a person, made in a thread."""
+    answer: Response = await request.app.state.work.question(work)
+    return answer
 
 
 class _File(FileResponse):

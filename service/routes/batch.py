@@ -13,8 +13,9 @@ from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from ..answers import answer_case, cost_of
-from ..case import OPTIONS, Columns, Options, OptionsQuery, options_of, read_form
+from ..case import Columns
 from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
+from ..options import OPTIONS, Options, OptionsQuery, options_of, read_form
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..wire import Batch, Form, forms
 from ..wire.json import decode, dump

@@ -8,8 +8,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from ..answers import answer_case, cost_of
-from ..case import CaseQuery, CaseRequest, Options, read_form
 from ..models import CaseAnswer
+from ..options import CaseQuery, CaseRequest, Options, read_form
 from ..problems import FieldFault, refuse
 from ..wire.json import dump
 from . import Endpoint, given_in_body, given_in_query, reply

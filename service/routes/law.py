@@ -15,13 +15,14 @@ from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, SI
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 
 from ..answers import answer_columns, nested, parts_of
-from ..case import INPUTS, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
+from ..case import INPUTS
 from ..models import Answered, default, included
+from ..options import NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
 from ..problems import FieldFault, refuse
 from ..quantities import INCLUDES
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, given_in_query, reply
+from . import Endpoint, given_in_body, given_in_query, in_thread, reply
 from .solve_for import FIVE, FIVE_QUERY, Name, in_si, per_value
 
 __all__ = ["ENDPOINTS"]
@@ -80,7 +81,7 @@ async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
     form, case = _read(await given_in_body(request))
     table = request.app.state.tables.pick(form.tolerance)
-    return await request.app.state.work.question(lambda: reply(dump(_answer(table, form, case))))
+    return await in_thread(request, lambda: reply(dump(_answer(table, form, case))))
 
 
 async def get_law_csv(request: Request) -> Response:
@@ -99,9 +100,7 @@ async def get_law_csv(request: Request) -> Response:
         "Cache-Control": "no-cache",
     }
     kind = "text/csv; charset=utf-8; header=present"
-    return await request.app.state.work.question(
-        lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind)
-    )
+    return await in_thread(request, lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind))
 
 
 def _answer(table: LoadedTable, form: LawOptions, case: dict[str, float]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from mumacro.page import POLICY, map_of, names
 
 from .. import __version__
 from ..wire.json import dump
-from . import Endpoint, file_answer, reply
+from . import Endpoint, file_answer, in_thread, reply
 
 __all__ = ["ASSETS", "ENDPOINTS", "FOLDER", "POLICY"]
 
@@ -45,7 +45,7 @@ async def _map(request: Request) -> Response:
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return await request.app.state.work.question(lambda: reply(dump(map_of(surrogate)), headers))
+    return await in_thread(request, lambda: reply(dump(map_of(surrogate)), headers))
 
 
 ENDPOINTS = [

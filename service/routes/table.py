@@ -9,8 +9,8 @@ from starlette.responses import Response
 from mumacro.errors import TableError
 
 from .. import __version__
-from ..case import Positive, bounded, relation
 from ..models import TableAnswer
+from ..options import Positive, bounded, relation
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
@@ -43,7 +43,8 @@ def _chosen(request: Request) -> LoadedTable:
     except ValidationError as error:
         refuse(faults_of(error, TableChoice, TableChoice.model_fields))
     tables = request.app.state.tables
-    return tables.pick(choice.tolerance) if choice.id is None else tables.named(choice.id)
+    table: LoadedTable = tables.pick(choice.tolerance) if choice.id is None else tables.named(choice.id)
+    return table
 
 
 async def get_table(request: Request) -> Response:

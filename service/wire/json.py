@@ -24,8 +24,9 @@ import simdjson
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE
 
 from ..answers import Part, nested
-from ..case import INPUTS, MAX_ERRORS, OPTIONS, Columns, Reason, checked, columns_of, example, options_of, too_large
-from ..case import Options as OptionsModel
+from ..case import INPUTS, MAX_ERRORS, Columns, Reason, checked, columns_of, too_large
+from ..options import OPTIONS, example, options_of
+from ..options import Options as OptionsModel
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
@@ -60,13 +61,7 @@ _PATIENT = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole, parse_f
 
 
 def decode(text: bytes | bytearray, large: bool = False) -> Any:
-    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
-
-    Raises
-    ------
-    RequestError
-        Not JSON; an object that names a member twice.
-    """
+    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
     if not text:
         raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
     if not large:
@@ -84,12 +79,7 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
 
 
 def read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
-    """The cases and the options of a body: columns or one case, or a list of rows.
-
-    Raises
-    ------
-    RequestError
-    """
+    """The cases and the options of a body: columns or one case, or a list of rows."""
     _limit_values(text, max_batch)
     if bytes(text[:4096]).lstrip()[:1] == b"[":
         return _quick_rows(text, max_batch) or _rows(decode(text, large=True), max_batch), {}
