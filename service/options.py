@@ -48,7 +48,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 _STRICT = ConfigDict(strict=True, extra="forbid")
-_NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # not described: a query has none
+_NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -195,17 +195,16 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
     """The model of a query with the same members as a body; ``std`` becomes std_mu0, std_Fz, ... unless ``changed``."""
     fields: dict[str, Any] = {}
     for key, info in base.model_fields.items():
-        kinds = get_args(info.annotation)
-        kind: Any = reduce(or_, [*(kind for kind in kinds if kind is not NoneType), _NO_NULL])
-        fields[key] = (kind if NoneType in kinds else info.annotation, info)
+        kind, kinds = info.annotation, get_args(info.annotation)
+        if NoneType in kinds:
+            kind = reduce(or_, [*(one for one in kinds if one is not NoneType), _NO_NULL])
+        fields[key] = (kind, info)
     fields.pop("std", None)
     if not changed:
         for key, (unit, _) in SI.items():
             kind = Hertz if key == "f" else NotNegative
-            fields[f"std_{key}"] = (
-                kind | SkipJsonSchema[None],
-                bounded("finite and >= 0", f"Standard deviation [{unit}]", None),
-            )
+            told = bounded("finite and >= 0", f"Standard deviation [{unit}]", None)
+            fields[f"std_{key}"] = (kind | _NO_NULL, told)
     return create_model(name, __config__=_STRICT, **{**fields, **changed})
 
 
