@@ -178,12 +178,12 @@ def answer_case(
         return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[source], bound, SOURCES[source]), strict=True)), source
     inputs: dict[str, Any] = {**case}
     found = surrogate.evaluate(**inputs, gradient=_need_slopes(include))
-    numbers = found.mu_macro, found.mu_ratio, found.regime, found.error_bound, found.source
-    values = dict(zip(_NAMES, numbers, strict=True))
+    source = found.source_code
+    numbers = found.mu_macro, found.mu_ratio, REGIME_NAMES[source], found.error_bound, SOURCES[source]
     cases = Cases(surrogate, {name: np.float64(case[name]) for name in FIELDS}, found, std or {})
-    for part, column in zip(parts_of(include)[len(values) :], _computed(cases, include), strict=True):
-        values[part.path] = part.value(float(column))
-    return nested(values), found.source_code
+    columns = zip(parts_of(include)[len(_NAMES) :], _computed(cases, include), strict=True)
+    more = nested({part.path: part.value(float(column)) for part, column in columns})
+    return {**dict(zip(_NAMES, numbers, strict=True)), **more}, source
 
 
 def _need_slopes(include: Sequence[str]) -> bool:

@@ -4,7 +4,8 @@ What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) i
 """
 
 from collections.abc import Iterable, Mapping
-from functools import cache, reduce
+from contextlib import suppress
+from functools import cache, lru_cache, reduce
 from operator import or_
 from types import NoneType
 from typing import Annotated, Any, Literal, Self, TypeVar, get_args
@@ -22,8 +23,8 @@ from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
 
 __all__ = [
-    "OPTIONS", "Case", "CaseColumns", "CaseQuery", "CaseRequest", "NotNegative", "Options", "OptionsQuery", "Positive",
-    "bounded", "example", "input_fields", "options_of", "query_of", "read_form", "relation", "split_names",
+    "NO_NULL", "OPTIONS", "Case", "CaseColumns", "CaseQuery", "CaseRequest", "NotNegative", "Options", "OptionsQuery",
+    "Positive", "bounded", "example", "input_fields", "options_of", "query_of", "read_form", "relation", "split_names",
 ]  # fmt: skip
 
 _NAMES = frozenset(INPUTS)
@@ -48,7 +49,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 _STRICT = ConfigDict(strict=True, extra="forbid")
-_NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
+NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -108,7 +109,7 @@ class Options(BaseModel):
 
     model_config = _STRICT
 
-    include: list[Include] | None = bounded(_INCLUDED, INCLUDE, None, max_length=2 * len(INCLUDES))
+    include: Annotated[list[Include], Field(max_length=2 * len(INCLUDES))] | None = bounded(_INCLUDED, INCLUDE, None)
     tolerance: Positive | None = bounded(
         "finite and > 0", "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers", None
     )
@@ -140,6 +141,11 @@ OPTIONS = tuple(Options.model_fields)
 NO_OPTIONS = Options()
 
 
+@lru_cache(256)
+def _including(names: tuple[str, ...]) -> Options:
+    return Options(include=list(names))
+
+
 def options_of(
     model: type[Model], given: Mapping[str, Any], known: Iterable[str], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
@@ -149,6 +155,12 @@ def options_of(
     """
     if model is Options and given.keys() <= _NAMES:
         return NO_OPTIONS, given, []  # type: ignore[return-value]
+    if model is Options and given.keys() - _NAMES == {"include"} and type(given["include"]) is list:
+        names = given["include"]
+        if len(names) < 9 and all(type(name) is str for name in names):
+            with suppress(ValidationError):
+                rest = {name: value for name, value in given.items() if name != "include"}
+                return _including(tuple(names)), rest, []  # type: ignore[return-value]
     fields = model.model_fields
     own = {name: value for name, value in given.items() if name in fields}
     rest = {name: value for name, value in given.items() if name not in own}
@@ -197,14 +209,15 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
     for key, info in base.model_fields.items():
         kind, kinds = info.annotation, get_args(info.annotation)
         if NoneType in kinds:
-            kind = reduce(or_, [*(one for one in kinds if one is not NoneType), _NO_NULL])
+            kind = reduce(or_, [*(one for one in kinds if one is not NoneType), NO_NULL])
         fields[key] = (kind, info)
-    fields.pop("std", None)
+    for key in ("std", "family"):  # objects
+        fields.pop(key, None)
     if not changed:
         for key, (unit, _) in SI.items():
             kind = Hertz if key == "f" else NotNegative
             told = bounded("finite and >= 0", f"Standard deviation [{unit}]", None)
-            fields[f"std_{key}"] = (kind | _NO_NULL, told)
+            fields[f"std_{key}"] = (kind | NO_NULL, told)
     return create_model(name, __config__=_STRICT, **{**fields, **changed})
 
 

@@ -17,7 +17,7 @@ from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, 
 from ..answers import answer_columns, nested, parts_of
 from ..case import INPUTS
 from ..models import Answered, default, included
-from ..options import NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
+from ..options import NO_NULL, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
 from ..problems import FieldFault, refuse
 from ..quantities import INCLUDES
 from ..tables import LoadedTable
@@ -49,10 +49,9 @@ class LawOptions(Options):
         f"an object with one input and 1 to {MAX_CURVES} values of it, finite and >= 0",
         "One input that is left out elsewhere: one curve per value", None,
     )  # fmt: skip
-    include: list[LawInclude] | None = bounded(
-        f"a list of names from: approximations, {', '.join(INCLUDES)}", "More to compute at every value", None,
-        max_length=2 + 2 * len(INCLUDES),
-    )  # fmt: skip
+    include: Annotated[list[LawInclude], Field(max_length=2 + 2 * len(INCLUDES))] | None = bounded(
+        f"a list of names from: approximations, {', '.join(INCLUDES)}", "More to compute at every value", None
+    )
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
@@ -161,8 +160,8 @@ LawRequest.model_config["json_schema_extra"] = {
     ]
 }
 _only: Any = (
-    list[Literal["approximations"]] | None,
-    Field(None, max_length=4, description="approximations: those of the paper beside the exact values"),
+    Annotated[list[Literal["approximations"]], Field(max_length=4)] | NO_NULL,
+    Field(None, description="approximations: those of the paper beside the exact values"),
 )
 LawQuery: Any = query_of("LawQuery", LawRequest, include=_only, k=FIVE_QUERY["k"])
 
