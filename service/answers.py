@@ -98,28 +98,15 @@ def where(condition: Any, one: Any, other: Any) -> Any:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One name that ``include`` may hold.
-
-    Attributes
-    ----------
-    name, text : str
-        Its meaning, in one sentence.
-    parts : tuple of Part
-        The columns that it adds.
-    compute : callable
-        From :class:`Cases` to one column (n,) per part, in their order; NaN where there is no value.
-    cost : float
-        Time of a case, in times of a plain answer.
-    slopes : bool
-        Whether it needs the gradient.
-    """
+    """One name that ``include`` may hold."""
 
     name: str
-    text: str
-    parts: tuple[Part, ...]
+    text: str  # its meaning, in one sentence
+    parts: tuple[Part, ...]  # the columns that it adds
+    #: to one column (n,) per part, in their order; NaN where there is no value
     compute: Callable[[Cases], Sequence[Any]]
-    cost: float
-    slopes: bool = False
+    cost: float  # time of a case, in times of a plain answer
+    slopes: bool = False  # whether it needs the gradient
 
 
 #: the columns of every answer

@@ -91,16 +91,8 @@ def checked(
 ) -> tuple[dict[str, float], list[FieldFault]]:
     """The inputs of one case by field, with ``omega`` for ``f``, and all of its faults.
 
-    Parameters
-    ----------
-    given : mapping
-        Inputs by name; ``f`` may stand in place of ``omega``.
-    left_out : iterable of str
-        Inputs that the request asks for, which must not be given.
-    null_is_rigid : bool
-        Whether a k of null is a rigid contact: in a single case; in a batch it is a gap.
-    known : iterable of str
-        All names that the request may have, for the advice on another one.
+    ``left_out`` are the inputs that the request asks for, which must not be given.  A k of null is a rigid contact in a
+    single case; in a batch it is a gap.  ``known`` are all names that the request may have, for the advice on others.
     """
     values: dict[str, float] = {}
     faults: list[FieldFault] = []
@@ -123,29 +115,16 @@ def checked(
 
 @dataclass
 class Columns:
-    """The six inputs of ``size`` cases.
-
-    Attributes
-    ----------
-    size : int
-    six : list of ndarray
-        In the order of FIELDS, (size,) or (1,) where one value holds for all; a value that is no number is NaN.
-    reasons : dict of int to Reason
-        Why a case could not be read, for the first MAX_ERRORS of each column; such a case has a NaN.
-    hertz : bool
-        Whether the frequency was given as f.
-    listed : bool
-        Whether any input came as a list.
-    rows : bool
-        Whether the cases came one by one.
-    """
+    """The six inputs of ``size`` cases."""
 
     size: int
+    #: in the order of FIELDS, (size,) or (1,) where one value holds for all; a value that is no number is NaN
     six: list[Array]
+    #: why a case could not be read, for the first MAX_ERRORS of each column; such a case has a NaN
     reasons: dict[int, Reason] = field(default_factory=dict)
-    hertz: bool = False
-    listed: bool = True
-    rows: bool = False
+    hertz: bool = False  # whether the frequency was given as f
+    listed: bool = True  # whether any input came as a list
+    rows: bool = False  # whether the cases came one by one
 
     def part(self, start: int, stop: int) -> list[Array]:
         """The six columns of the cases from ``start`` to ``stop``."""

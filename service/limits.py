@@ -35,13 +35,7 @@ _ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b
 
 
 class Keys:
-    """API keys and the names of their holders; with none, the service is open to all.
-
-    Parameters
-    ----------
-    keys : mapping
-        API key -> name of its holder.
-    """
+    """API keys and the names of their holders, by key; with none, the service is open to all."""
 
     def __init__(self, keys: Mapping[str, str]) -> None:
         self._keys = [(key.encode("ascii"), name) for key, name in keys.items()]

@@ -141,13 +141,6 @@ class Tables:
             refuse([FieldFault(("tolerance",), reason, tolerance, parameter)], tightest_available=tightest)
         return min(fit, key=lambda table: (table.size_bytes, -table.surrogate.tolerance))
 
-    def named(self, identity: str) -> LoadedTable:
-        """The table of that name."""
-        found = {table.id: table for table in self._ready()}
-        if identity not in found:
-            refuse([FieldFault.of("id", f"must be one of {', '.join(found)}", identity)])
-        return found[identity]
-
     def _ready(self) -> tuple[LoadedTable, ...]:
         if self.fault is not None:
             raise RequestError(Kind.NOT_READY, self.fault)

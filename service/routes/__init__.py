@@ -56,40 +56,20 @@ _RETRY = {"description": "Seconds after which to send the request again", "schem
 
 @dataclass(frozen=True)
 class Endpoint:
-    """One path and method, and its description.
-
-    Attributes
-    ----------
-    path, method : str
-        ``GET`` answers ``HEAD``, too.
-    answer : callable
-        From a request to a response; what it raises becomes a problem document.
-    summary : str
-        Its title in OpenAPI, with the function's name as the operation's id; without one it is not described.
-    query, body, model : type of BaseModel, optional
-        The forms of the query, the body and the answer.
-    statuses : tuple of int
-        Of the problems that it can give, beside those of its kind.
-    content : mapping
-        Further descriptions of the answer, by status.
-    request : mapping, optional
-        The description of a body that is no model.
-    open : bool
-        Whether it needs no API key.
-    """
+    """One path and method, and its description; without a summary it is not described."""
 
     path: str
-    method: str
-    answer: Callable[[Request], Awaitable[Response]]
+    method: str  # GET answers HEAD, too
+    answer: Callable[[Request], Awaitable[Response]]  # its name is the operation's id
     summary: str = ""
     query: type[BaseModel] | None = None
     body: type[BaseModel] | None = None
-    model: Any = None
-    statuses: tuple[int, ...] = ()
-    content: Mapping[int | str, Any] = field(default_factory=dict)
-    request: Mapping[str, Any] | None = None
+    model: Any = None  # of the answer
+    statuses: tuple[int, ...] = ()  # of the problems that it can give, beside those of its kind
+    content: Mapping[int | str, Any] = field(default_factory=dict)  # further descriptions of answers, by status
+    request: Mapping[str, Any] | None = None  # the description of a body that is no model
     tag: str = "answers"
-    open: bool = False
+    open: bool = False  # whether it needs no API key
 
     def describe_to(self, app: FastAPI) -> None:
         """Add the route to an application, with its description."""

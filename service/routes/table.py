@@ -1,8 +1,8 @@
 """The table itself: ``GET /v1/table`` (metadata) and ``GET /v1/table.nc`` (the file)."""
 
-from typing import Any, Self
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -10,7 +10,7 @@ from mumacro.errors import TableError
 
 from .. import __version__
 from ..models import TableAnswer
-from ..options import Positive, bounded, relation
+from ..options import NO_NULL, Positive, bounded
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
@@ -20,35 +20,24 @@ __all__ = ["ENDPOINTS"]
 
 
 class TableChoice(BaseModel):
-    """Choice of a table: by id or by tolerance; with neither, the tightest."""
+    """Choice of a table; without a tolerance, the tightest."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
-    id: str | None = bounded("the name of a table", default=None)
-    tolerance: Positive | None = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
-
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
-        if self.id is not None and self.tolerance is not None:
-            raise relation("id", "choose by one id or by tolerance")
-        return self
+    tolerance: Positive | NO_NULL = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
 
 
 def _chosen(request: Request) -> LoadedTable:
-    given = given_in_query(request)
-    if "id" in given:
-        given["id"] = str(given["id"])
     try:
-        choice = TableChoice.model_validate(given)
+        choice = TableChoice.model_validate(given_in_query(request))
     except ValidationError as error:
         refuse(faults_of(error, TableChoice, TableChoice.model_fields))
-    tables = request.app.state.tables
-    table: LoadedTable = tables.pick(choice.tolerance) if choice.id is None else tables.named(choice.id)
+    table: LoadedTable = request.app.state.tables.pick(choice.tolerance)
     return table
 
 
 async def get_table(request: Request) -> Response:
-    """Describe the default table, or the one chosen by ``id`` or ``tolerance``; list all that are loaded."""
+    """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
     table = _chosen(request)
     surrogate = table.surrogate
     answer = {
