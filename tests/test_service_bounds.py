@@ -80,6 +80,16 @@ def test_a_body_that_never_ends_is_given_up(server, path, length):
     assert server.ask("GET", "/livez")[0] == 200
 
 
+@pytest.mark.parametrize("start", [b"", b"G", b"GET /livez HTTP/1.1\r\nX-Slow: "])
+def test_a_head_that_never_ends_is_given_up(server, start):
+    with connect(server) as raw:
+        raw.sendall(start)
+        if start:
+            drip(raw, b"x")
+        else:
+            assert read_to_end(raw) == b""
+
+
 def test_a_head_that_stops_after_an_answer_is_given_up(server):
     with connect(server) as raw:
         raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
