@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,13 +53,19 @@ _errors = logging.getLogger("mumacro.error")
 # --- logs ---------------------------------------------------------------------------------------------
 
 
+@lru_cache(1)
+def _second(seconds: int) -> str:
+    """A time in words; to make it takes longer than the rest of a line."""
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+
+
 class JsonFormatter(logging.Formatter):
     """One record, one line of JSON: time, level, logger, message, the record's ``fields``."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
         line: dict[str, Any] = {
-            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "time": f"{_second(int(record.created))}.{int(record.created % 1.0 * 1e3):03d}+00:00",
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),

@@ -22,15 +22,16 @@ _LARGE = 100  # cost from which one case is computed in a thread, in times of a 
 
 async def _answered(request: Request, given: Mapping[str, Any]) -> dict[str, Any]:
     options, case = read_form(Options, given)
-    table = request.app.state.tables.pick(options.tolerance)
+    state = request.app.state
+    table = state.tables.pick(options.tolerance)
     include, std = options.names(), options.deviations()
 
     def answer() -> tuple[dict[str, Any], int]:
         return answer_case(table.surrogate, case, include, std)
 
     large = bool(include) and cost_of(include) > _LARGE
-    values, source = await request.app.state.work.question(answer) if large else answer()
-    request.app.state.metrics.case(table, source)
+    values, source = await state.work.question(answer) if large else answer()
+    state.metrics.case(table, source)
     return {**values, **table.signature}
 
 
