@@ -213,7 +213,7 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
         fields[key] = (kind, info)
     for key in ("std", "family"):  # objects
         fields.pop(key, None)
-    if not changed:
+    if "std" in base.model_fields and not changed:
         for key, (unit, _) in SI.items():
             kind = Hertz if key == "f" else NotNegative
             told = bounded("finite and >= 0", f"Standard deviation [{unit}]", None)

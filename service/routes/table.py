@@ -10,7 +10,7 @@ from mumacro.errors import TableError
 
 from .. import __version__
 from ..models import TableAnswer
-from ..options import NO_NULL, Positive, bounded
+from ..options import Positive, bounded, query_of
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
@@ -24,7 +24,10 @@ class TableChoice(BaseModel):
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
-    tolerance: Positive | NO_NULL = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
+    tolerance: Positive | None = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
+
+
+TableQuery: Any = query_of("TableQuery", TableChoice)
 
 
 def _chosen(request: Request) -> LoadedTable:
@@ -73,11 +76,11 @@ _FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "
 ENDPOINTS = [
     Endpoint(
         "/v1/table", "GET", get_table, "Properties of a table",
-        query=TableChoice, model=TableAnswer, tag="table",
+        query=TableQuery, model=TableAnswer, tag="table",
     ),
     Endpoint(
         "/v1/table.nc", "GET", get_table_file, "The table as a netCDF-4 file",
-        query=TableChoice, statuses=(416,), tag="table",
+        query=TableQuery, statuses=(416,), tag="table",
         content={
             200: {"description": "The file", "content": _FILE},
             206: {"description": "The part of it that Range requests", "content": _FILE},
