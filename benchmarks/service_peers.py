@@ -39,8 +39,8 @@ def fastapi() -> Any:
     from fastapi import FastAPI
 
     from mumacro import Surrogate
-    from service.case import Case
     from service.models import CaseAnswer
+    from service.options import Case
 
     surrogate = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
     label = {"id": surrogate.id, "tolerance": surrogate.tolerance}

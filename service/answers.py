@@ -7,7 +7,6 @@ first entry, service/quantities.py has the others.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from mumacro.inputs import FIELDS
 __all__ = [
     "DEFAULT", "QUANTITIES", "REGIME_NAMES", "SOURCES", "Cases", "Part", "Quantity", "answer_case",
     "answer_columns", "cost_of", "nested", "parts_of", "register",
+    "where",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -42,6 +42,11 @@ class Part:
     kind: type = float
     names: tuple[str, ...] = ()
 
+    @property
+    def described(self) -> str:
+        """Its meaning and unit."""
+        return f"{self.text} [{self.unit}]"
+
     def value(self, number: float) -> Any:
         """One number of the column as JSON has it; NaN is written as null."""
         if self.names:
@@ -59,110 +64,81 @@ class Part:
 
 @dataclass
 class Cases:
-    """Legal cases that quantities are computed for: six columns (n,), k = inf is rigid, and what is known of them."""
+    """Legal cases that quantities are computed for: arrays (n,), or numbers of numpy for one; k = inf is rigid contact.
+
+    The groups are those of the library; the slopes, by name of the input, are there if a requested quantity needs them.
+    """
 
     surrogate: Surrogate
-    columns: Mapping[str, Array]
-    mu_macro: Array
-    mu_ratio: Array
-    error_bound: Array
-    source: Codes
+    columns: Mapping[str, Any]
+    answer: Any
     std: Mapping[str, float]
-    slopes: bool
 
-    @cached_property
-    def details(self) -> Any:
-        """Groups, and slopes if a requested quantity needs them: v_tilde, y_tilde, length_scale, gradient, ..."""
-        one = self.source.size == 1  # the library answers plain floats faster than arrays of one
-        given: dict[str, Any] = {name: column.item() if one else column for name, column in self.columns.items()}
-        answer = self.surrogate.evaluate(**given, gradient=self.slopes, groups=True)
-        return _Details(answer, np.isinf(self.columns["k"]))
+    def __post_init__(self) -> None:
+        answer = self.answer
+        found = [answer.mu_macro, answer.error_bound, answer.v_tilde, answer.y_tilde, answer.length_scale]
+        if isinstance(found[0], float):
+            found = list(map(np.float64, found))
+        self.mu_macro, self.error_bound, self.v_tilde, self.y_tilde, self.length_scale = found
+        self.at_rest: Any = (self.columns["y0"] == 0.0) | (self.columns["omega"] == 0.0)
+        #: elastic, oscillating, with groups within double range
+        self.usable: Any = np.isfinite(self.y_tilde) & ~self.at_rest
 
-    @cached_property
-    def at_rest(self) -> NDArray[np.bool_]:
-        """Where nothing oscillates."""
-        resting: NDArray[np.bool_] = (self.columns["y0"] == 0.0) | (self.columns["omega"] == 0.0)
-        return resting
-
-    @cached_property
-    def usable(self) -> NDArray[np.bool_]:
-        """Where the contact is elastic, oscillates, and its groups are within double range."""
-        known: NDArray[np.bool_] = np.isfinite(self.details.y_tilde) & ~self.at_rest
-        return known
+    def slopes(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """d mu_macro / d input and the bounds, NaN along k where contact is rigid."""
+        no_slope = where(np.isinf(self.columns["k"]), np.nan, 0.0)
+        slopes, bounds = self.answer.gradient, self.answer.gradient_bound
+        return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}
 
 
-class _Details:
-    """Groups and slopes (n,): the slopes by name of the input, NaN along k where contact is rigid."""
-
-    def __init__(self, answer: Any, rigid: NDArray[np.bool_]) -> None:
-        self.v_tilde, self.y_tilde, self.length_scale = (
-            np.atleast_1d(group) for group in (answer.v_tilde, answer.y_tilde, answer.length_scale)
-        )
-        self.gradient, self.gradient_bound = (
-            {name: np.atleast_1d(slope) for name, slope in (found or {}).items()}
-            for found in (answer.gradient, answer.gradient_bound)
-        )
-        if self.gradient:
-            for slopes in (self.gradient, self.gradient_bound):
-                slopes["k"] = np.where(rigid, np.nan, slopes["k"])
+def where(condition: Any, one: Any, other: Any) -> Any:
+    """``np.where``, which takes a microsecond for a single number."""
+    return np.where(condition, one, other) if isinstance(condition, np.ndarray) else one if condition else other
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """The default outputs, or one name that ``include`` may hold.
-
-    Attributes
-    ----------
-    name : str
-    text : str
-        Its meaning, in one sentence.
-    parts : tuple of Part
-        The columns that it adds.
-    compute : callable
-        From :class:`Cases` to one column (n,) per part, in their order; NaN where there is no value.
-    cost : float
-        Time of a case, in times of a plain answer.
-    slopes : bool
-        Whether it needs the gradient.
-    """
+    """One name that ``include`` may hold."""
 
     name: str
-    text: str
-    parts: tuple[Part, ...]
+    text: str  # its meaning, in one sentence
+    parts: tuple[Part, ...]  # the columns that it adds
+    #: to one column (n,) per part, in their order; NaN where there is no value
     compute: Callable[[Cases], Sequence[Any]]
-    cost: float
-    slopes: bool = False
+    cost: float  # time of a case, in times of a plain answer
+    slopes: bool = False  # whether it needs the gradient
 
 
-DEFAULT = Quantity(
-    "answer",
-    "The answer to a case",
-    (
-        Part("mu_macro", "-", "Macroscopic coefficient of friction"),
-        Part("mu_ratio", "-", "mu_macro/mu0, from 0 to 1"),
-        Part("regime", "-", "How the contact moves", str, REGIME_NAMES),
-        Part("error_bound", "-", "Bound of the absolute error of mu_macro"),
-        Part("source", "-", "Block of the table, or closed-form tail, that the value came from", str, tuple(SOURCES)),
-    ),
-    lambda cases: (cases.mu_macro, cases.mu_ratio, cases.source, cases.error_bound, cases.source),
-    cost=1,
+#: the columns of every answer
+DEFAULT = (
+    Part("mu_macro", "-", "Macroscopic coefficient of friction"),
+    Part("mu_ratio", "-", "mu_macro/mu0, from 0 to 1"),
+    Part("regime", "-", "How the contact moves", str, REGIME_NAMES),
+    Part("error_bound", "-", "Bound of the absolute error of mu_macro"),
+    Part("source", "-", "Block of the table, or closed-form tail, that the value came from", str, tuple(SOURCES)),
 )
+_NAMES = tuple(part.path for part in DEFAULT)
 QUANTITIES: dict[str, Quantity] = {}
 
 
-def register(quantity: Quantity) -> None:
-    """Add a quantity."""
-    QUANTITIES[quantity.name] = quantity
+def register(name: str, text: str, parts: Sequence[Part], cost: float, slopes: bool = False) -> Callable[[Any], Any]:
+    """Add the quantity that the decorated function computes."""
+
+    def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
+        QUANTITIES[name] = Quantity(name, text, tuple(parts), compute, cost, slopes)
+        return compute
+
+    return add
 
 
 def parts_of(include: Sequence[str]) -> list[Part]:
     """The columns of an answer with these quantities, in order."""
-    return [*DEFAULT.parts, *(part for name in include for part in QUANTITIES[name].parts)]
+    return [*DEFAULT, *(part for name in include for part in QUANTITIES[name].parts)]
 
 
 def cost_of(include: Sequence[str]) -> float:
     """Time of a case with these quantities, in times of a plain answer."""
-    return DEFAULT.cost + sum(QUANTITIES[name].cost for name in include)
+    return 1.0 + sum(QUANTITIES[name].cost for name in include)
 
 
 def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,25 +160,21 @@ def answer_case(
     surrogate: Surrogate, case: Mapping[str, float], include: Sequence[str] = (), std: Mapping[str, float] | None = None
 ) -> tuple[dict[str, Any], int]:
     """The answer to one legal case as plain Python values, and the code of its source; -1: the case is not legal."""
-    mu_macro, mu, bound, source = surrogate.evaluate_case(*(case[name] for name in FIELDS))
-    numbers = mu_macro, mu, source, bound, source
-    values = {part.path: part.value(number) for part, number in zip(DEFAULT.parts, numbers, strict=True)}
-    if include and source >= 0:
-        columns = {name: np.array([case[name]]) for name in FIELDS}
-        cases = _cases(surrogate, columns, [np.array([x]) for x in numbers[:2]], bound, source, include, std)
-        for part, column in zip(parts_of(include)[len(values) :], _computed(cases, include), strict=True):
-            values[part.path] = part.value(column[0].item())
-        values = nested(values)
-    return values, source
+    if not include:
+        macro, ratio, bound, source = surrogate.evaluate_case(*(case[name] for name in FIELDS))
+        return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[source], bound, SOURCES[source]), strict=True)), source
+    inputs: dict[str, Any] = {**case}
+    found = surrogate.evaluate(**inputs, gradient=_need_slopes(include))
+    source = found.source_code
+    numbers = found.mu_macro, found.mu_ratio, REGIME_NAMES[source], found.error_bound, SOURCES[source]
+    cases = Cases(surrogate, {name: np.float64(case[name]) for name in FIELDS}, found, std or {})
+    columns = zip(parts_of(include)[len(_NAMES) :], _computed(cases, include), strict=True)
+    more = nested({part.path: part.value(float(column)) for part, column in columns})
+    return {**dict(zip(_NAMES, numbers, strict=True)), **more}, source
 
 
-def _cases(
-    surrogate: Surrogate, columns: Mapping[str, Array], mu: Sequence[Array], bound: Any, source: Any,
-    include: Sequence[str], std: Mapping[str, float] | None,
-) -> Cases:  # fmt: skip
-    slopes = any(QUANTITIES[name].slopes for name in include)
-    codes = np.atleast_1d(np.asarray(source, dtype=np.int8))
-    return Cases(surrogate, columns, mu[0], mu[1], np.atleast_1d(bound), codes, std or {}, slopes)
+def _need_slopes(include: Sequence[str]) -> bool:
+    return any(QUANTITIES[name].slopes for name in include)
 
 
 def _computed(cases: Cases, include: Sequence[str]) -> list[Any]:
@@ -220,21 +192,15 @@ def answer_columns(
     """
     macro, ratio, bound, source = surrogate.evaluate_columns(six[0], six[1], six[2], six[3], six[4], six[5], n)
     parts = parts_of(include)
-    found: dict[str, Any] = dict(
-        zip((part.path for part in parts), (macro, ratio, source, bound, source), strict=False)
-    )
-    if include:
-        where = np.flatnonzero(source >= 0)
-        good = {
+    found: dict[str, Any] = {part.path: np.full(n, np.nan) for part in parts[len(DEFAULT) :]}
+    where = np.flatnonzero(source >= 0)
+    if include and where.size:
+        legal: dict[str, Any] = {
             name: column[where] if column.size == n else np.full(where.size, column[0])
             for name, column in zip(FIELDS, six, strict=True)
         }
-        extra = parts[len(DEFAULT.parts) :]
-        if where.size:
-            cases = _cases(surrogate, good, (macro[where], ratio[where]), bound[where], source[where], include, std)
-            computed = _computed(cases, include)
-        for i, part in enumerate(extra):
-            found[part.path] = np.full(n, np.nan)
-            if where.size:
-                found[part.path][where] = computed[i]
-    return found, source
+        answer = surrogate.evaluate(**legal, gradient=_need_slopes(include), groups=True)
+        cases = Cases(surrogate, legal, answer, std or {})
+        for column, values in zip(found.values(), _computed(cases, include), strict=True):
+            column[where] = values
+    return {**dict(zip(_NAMES, (macro, ratio, source, bound, source), strict=True)), **found}, source

@@ -1,4 +1,4 @@
-"""The application: ``create_app(settings)`` builds it from settings, tables, middleware and endpoints.
+"""The application: ``create_app(settings)`` builds it from settings, tables and endpoints.
 
 The import of this module does no work.  ``uvicorn --factory service.app:create_app`` works: without an argument the
 settings are read from the environment.
@@ -11,15 +11,19 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
+from pydantic.json_schema import models_json_schema
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Receive, Scope, Send
 
+from . import __version__
 from .limits import Keys, Work
+from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .observe import Metrics, Observe
-from .openapi import describe
+from .options import Case, CaseColumns
 from .problems import problem_of
 from .routes import Routes, batch, case, docs, health, law, page, solve_for, table
 from .settings import Settings, load_settings, unknown_variables
@@ -31,6 +35,14 @@ __all__ = ["Application", "create_app"]
 ENDPOINTS = [
     endpoint for module in (case, batch, solve_for, law, table, health, docs, page) for endpoint in module.ENDPOINTS
 ]
+_DESCRIPTION = (
+    "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and oscillates across the "
+    "sliding direction. Inputs in SI units; answers come from a table verified against the full model. "
+    "Errors are problem details (RFC 9457)."
+)
+# models that are described by name only
+_MORE: Any = [(Case, "validation"), (CaseColumns, "validation")]
+_MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
 _log = logging.getLogger("mumacro.app")
 
 
@@ -54,8 +66,8 @@ async def _problem(request: Request, error: Exception) -> Response:
 class Application(FastAPI):
     """The whole service.
 
-    The endpoints are plain functions behind one route: FastAPI's solving of dependencies takes longer than an answer
-    (docs/decisions/0011-wire.md).
+    FastAPI describes the endpoints, starts and ends the application, and answers what is none of them (the guide).
+    Requests to endpoints do not pass its layers (docs/decisions/0011-wire.md).
 
     Attributes
     ----------
@@ -65,35 +77,53 @@ class Application(FastAPI):
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(
-            openapi_url=None, docs_url=None, redoc_url=None, lifespan=_lifespan,
-            exception_handlers={HTTPException: _problem},
+            title="mumacro", version=__version__, description=_DESCRIPTION, docs_url=None, redoc_url=None,
+            openapi_url=None, redirect_slashes=False, lifespan=_lifespan, exception_handlers={HTTPException: _problem},
+            servers=[{"url": settings.root_path}] if settings.root_path else None,
         )  # fmt: skip
-        keys = Keys(settings.keys())
         state = self.state
         state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
         state.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
+        for endpoint in ENDPOINTS:
+            endpoint.describe_to(self)
         state.openapi = dump(self.openapi())
+        # The pages are the same for everyone and hold no number.  They ask for the key and send it with every request.
+        opened = {endpoint.path for endpoint in ENDPOINTS if endpoint.open}
         if settings.guide is not None:
             self.add_route("/guide", lambda _: RedirectResponse("guide/"))
             self.mount("/guide", StaticFiles(directory=settings.guide, html=True))
-        self.mount("", Routes(ENDPOINTS))
-        # The pages are the same for everyone and hold no number.  They ask for the key and send it with every request.
-        opened = frozenset(endpoint.path for endpoint in ENDPOINTS if endpoint.open)
-        self.add_middleware(
-            Observe, metrics=state.metrics, keys=keys, open_paths=opened, guide=settings.guide is not None
-        )
+            opened.add("/guide")
+        routes = Routes(ENDPOINTS, super().__call__)
+        self._front: ASGIApp = Observe(routes, state.metrics, Keys(settings.keys()), opened)
         if settings.cors_origins:
-            self.add_middleware(
-                CORSMiddleware,
+            self._front = CORSMiddleware(
+                self._front,
                 allow_origins=list(settings.cors_origins), allow_methods=["GET", "HEAD", "POST"],
                 allow_headers=["Content-Type", "X-API-Key", "Authorization", "If-None-Match", "X-Request-ID"],
                 expose_headers=["ETag", "X-Request-ID", "Retry-After"],
             )  # fmt: skip
 
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; the events of start and end are FastAPI's."""
+        if scope["type"] == "http":
+            scope["app"] = self
+            await self._front(scope, receive, send)
+        else:
+            await super().__call__(scope, receive, send)
+
     def openapi(self) -> dict[str, Any]:
         """The description of the interface."""
-        settings: Settings = self.state.settings
-        return describe(ENDPOINTS, settings.root_path, bool(settings.keys()))
+        if self.openapi_schema is None:
+            described = super().openapi()
+            _, more = models_json_schema(_MORE, ref_template="#/components/schemas/{model}")
+            described["components"]["schemas"] |= more["$defs"]
+            if self.state.settings.keys():
+                described["components"]["securitySchemes"] = {
+                    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
+                    "bearer": {"type": "http", "scheme": "bearer"},
+                }
+                described["security"] = [{"key": []}, {"bearer": []}]
+        return super().openapi()
 
 
 def create_app(settings: Settings | None = None) -> Application:

@@ -19,30 +19,10 @@ from starlette.types import Receive, Scope
 
 from mumacro.processors import processors
 
-from .problems import (
-    CLOSE,
-    BodyTooLargeError,
-    MalformedBodyError,
-    OverloadedError,
-    SlowClientError,
-    TookTooLongError,
-    UnauthorizedError,
-    UnsupportedBodyError,
-)
+from .problems import CLOSE, Kind, RequestError
 from .settings import Settings
 
-__all__ = [
-    "AT_ONCE",
-    "SMALL_BODY",
-    "Keys",
-    "Slots",
-    "Work",
-    "check_head",
-    "drained",
-    "media_type_of",
-    "read_body",
-    "wants_gzip",
-]
+__all__ = ["AT_ONCE", "SMALL_BODY", "Keys", "Slots", "Work", "check_head", "drained", "media_type_of", "read_body"]
 
 T = TypeVar("T")
 SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
@@ -55,13 +35,7 @@ _ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b
 
 
 class Keys:
-    """API keys and the names of their holders; with none, the service is open to all.
-
-    Parameters
-    ----------
-    keys : mapping
-        API key -> name of its holder.
-    """
+    """API keys and the names of their holders, by key; with none, the service is open to all."""
 
     def __init__(self, keys: Mapping[str, str]) -> None:
         self._keys = [(key.encode("ascii"), name) for key, name in keys.items()]
@@ -70,12 +44,7 @@ class Keys:
         return bool(self._keys)
 
     def holder(self, headers: Mapping[bytes, bytes]) -> str:
-        """The name of the holder of the request's key.
-
-        Raises
-        ------
-        UnauthorizedError
-        """
+        """The name of the holder of the request's key."""
         offered = headers.get(b"x-api-key")
         if offered is None:
             scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
@@ -85,74 +54,46 @@ class Keys:
             if secrets.compare_digest(offered, key):
                 found = name
         if found is None:
-            raise UnauthorizedError(
-                "send the API key as X-API-Key or as Authorization: Bearer",
-                headers={"WWW-Authenticate": "Bearer", **CLOSE},
-            )
+            fields = {"WWW-Authenticate": "Bearer", **CLOSE}
+            told = "send the API key as X-API-Key or as Authorization: Bearer"
+            raise RequestError(Kind.UNAUTHORIZED, told, headers=fields)
         return found
 
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
-    """Refuse a head that says two things, or asks for another protocol.
-
-    Raises
-    ------
-    MalformedBodyError
-    """
+    """Refuse a head that says two things, or asks for another protocol."""
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
             if names.count(name) > 1:
-                raise MalformedBodyError(f"the header {name.decode()} is given more than once", headers=CLOSE)
+                told = f"the header {name.decode()} is given more than once"
+                raise RequestError(Kind.MALFORMED_BODY, told, headers=CLOSE)
     if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
         # the body would be read as another protocol
-        raise MalformedBodyError("this service does not upgrade connections: send no Upgrade", headers=CLOSE)
+        told = "this service does not upgrade connections: send no Upgrade"
+        raise RequestError(Kind.MALFORMED_BODY, told, headers=CLOSE)
 
 
 def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
-    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first.
-
-    Raises
-    ------
-    UnsupportedBodyError
-        Another media type, another charset than UTF-8, or a compressed body.
-    """
-    given = headers.get(b"content-type")
-    found = next(iter(known.values()))
-    if given is not None and given != b"application/json":
-        media, _, parameters = given.decode("latin-1").lower().partition(";")
-        charset = parameters.strip().removeprefix("charset=").strip('"') if "charset=" in parameters else "utf-8"
-        named = known.get(media.strip())
-        if named is None or charset.split(";")[0].strip() not in ("utf-8", "utf8", "us-ascii"):
-            offer = ", ".join(dict.fromkeys(known.values()))
-            shown = given.decode("latin-1")[:80]
-            raise UnsupportedBodyError(f"send {offer}, not {shown}", headers={"Accept-Post": offer, **CLOSE})
-        found = named
+    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first."""
+    given = headers.get(b"content-type", b"").decode("latin-1")
+    media, _, parameters = given.lower().partition(";")
+    found = known.get(media.strip()) if given else next(iter(known.values()))
+    charset = parameters.partition("charset=")[2].partition(";")[0].strip('" ')
+    if found is None or charset not in ("", "utf-8", "utf8", "us-ascii"):
+        offer = ", ".join(dict.fromkeys(known.values()))
+        fields = {"Accept-Post": offer, **CLOSE}
+        raise RequestError(Kind.UNSUPPORTED_BODY, f"send {offer}, not {given[:80]}", headers=fields)
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":
-        raise UnsupportedBodyError(
-            "send the body without Content-Encoding", headers={"Accept-Encoding": "identity", **CLOSE}
-        )
+        fields = {"Accept-Encoding": "identity", **CLOSE}
+        raise RequestError(Kind.UNSUPPORTED_BODY, "send the body without Content-Encoding", headers=fields)
     return found
-
-
-def wants_gzip(offers: str) -> bool:
-    """Whether this value of Accept-Encoding accepts gzip."""
-    wanted = {}
-    for offer in offers.lower().split(","):
-        name, _, weight = offer.partition(";")
-        wanted[name.strip()] = weight.replace(" ", "").rstrip("0") not in ("q=", "q=0.")
-    return wanted.get("gzip", wanted.get("*", False))
 
 
 async def read_body(
     headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
 ) -> bytearray:
-    """The body of a request; ``large`` is called before more than SMALL_BODY is read.
-
-    Raises
-    ------
-    BodyTooLargeError, ClientDisconnect
-    """
+    """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
     length = headers.get(b"content-length", b"0")
     if not length.isdigit() or len(length) > 18 or int(length) > limit:
         raise _too_large(limit)
@@ -172,13 +113,13 @@ async def read_body(
     return body
 
 
-def _too_large(limit: int) -> BodyTooLargeError:
-    # The rest of the body is not used: without "close" the server would read all of it.
-    return BodyTooLargeError(
+def _too_large(limit: int) -> RequestError:
+    told = (
         f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
-        "Content-Length if they are more, and read the answer while you send",
-        headers=CLOSE, max_bytes=limit,
-    )  # fmt: skip
+        "Content-Length if they are more, and read the answer while you send"
+    )
+    # The rest of the body is not used: without "close" the server would read all of it.
+    return RequestError(Kind.BODY_TOO_LARGE, told, headers=CLOSE, max_bytes=limit)
 
 
 async def drained(receive: Receive) -> None:
@@ -211,15 +152,9 @@ class Slots:
         self._name = name
 
     def take(self) -> None:
-        """Take a slot; the code that called this gives it back.
-
-        Raises
-        ------
-        OverloadedError
-            No slot is free.
-        """
+        """Take a slot; the code that called this gives it back."""
         if self.used >= self.number:
-            raise OverloadedError(f"{self.used} {self._name} are being answered already", headers=CLOSE)
+            raise RequestError(Kind.OVERLOADED, f"{self.used} {self._name} are being answered already", headers=CLOSE)
         self.used += 1
 
     def give_back(self) -> None:
@@ -249,26 +184,16 @@ class Work:
 
     @asynccontextmanager
     async def deadline(self) -> AsyncIterator[None]:
-        """One time limit for a whole answer: reading, computing and sending.
-
-        Raises
-        ------
-        TookTooLongError
-        """
+        """One time limit for a whole answer: reading, computing and sending."""
         limit = self.settings.time_limit_s
         try:
             async with asyncio.timeout(limit):
                 yield
         except TimeoutError:
-            raise TookTooLongError(f"a request may take up to {limit} s", headers=CLOSE) from None
+            raise RequestError(Kind.TOOK_TOO_LONG, f"a request may take up to {limit} s", headers=CLOSE) from None
 
     async def question(self, work: Callable[[], T]) -> T:
-        """Do the work of a question in a thread and a slot; the slot is held until it is done, even without a client.
-
-        Raises
-        ------
-        OverloadedError, TookTooLongError
-        """
+        """Do the work of a question in a thread; its slot is held until it is done, even without a client."""
         self.questions.take()
         task = asyncio.ensure_future(self.questions.run(work))
 
@@ -282,15 +207,10 @@ class Work:
             return await asyncio.shield(task)
 
     async def client(self, move: Awaitable[T]) -> T:
-        """Wait for the client to send or to read.
-
-        Raises
-        ------
-        SlowClientError
-        """
+        """Wait for the client to send or to read."""
         limit = self.settings.client_timeout_s
         try:
             async with asyncio.timeout(limit):
                 return await move
         except TimeoutError:
-            raise SlowClientError(f"a client may take up to {limit} s", headers=CLOSE) from None
+            raise RequestError(Kind.SLOW_CLIENT, f"a client may take up to {limit} s", headers=CLOSE) from None

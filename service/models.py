@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, create_model
 
-from .answers import DEFAULT, QUANTITIES, Part
+from .answers import DEFAULT, QUANTITIES, Part, nested
 
 __all__ = [
     "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
@@ -48,11 +48,8 @@ def _kind(part: Part, listed: bool, null: bool) -> Any:
 def default(listed: bool) -> dict[str, Any]:
     """The default outputs as members of a model."""
     return {
-        part.path: (
-            _kind(part, listed, null=listed or part.path == "error_bound"),
-            Field(description=f"{part.text} [{part.unit}]"),
-        )
-        for part in DEFAULT.parts
+        part.path: (_kind(part, listed, listed or part.path == "error_bound"), Field(description=part.described))
+        for part in DEFAULT
     }
 
 
@@ -60,18 +57,15 @@ def included(listed: bool) -> dict[str, Any]:
     """Members that ``include`` adds to a model of an answer."""
     fields: dict[str, Any] = {}
     for quantity in QUANTITIES.values():
-        inner: dict[str, dict[str, Any]] = {}
-        for part in quantity.parts:
-            name, _, key = part.path.partition(".")
-            kind, text = _kind(part, listed, null=True), f"{part.text} [{part.unit}]"
-            if key:
-                inner.setdefault(name, {})[key] = (kind, Field(description=text))
+        kinds = {part.path: (_kind(part, listed, True), Field(description=part.described)) for part in quantity.parts}
+        for name, found in nested(kinds).items():
+            if isinstance(found, dict):
+                title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
+                model: Any = create_model(title, __doc__=f"{quantity.text}.", **found)
+                fields[name] = (model | None, Field(None, description="Only if requested"))
             else:
-                fields[name] = (kind | None, Field(None, description=f"Only if requested. {text}"))
-        for name, members in inner.items():
-            title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
-            model: Any = create_model(title, __doc__=f"{quantity.text}.", **members)
-            fields[name] = (model | None, Field(None, description="Only if requested"))
+                kind, told = found
+                fields[name] = (kind | None, Field(None, description=f"Only if requested. {told.description}"))
     return fields
 
 

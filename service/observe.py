@@ -1,24 +1,23 @@
 """What is seen of a request from outside: its id, its log line, its counters, and the answer to an exception.
 
-Logs are JSON lines on standard output, written by a thread of ``logging.handlers.QueueListener``.  Counters are those
+Logs are JSON lines on standard output, kept by ``logging.handlers.BufferingHandler`` for a thread.  Counters are those
 of prometheus_client; several workers share them through its multiprocess mode, in a private folder that is made at
 the start.
 """
 
-import atexit
 import itertools
 import logging
 import logging.handlers
 import os
-import queue
 import re
-import shutil
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from contextvars import ContextVar
+from collections.abc import Set as AbstractSet
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,12 +28,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.errors import MumacroError
 
+from .answers import REGIME_NAMES, SOURCES
 from .limits import Keys, check_head, drained
-from .problems import CLOSE, OverloadedError, SlowClientError, TookTooLongError, problem_of
+from .problems import CLOSE, Kind, RequestError, problem_of
 from .routes import path_of
 from .tables import LoadedTable, Tables
 
-__all__ = ["JsonFormatter", "LogQueue", "Metrics", "Observe", "log_config", "shared_counters"]
+__all__ = ["JsonFormatter", "LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
 
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})
@@ -44,13 +44,19 @@ _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and int
 _MOST_SHOWN = 64  # characters of a client's address: behind a proxy it is a header, of any length
 _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
 _WRITE_EVERY_S = 0.05
+_NO_SNIFF = (b"x-content-type-options", b"nosniff")
 
-request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 _access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
 
 
 # --- logs ---------------------------------------------------------------------------------------------
+
+
+@lru_cache(1)
+def _second(seconds: int) -> str:
+    """A time in words; to make it takes longer than the rest of a line."""
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
 
 
 class JsonFormatter(logging.Formatter):
@@ -59,7 +65,7 @@ class JsonFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
         line: dict[str, Any] = {
-            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "time": f"{_second(int(record.created))}.{int(record.created % 1.0 * 1e3):03d}+00:00",
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),
@@ -70,88 +76,67 @@ class JsonFormatter(logging.Formatter):
         return orjson.dumps(line, default=str).decode()
 
 
-class _Writer(logging.handlers.QueueListener):
-    """Writes what is in the queue in one go, twenty times a second: no request wakes this thread."""
+class LogLines(logging.handlers.BufferingHandler):
+    """Keeps records for a thread that writes them twenty times a second: a stalled reader delays no request.
 
-    _lines: list[str]
-
-    def dequeue(self, block: bool) -> logging.LogRecord:
-        """The next record; before it waits for one, all lines are written."""
-        while True:
-            try:
-                record: logging.LogRecord = self.queue.get_nowait()  # type: ignore[attr-defined]
-                return record
-            except queue.Empty:
-                if not block:
-                    raise
-                self.flush()
-                time.sleep(_WRITE_EVERY_S)
-
-    def handle(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
-        self._lines.append(self.handlers[0].format(record))
-
-    def flush(self) -> None:
-        """Write the lines by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
-        if self._lines:
-            rest = memoryview(("\n".join(self._lines) + "\n").encode("utf-8", "backslashreplace"))
-            self._lines.clear()
-            with suppress(OSError):  # the reader is gone
-                while rest:
-                    rest = rest[os.write(1, rest) :]
-
-
-class LogQueue(logging.handlers.QueueHandler):
-    """Hands records to the thread that writes them: a stalled reader of the log delays no request.
-
-    Lines that find the queue full are dropped, and counted in the next line that does not.
+    Records that find the buffer full are dropped, and counted in a line that follows.
     """
 
     def __init__(self) -> None:
-        self._records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
-        super().__init__(self._records)
-        formatter = logging.NullHandler()
-        formatter.setFormatter(JsonFormatter())
-        self._writer = _Writer(self._records, formatter)
-        self._writer._lines = []
-        self._writer.start()
-        self._dropped = 0
-        atexit.register(self._finish)
+        super().__init__(_MOST_WAITING)
+        self.setFormatter(JsonFormatter())
+        self._dropped, self._writes = 0, False
+        threading.Thread(target=self._write, name="log", daemon=True).start()
 
-    def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
-        """The record as it is, with the id of its request: it stays in this process."""
-        current = request_id.get()
-        if current is not None:
-            record.fields = {"request_id": current, **getattr(record, "fields", {})}
-        return record
-
-    def enqueue(self, record: logging.LogRecord) -> None:
-        """Queue a record if there is room."""
-        if self._records.qsize() >= _MOST_WAITING:
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a record if there is room."""
+        if len(self.buffer) < self.capacity:
+            self.buffer.append(record)
+        else:
             self._dropped += 1
-            return
-        if self._dropped:
-            told = f"{self._dropped} lines of the log were dropped: standard output was not read in time"
-            fields = {"name": __name__, "levelno": logging.WARNING, "levelname": "WARNING", "msg": told}
-            self._records.put(logging.makeLogRecord(fields))
-            self._dropped = 0
-        self._records.put(record)
 
-    def _finish(self) -> None:
-        """Wait a second at most for the last lines."""
+    def _write(self) -> None:
+        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
+        while True:
+            time.sleep(_WRITE_EVERY_S)
+            with self.lock or nullcontext():
+                records, self.buffer, dropped, self._dropped = self.buffer, [], self._dropped, 0
+                self._writes = bool(records)
+            if dropped:
+                told = f"{dropped} lines of the log were dropped: standard output was not read in time"
+                fields = {"name": __name__, "levelno": logging.WARNING, "levelname": "WARNING", "msg": told}
+                records.append(logging.makeLogRecord(fields))
+            rest = memoryview("".join(f"{self.format(record)}\n" for record in records).encode())
+            with suppress(OSError):  # the reader is gone
+                while rest:
+                    rest = rest[os.write(1, rest) :]
+            self._writes = False
+
+    def flush(self) -> None:
+        """At the end, wait a second at most for the last lines."""
         until = time.monotonic() + 1.0
-        while (not self._records.empty() or self._writer._lines) and time.monotonic() < until:
+        while (self.buffer or self._writes) and time.monotonic() < until:
             time.sleep(0.01)
+
+
+class AccessRecord(logging.LogRecord):
+    """The record of a request.  It has no place in a source file: finding that takes longer than all the rest."""
+
+    def __init__(self, level: int, fields: dict[str, Any]) -> None:
+        own = {"levelno": level, "levelname": _LEVELS[level], "created": time.time(), "fields": fields}
+        self.__dict__ = {**_SAME, **own}
+
+
+_LEVELS = {logging.DEBUG: "DEBUG", logging.INFO: "INFO"}
+_SAME = vars(logging.LogRecord("mumacro.access", logging.INFO, "", 0, "request", None, None))
 
 
 def log_config(level: str) -> dict[str, Any]:
     """A ``logging.config.dictConfig`` for this process: everything to standard output, as JSON lines."""
-    # parts of a record that no line shows
-    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
     return {
         "version": 1,
         "disable_existing_loggers": False,
-        "handlers": {"out": {"()": LogQueue}},
+        "handlers": {"out": {"()": LogLines}},
         "root": {"level": "WARNING", "handlers": ["out"]},
         "loggers": {name: {"level": level.upper()} for name in ("mumacro", "uvicorn")},
     }
@@ -162,22 +147,18 @@ def log_config(level: str) -> dict[str, Any]:
 
 @contextmanager
 def shared_counters() -> Iterator[None]:
-    """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end."""
-    for place in ("/dev/shm", None):  # noqa: S108  (mkdtemp makes a folder of its own there)
-        try:
-            folder = tempfile.mkdtemp(prefix="mumacro-metrics-", dir=place)
-            break
-        except OSError:
-            continue
-    else:  # no writable folder: every worker reports its own counters
+    """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end.
+
+    Without a writable folder every worker reports its own counters.
+    """
+    with ExitStack() as stack:
+        for place in ("/dev/shm", None):  # noqa: S108  (a folder of its own is made there)
+            with suppress(OSError):
+                made = tempfile.TemporaryDirectory(prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True)
+                os.environ[_SHARED] = stack.enter_context(made)
+                break
         yield
-        return
-    os.environ[_SHARED] = folder
-    try:
-        yield
-    finally:
         os.environ.pop(_SHARED, None)
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 class Metrics:
@@ -187,24 +168,17 @@ class Metrics:
         from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics
 
         disable_created_metrics()  # type: ignore[no-untyped-call]
-
         self._paths = paths
-        self.registry = CollectorRegistry()
-        self._requests = Counter(
-            "mumacro_requests", "Finished requests", ["route", "method", "status"], registry=self.registry
-        )
+        self.registry = own = CollectorRegistry()
+        self._requests = Counter("mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own)
+        told = "From the head of a request to the end of its answer"
         self._durations = Histogram(
-            "mumacro_request_duration_seconds", "From the head of a request to the end of its answer", ["route"],
-            buckets=_BUCKETS_S, registry=self.registry,
-        )  # fmt: skip
-        self._cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=self.registry)
-        self._bad = Counter(
-            "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=self.registry
+            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
         )
-        self._info = Gauge(
-            "mumacro_table_info", "Loaded tables", ["id", "tolerance"], registry=self.registry,
-            multiprocess_mode="mostrecent",
-        )  # fmt: skip
+        self._cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own)
+        self._bad = Counter("mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own)
+        labels = ["id", "tolerance"]
+        self._info = Gauge("mumacro_table_info", "Loaded tables", labels, registry=own, multiprocess_mode="mostrecent")
         self._known: dict[tuple[str, str, int], tuple[Any, Any]] = {}
         self._sources: dict[tuple[str, int], Any] = {}
 
@@ -217,26 +191,19 @@ class Metrics:
     def request(self, path: str, method: str, status: int, seconds: float) -> None:
         """Count one request."""
         key = path if path in self._paths else "other", method if method in _METHODS else "other", status
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = (
-                self._requests.labels(key[0], key[1], str(status)),
-                self._durations.labels(key[0]),
-            )
-        found[0].inc()
-        found[1].observe(seconds)
+        if key not in self._known:
+            self._known[key] = self._requests.labels(*key), self._durations.labels(key[0])
+        count, durations = self._known[key]
+        count.inc()
+        durations.observe(seconds)
 
     def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
         """Count answered cases of one source code; -1 are bad ones."""
-        found = self._sources.get((table.id, source))
-        if found is None:
-            from .answers import REGIME_NAMES, SOURCES
-
-            names = (table.id, SOURCES[source], REGIME_NAMES[source])
-            found = self._sources[table.id, source] = (
-                self._bad.labels(table.id) if source < 0 else self._cases.labels(*names)
-            )
-        found.inc(number)
+        key = table.id, source
+        if key not in self._sources:
+            names = table.id, SOURCES[source], REGIME_NAMES[source]
+            self._sources[key] = self._bad.labels(table.id) if source < 0 else self._cases.labels(*names)
+        self._sources[key].inc(number)
 
     def cases(self, table: LoadedTable, source: Any) -> None:
         """Count the cases of a batch by their source codes, bad ones among them."""
@@ -260,79 +227,66 @@ class Metrics:
 
 
 class Observe:
-    """Middleware: id, key, log line, counters, and problem details for every exception."""
+    """Middleware: id, key, log line, counters, and problem details for every exception.
 
-    def __init__(
-        self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: frozenset[str], guide: bool = False
-    ) -> None:
+    ``open_paths`` need no key; ``/guide`` among them opens all that is below it.
+    """
+
+    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: AbstractSet[str]) -> None:
         self.app = app
-        self._metrics, self._keys, self._open_paths, self._guide = metrics, keys, open_paths, guide
-        self._stem, self._numbers = os.urandom(8).hex().encode(), itertools.count(int.from_bytes(os.urandom(6)))
+        self._metrics, self._keys, self._open_paths = metrics, keys, open_paths
+        self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Run one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
         started = time.perf_counter()
         headers: dict[bytes, bytes] = dict(scope["headers"])
-        identity = headers.get(b"x-request-id", b"")
-        if not _ID.fullmatch(identity):
-            identity = b"%b%016x" % (self._stem, next(self._numbers))
-        shown = scope["request_id"] = identity.decode("ascii")
-        token = request_id.set(shown)
+        offered = headers.get(b"x-request-id", b"")
+        identity = offered.decode() if _ID.fullmatch(offered) else f"{self._stem}{next(self._numbers):016x}"
+        scope["request_id"] = identity
         path, status, holder = path_of(scope), 0, None
 
         async def send_marked(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [
-                    *message["headers"], (b"x-request-id", identity), (b"x-content-type-options", b"nosniff"),
-                ]  # fmt: skip
+                message["headers"] = [*message["headers"], (b"x-request-id", identity.encode()), _NO_SNIFF]
             await send(message)
 
         try:
-            if scope.get("state", {}).get("full") and path not in HEALTH_PATHS:
-                raise OverloadedError("too many connections are open", headers=CLOSE)
+            if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
+                raise RequestError(Kind.OVERLOADED, "too many connections are open", headers=CLOSE)
             check_head(scope, headers)
-            guide = self._guide and (path == "/guide" or path.startswith("/guide/"))
-            if self._keys and path not in self._open_paths and not guide:
+            if self._keys and not self._is_open(path):
                 holder = self._keys.holder(headers)
             await self.app(scope, receive, send_marked)
         except ClientDisconnect:
             status = 499  # the usual status for a client that disconnected before the answer
         except Exception as error:
             if not isinstance(error, (MumacroError, HTTPException, MemoryError)):
-                _errors.exception("unexpected error", extra={"fields": {"path": scope["path"]}})
+                fields = {"request_id": identity, "path": scope["path"]}
+                _errors.exception("unexpected error", extra={"fields": fields})
             if status:  # the answer has begun: end the connection without its end
                 status = 499
                 raise ClientDisconnect from error
             answer = problem_of(error, scope)
-            unread = not isinstance(error, (SlowClientError, TookTooLongError)) and b"expect" not in headers
-            if answer.headers.get("connection") == "close" and unread:
+            late = getattr(error, "kind", None) in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
+            if answer.headers.get("connection") == "close" and not late and b"expect" not in headers:
                 await drained(receive)
             await answer(scope, receive, send_marked)
         finally:
             seconds = time.perf_counter() - started
             self._metrics.request(path, scope["method"], status, seconds)
-            self._log(scope, path, status, seconds, holder)
-            request_id.reset(token)
+            level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
+            if _access.isEnabledFor(level):
+                client = scope.get("client")
+                fields = {
+                    "request_id": identity, "method": scope["method"], "path": path, "status": status,
+                    "duration_ms": round(1e3 * seconds, 3), "client": client[0][:_MOST_SHOWN] if client else None,
+                }  # fmt: skip
+                if holder is not None:
+                    fields["key"] = holder
+                _access.handle(AccessRecord(level, fields))
 
-    def _log(self, scope: Scope, path: str, status: int, seconds: float, holder: str | None) -> None:
-        level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
-        if not _access.isEnabledFor(level):
-            return
-        client = scope.get("client")
-        fields = {
-            "method": scope["method"], "path": path, "status": status, "duration_ms": round(1e3 * seconds, 3),
-            "client": client[0][:_MOST_SHOWN] if client else None,
-        }  # fmt: skip
-        if holder is not None:
-            fields["key"] = holder
-        _access.handle(
-            logging.makeLogRecord({
-                "name": "mumacro.access", "levelno": level, "levelname": logging.getLevelName(level),
-                "msg": "request", "fields": fields,
-            })
-        )  # fmt: skip
+    def _is_open(self, path: str) -> bool:
+        return path in self._open_paths or (path.startswith("/guide/") and "/guide" in self._open_paths)

@@ -5,128 +5,93 @@ Equation numbers are those of Benad, Nakano, Popov, Popov, "Active control of fr
 """
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, reduce
 from statistics import NormalDist
 
 import numpy as np
 
-from mumacro.charts import REGIME_OF_SOURCE, REGIMES, ROUNDING
+from mumacro.charts import ROUNDING
 from mumacro.inputs import FIELDS, SI
 from mumacro.settling import settling
 
-from .answers import QUANTITIES, Array, Cases, Part, Quantity, register
+from .answers import QUANTITIES, Array, Cases, Part, register, where
 
 __all__ = ["INCLUDES"]
 
 SAMPLES = 256  # of the inputs, for std_sampled
 ENOUGH = 0.1  # relative difference of std_sampled and std up to which first order counts as enough
-_STATIC = REGIMES.index("static")
-
-# --- groups and marks on the friction law -------------------------------------------------------------
+_PER = {name: "-" if unit == "-" else f"1/({unit})" for name, (unit, _) in SI.items()}
 
 
-def _groups(cases: Cases) -> Sequence[Array]:
-    return cases.details.v_tilde, cases.details.y_tilde, cases.details.length_scale
-
-
-register(
-    Quantity(
-        "groups",
-        "Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double range)",
-        (
-            Part("groups.v_tilde", "-", "v0/(l0 omega)"),
-            Part("groups.y_tilde", "-", "y0/l0"),
-            Part("groups.l0", "m", "Length scale mu0 Fz/k; 0 for rigid contact"),
-        ),
-        _groups,
-        cost=2,
-    )
+@register(
+    "groups",
+    "Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double range)",
+    (
+        Part("groups.v_tilde", "-", "v0/(l0 omega)"),
+        Part("groups.y_tilde", "-", "y0/l0"),
+        Part("groups.l0", "m", "Length scale mu0 Fz/k; 0 for rigid contact"),
+    ),
+    cost=2,
 )
+def _groups(cases: Cases) -> Sequence[Array]:
+    return cases.v_tilde, cases.y_tilde, cases.length_scale
 
 
+@register(
+    "limits",
+    "Marks on the friction law of this case; null: beyond double range",
+    (
+        Part("limits.mu_static", "-", "Static limit, v0 -> 0, eq. (38): mu0 sqrt(1 - y~^2), or 0 for y~ >= 1"),
+        Part("limits.v0_crit", "m/s", "Velocity at the border of continuous sliding"),
+        Part("limits.mu_crit", "-", "mu_macro at that border"),
+    ),
+    cost=4,
+)
 def _limits(cases: Cases) -> Sequence[Array]:
     # Rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0, with mu_crit -> 0.
-    mu0, omega = cases.columns["mu0"], cases.columns["omega"]
-    y_tilde, surrogate = cases.details.y_tilde, cases.surrogate
-    y = np.where(cases.usable, y_tilde, 1.0)
-    v = np.asarray(surrogate.v_tilde_crit(y))
-    ratio = np.asarray(surrogate.mu_ratio(v, y))
-    below = np.minimum(y_tilde, 1.0)
+    mu0, omega, surrogate = cases.columns["mu0"], cases.columns["omega"], cases.surrogate
+    y = where(cases.usable, cases.y_tilde, 1.0)
+    v = surrogate.v_tilde_crit(y)
+    below = np.minimum(cases.y_tilde, 1.0)
     static = mu0 * np.sqrt((1.0 - below) * (1.0 + below))  # keeps the digits that 1 - y^2 loses near y~ = 1
     rest, rigid = cases.at_rest, np.isinf(cases.columns["k"])
-    speed = np.where(cases.usable, cases.details.length_scale * v * omega, np.nan)
-    crit = np.where(cases.usable, mu0 * ratio, np.nan)
+    speed = where(cases.usable, cases.length_scale * v * omega, np.nan)
+    crit = where(cases.usable, mu0 * surrogate.mu_ratio(v, y), np.nan)
     return (
-        np.where(rest, mu0, np.where(rigid, 0.0, static)),
-        np.where(rest | rigid, 0.0, speed),
-        np.where(rest, mu0, np.where(rigid, 0.0, crit)),
+        where(rest, mu0, where(rigid, 0.0, static)),
+        where(rest | rigid, 0.0, speed),
+        where(rest, mu0, where(rigid, 0.0, crit)),
     )
 
 
-register(
-    Quantity(
-        "limits",
-        "Marks on the friction law of this case; null: beyond double range",
-        (
-            Part("limits.mu_static", "-", "Static limit, v0 -> 0, eq. (38): mu0 sqrt(1 - y~^2), or 0 for y~ >= 1"),
-            Part("limits.v0_crit", "m/s", "Velocity at the border of continuous sliding"),
-            Part("limits.mu_crit", "-", "mu_macro at that border"),
-        ),
-        _limits,
-        cost=4,
-    )
+@register(
+    "regime_certain",
+    "Whether the regime is certain",
+    [Part("regime_certain", "-", "false: within the error of this table's border", bool)],
+    cost=3,
 )
-
-
 def _regime_certain(cases: Cases) -> Sequence[Array]:
-    y = np.where(cases.usable, cases.details.y_tilde, 1.0)
-    crit = np.asarray(cases.surrogate.v_tilde_crit(y))
-    distance = np.abs(cases.details.v_tilde / crit - 1.0)
-    clear = (
-        ~cases.usable
-        | (REGIME_OF_SOURCE[cases.source] == _STATIC)
-        | (distance > (cases.surrogate.border.max_rel_error + ROUNDING))
-    )
-    return (clear.astype(np.float64),)
+    return ((cases.answer.regime_certain | ~cases.usable).astype(np.float64),)
 
-
-register(
-    Quantity(
-        "regime_certain",
-        "Whether the regime is certain",
-        (Part("regime_certain", "-", "false: within the error of this table's border", bool),),
-        _regime_certain,
-        cost=3,
-    )
-)
 
 # --- sensitivity and uncertainty ----------------------------------------------------------------------
 
-_UNITS = {name: unit for name, (unit, _) in SI.items()}
-_PER = {name: "-" if unit == "-" else f"1/({unit})" for name, unit in _UNITS.items()}
 
-
-def _gradient(cases: Cases) -> Sequence[Array]:
-    slopes, bounds = cases.details.gradient, cases.details.gradient_bound
-    return [slopes[name] for name in FIELDS] + [bounds[name] for name in FIELDS]
-
-
-register(
-    Quantity(
-        "gradient",
-        "d mu_macro / d input; null: not finite, or no such input (k of rigid contact)",
-        (
-            *(Part(f"gradient.{name}", _PER[name], f"d mu_macro / d {name}") for name in FIELDS),
-            *(
-                Part(f"gradient_bound.{name}", _PER[name], "Bound of its absolute error; null: not in this table")
-                for name in FIELDS
-            ),
+@register(
+    "gradient",
+    "d mu_macro / d input; null: not finite, or no such input (k of rigid contact)",
+    [
+        *(Part(f"gradient.{name}", _PER[name], f"d mu_macro / d {name}") for name in FIELDS),
+        *(
+            Part(f"gradient_bound.{name}", _PER[name], "Bound of its absolute error; null: not in this table")
+            for name in FIELDS
         ),
-        _gradient,
-        cost=6,
-        slopes=True,
-    )
+    ],
+    cost=6,
+    slopes=True,
 )
+def _gradient(cases: Cases) -> Sequence[Array]:
+    return [found[name] for found in cases.slopes() for name in FIELDS]
 
 
 @cache
@@ -149,142 +114,109 @@ def _sampled(cases: Cases) -> Array:
     total, squares, count = np.zeros(n), np.zeros(n), np.zeros(n)
     deviations = np.array([cases.std.get(name, 0.0) for name in FIELDS])
     for point in _normal_samples():
-        shifted = [
-            cases.columns[name] + shift if shift else cases.columns[name]
-            for name, shift in zip(FIELDS, (point * deviations).tolist(), strict=True)
-        ]
-        a, b, c, d, e, f = shifted
-        mu, _, _, _ = cases.surrogate.evaluate_columns(a, b, c, d, e, f, n)
-        off = np.where(np.isnan(mu), 0.0, mu - cases.mu_macro)
-        total += off
-        squares += off * off
-        count += ~np.isnan(mu)
-    mean = total / count
-    spread: Array = np.sqrt(np.maximum(squares / count - mean * mean, 0.0))
-    return spread
+        pairs = zip(FIELDS, point * deviations, strict=True)
+        a, b, c, d, e, f = (np.atleast_1d(cases.columns[name] + shift) for name, shift in pairs)
+        off = cases.surrogate.evaluate_columns(a, b, c, d, e, f, n)[0] - cases.mu_macro
+        total += np.nan_to_num(off)
+        squares += np.nan_to_num(off * off)
+        count += ~np.isnan(off)
+    spread: Array = np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
+    return spread.reshape(cases.mu_macro.shape)
 
 
+@register(
+    "std",
+    "Standard deviation of mu_macro from independent standard deviations of the inputs",
+    [
+        Part("std", "-", "To first order, from the gradient"),
+        Part("std_bound", "-", "The part of std that comes from the gradient's own bound; null: not in this table"),
+        *(Part(f"std_share.{name}", "-", f"Share of {name} in the variance, 0 to 1") for name in FIELDS),
+        Part("std_sampled", "-", f"Over {SAMPLES} evenly spread samples of normal inputs, those in bounds"),
+        Part(
+            "std_first_order_enough", "-",
+            f"false: std and std_sampled differ by more than {ENOUGH:.0%}, use the sampled value", bool,
+        ),
+    ],
+    cost=SAMPLES + 6,
+    slopes=True,
+)  # fmt: skip
 def _std(cases: Cases) -> Sequence[Array]:
-    n = cases.mu_macro.size
-    terms, doubts = {}, {}
-    for name in FIELDS:
-        deviation = cases.std.get(name, 0.0)
-        slope, bound = cases.details.gradient[name], cases.details.gradient_bound[name]
-        if name == "k":  # has no effect where contact is rigid
-            rigid = np.isinf(cases.columns["k"])
-            slope, bound = np.where(rigid, 0.0, slope), np.where(rigid, 0.0, bound)
-        # an infinite slope has no effect where the input is exact
-        terms[name] = slope * deviation if deviation else np.zeros(n)
-        doubts[name] = bound * deviation if deviation else np.zeros(n)
-    std = np.zeros(n)
-    doubt = np.zeros(n)
-    for name in FIELDS:
-        std, doubt = np.hypot(std, terms[name]), np.hypot(doubt, doubts[name])
-    shares = [np.where(std > 0.0, (terms[name] / std) ** 2, 0.0) for name in FIELDS]
-    sampled = _sampled(cases) if any(cases.std.values()) else np.zeros(n)
+    # k has no effect where contact is rigid, nor has an infinite slope where the input is exact
+    exact = {
+        name: (np.isinf(cases.columns["k"]) if name == "k" else False) | (cases.std.get(name, 0.0) == 0.0)
+        for name in FIELDS
+    }
+    terms, doubts = (
+        [where(exact[name], 0.0, found[name] * cases.std.get(name, 0.0)) for name in FIELDS] for found in cases.slopes()
+    )
+    std, doubt = (reduce(np.hypot, found, 0.0 * cases.mu_macro) for found in (terms, doubts))
+    shares = [where(std > 0.0, (term / std) ** 2, 0.0) for term in terms]
+    sampled = _sampled(cases) if any(cases.std.values()) else 0.0 * std
     enough = np.abs(sampled - std) <= ENOUGH * sampled + np.nan_to_num(doubt) + 4.0 * cases.error_bound
     return [std, doubt, *shares, sampled, enough.astype(np.float64)]
 
 
-register(
-    Quantity(
-        "std",
-        "Standard deviation of mu_macro from independent standard deviations of the inputs",
-        (
-            Part("std", "-", "To first order, from the gradient"),
-            Part("std_bound", "-", "The part of std that comes from the gradient's own bound; null: not in this table"),
-            *(Part(f"std_share.{name}", "-", f"Share of {name} in the variance, 0 to 1") for name in FIELDS),
-            Part("std_sampled", "-", f"Over {SAMPLES} evenly spread samples of normal inputs, those in bounds"),
-            Part(
-                "std_first_order_enough", "-",
-                f"false: std and std_sampled differ by more than {ENOUGH:.0%}, use the sampled value", bool,
-            ),
-        ),
-        _std,
-        cost=SAMPLES + 6,
-        slopes=True,
-    )
-)  # fmt: skip
-
 # --- stick fraction, power and settling -----------------------------------------------------------------
 
 
+@register(
+    "stick_fraction",
+    "Share of the period during which the contact sticks",
+    (
+        Part("stick_fraction", "-", "Share of the period during which the contact sticks"),
+        Part("stick_fraction_bound", "-", "Bound of its absolute error, larger at the border; null: not known"),
+    ),
+    cost=4,
+)
 def _stick_fraction(cases: Cases) -> Sequence[Array]:
-    v, y = cases.details.v_tilde, cases.details.y_tilde
-    value, error = cases.surrogate.stick_fraction_with_bound(v, y)
-    bound = np.full(v.shape, np.nan) if error is None else np.asarray(error)
+    value, bound = cases.surrogate.stick_fraction_with_bound(cases.v_tilde, cases.y_tilde)
     # y~ below double range: the groups do not show whether such a contact sticks
-    lost = (y == 0.0) & (v < np.inf) & ~cases.at_rest
-    return np.asarray(value), np.where(lost, 1.0, bound)
+    lost = (cases.y_tilde == 0.0) & (cases.v_tilde < np.inf) & ~cases.at_rest
+    return value, where(lost, 1.0, bound)
 
 
-register(
-    Quantity(
-        "stick_fraction",
-        "Share of the period during which the contact sticks",
-        (
-            Part("stick_fraction", "-", "Share of the period during which the contact sticks"),
-            Part("stick_fraction_bound", "-", "Bound of its absolute error, larger at the border; null: not known"),
-        ),
-        _stick_fraction,
-        cost=4,
-    )
-)  # fmt: skip
-
-
+@register(
+    "power",
+    "Mean powers; null: not finite in double precision",
+    (
+        Part("power.oscillation", "W", "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid"),
+        Part("power.saved", "W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
+        Part("power_bound.oscillation", "W", "Bound of the absolute error; null also where not in this table"),
+        Part("power_bound.saved", "W", "Bound of the absolute error of saved"),
+    ),
+    cost=5,
+)
 def _power(cases: Cases) -> Sequence[Array]:
-    columns, details = cases.columns, cases.details
+    columns = cases.columns
     mu0, load, omega, v0 = (columns[name] for name in ("mu0", "Fz", "omega", "v0"))
-    usable = cases.usable & np.isfinite(details.v_tilde)
-    v, y = (np.where(usable, group, 1.0) for group in (details.v_tilde, details.y_tilde))
-    unit = mu0 * load * (details.length_scale * omega)
-    value, error = cases.surrogate.power_with_bound(v, y)
-    bound = np.nan if error is None else np.asarray(error) * unit
+    unit = where(cases.usable, mu0 * load * (cases.length_scale * omega), np.nan)
+    v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
+    value, bound = cases.surrogate.power_with_bound(v, y)
     saved = (mu0 - cases.mu_macro) * load * v0
     return (
-        np.where(cases.at_rest, 0.0, np.where(usable, np.asarray(value) * unit, np.nan)),
+        where(cases.at_rest, 0.0, value * unit),
         saved,
-        np.where(cases.at_rest, 0.0, np.where(usable, bound, np.nan)),
+        where(cases.at_rest, 0.0, bound * unit),
         cases.error_bound * load * v0 + ROUNDING * np.abs(saved),
     )
 
 
-register(
-    Quantity(
-        "power",
-        "Mean powers; null: not finite in double precision",
-        (
-            Part("power.oscillation", "W", "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; null: rigid"),
-            Part("power.saved", "W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
-            Part("power_bound.oscillation", "W", "Bound of the absolute error; null also where not in this table"),
-            Part("power_bound.saved", "W", "Bound of the absolute error of saved"),
-        ),
-        _power,
-        cost=5,
-    )
+@register(
+    "settling",
+    "Periods until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never slips",
+    (
+        Part("settling.periods", "-", "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many"),
+        Part("settling.periods_any", "-", "For a disturbance of any size: twice as many"),
+        Part("settling.time", "s", "periods as a time; also without oscillation"),
+        Part("settling.slip_path", "-", "Path of the foot in a period over l0; null also for rigid contact"),
+        Part("settling_bound.periods", "-", "Bound of the absolute error of periods; null also: not known"),
+    ),
+    cost=5,
 )
-
-
 def _settling(cases: Cases) -> Sequence[Array]:
-    found = settling(cases.surrogate, **dict(cases.columns))  # type: ignore[arg-type]
+    found = settling(cases.surrogate, **dict(cases.columns))
     return found.periods, found.periods_any, found.time, found.slip_path, found.error_bound
 
-
-register(
-    Quantity(
-        "settling",
-        "Periods until a disturbed contact is within 1 % of its steady cycle; null: infinite, it never slips",
-        (
-            Part("settling.periods", "-", "For a small disturbance: ln(100)/slip_path; in stick-slip at most as many"),
-            Part("settling.periods_any", "-", "For a disturbance of any size: twice as many"),
-            Part("settling.time", "s", "periods as a time; also without oscillation"),
-            Part("settling.slip_path", "-", "Path of the foot in a period over l0; null also for rigid contact"),
-            Part("settling_bound.periods", "-", "Bound of the absolute error of periods; null also: not known"),
-        ),
-        _settling,
-        cost=5,
-    )
-)
 
 #: names that ``include`` may hold
 INCLUDES = tuple(QUANTITIES)

@@ -4,21 +4,22 @@ uvicorn takes the class by its documented ``http`` parameter.  It uses parts of 
 promise of stability: pyproject.toml bounds the version, and the tests try every limit on a socket.
 """
 
-import asyncio
+import math
 from typing import Any, ClassVar
 
 import orjson
-from starlette.types import Scope
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from .problems import HeadTooLargeError, MalformedBodyError, RequestError, SlowClientError, pieces_of_problem
+from .problems import Kind, RequestError, document_of
 
 __all__ = ["Connection"]
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
-_TOO_LARGE = HeadTooLargeError(f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+_LOOK_EVERY_S = 0.25  # for connections whose time is over
+_TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+_ONE_HOST = RequestError(Kind.MALFORMED_BODY, "a request has one Host")
 
 
 class Connection(HttpToolsProtocol):
@@ -30,8 +31,9 @@ class Connection(HttpToolsProtocol):
 
     #: connections without a request, the longest waiting first
     waiting: ClassVar[dict["Connection", None]] = {}
-    _clock: asyncio.TimerHandle | None = None  # for the next move of the client
-    _deadline: asyncio.TimerHandle | None = None  # for the whole answer
+    #: the event loop whose connections are looked at
+    looked_at: ClassVar[Any] = None
+    _due = _end = math.inf  # when the client must have moved, and the answer be complete
     _arrived = _head = 0  # bytes of the last read; bytes since the head began
     _in_head = _second = False
     _refusal: RequestError | None = None
@@ -47,26 +49,31 @@ class Connection(HttpToolsProtocol):
         return self.cycle is not None and not self.cycle.response_complete
 
     def _watch(self) -> None:
-        if self._clock is None:
-            self._clock = self.loop.call_later(self._settings.client_timeout_s, self._late)
+        if self._due == math.inf:
+            self._due = self.loop.time() + self._settings.client_timeout_s
 
-    def _rest(self) -> None:
-        if self._clock is not None:
-            self._clock.cancel()
-            self._clock = None
-
-    def _late(self) -> None:
-        """Close, with 408 where a request has begun and its answer has not."""
-        self._clock = None
-        if self._in_head or (self._busy and not self.cycle.response_started):
-            self._refuse(SlowClientError(f"a client may take up to {self._settings.client_timeout_s} s"))
+    def _look(self) -> None:
+        """End the connections whose time is over: with 408 where a request has begun and its answer has not."""
+        now = self.loop.time()
+        for one in list(self.connections):
+            if isinstance(one, Connection) and now > min(one._due, one._end):
+                if now <= one._end and (one._in_head or (one._busy and not one.cycle.response_started)):
+                    told = f"a client may take up to {self._settings.client_timeout_s} s"
+                    one._refuse(RequestError(Kind.SLOW_CLIENT, told))
+                else:
+                    one.transport.abort()
+        if self.connections:
+            self.loop.call_later(_LOOK_EVERY_S, self._look)
         else:
-            self.transport.abort()
+            Connection.looked_at = None
 
     # --- the connection -------------------------------------------------------------------------------
 
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
+        if Connection.looked_at is not self.loop:
+            Connection.looked_at = self.loop
+            self.loop.call_later(_LOOK_EVERY_S, self._look)
         super().connection_made(transport)
         if len(self.connections) > self._settings.max_connections and self.waiting:
             oldest = next(iter(self.waiting))
@@ -78,9 +85,6 @@ class Connection(HttpToolsProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""
-        self._rest()
-        if self._deadline is not None:
-            self._deadline.cancel()
         self.waiting.pop(self, None)
         super().connection_lost(exc)
 
@@ -110,15 +114,15 @@ class Connection(HttpToolsProtocol):
         if self._busy and self.cycle.response_started:
             self.transport.abort()
         else:
-            self._refuse(self._refusal or MalformedBodyError(msg))
+            self._refuse(self._refusal or RequestError(Kind.MALFORMED_BODY, msg))
 
     def _refuse(self, error: RequestError) -> None:
-        scope: Scope = {"path": "", "method": "GET", **(self.scope or {})}
-        status, body, _ = pieces_of_problem(error, scope)
-        text = orjson.dumps(body)
+        self._due = self._end = math.inf
+        document = document_of(error, {"path": "", "method": "GET", **(self.scope or {})})
+        text = orjson.dumps(document)
         self.transport.write(
             b"HTTP/1.1 %d %b\r\ncontent-type: application/problem+json\r\ncontent-length: %d\r\nconnection: close\r\n"
-            b"\r\n%b" % (status, body["title"].encode(), len(text), text)
+            b"\r\n%b" % (document["status"], document["title"].encode(), len(text), text)
         )
         self.transport.close()
 
@@ -130,9 +134,13 @@ class Connection(HttpToolsProtocol):
     def resume_writing(self) -> None:
         """The client has read."""
         super().resume_writing()
-        self._rest()
+        self._due = math.inf
 
     # --- calls of the parser; what they raise ends in send_400_response ---------------------------------
+
+    def _raise(self, error: RequestError) -> None:
+        self._refusal = error
+        raise error
 
     def on_message_begin(self) -> None:
         """Begin a head, if the request before it is answered."""
@@ -147,37 +155,35 @@ class Connection(HttpToolsProtocol):
         if self._in_head:
             super().on_header(name, value)
             if len(self.headers) > MAX_FIELDS:
-                self._refusal = _TOO_LARGE
-                raise self._refusal
+                self._raise(_TOO_LARGE)
 
     def on_headers_complete(self) -> None:
         """Begin a request."""
-        if len(self.url) + sum(len(name) + len(value) for name, value in self.headers) > MAX_HEAD:
-            self._refusal = _TOO_LARGE
-            raise self._refusal
-        hosts = sum(name == b"host" for name, _ in self.headers)
+        size, hosts = len(self.url), 0
+        for name, value in self.headers:
+            size += len(name) + len(value)
+            hosts += name == b"host"
+        if size > MAX_HEAD:
+            self._raise(_TOO_LARGE)
         if hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
-            self._refusal = MalformedBodyError("a request has one Host")
-            raise self._refusal
+            self._raise(_ONE_HOST)
         self._in_head = False
-        self._rest()
         self.waiting.pop(self, None)
         if len(self.connections) > self._settings.max_connections:
             self.scope["state"]["full"] = True
         super().on_headers_complete()
-        self._deadline = self.loop.call_later(self._settings.time_limit_s + _MARGIN_S, self.transport.abort)
-        if not self.url.partition(b"?")[0].endswith(b"/batch"):  # there the application limits every wait
-            self._watch()
+        now = self.loop.time()
+        self._end = now + self._settings.time_limit_s + _MARGIN_S
+        in_batch = self.url.partition(b"?")[0].endswith(b"/batch")  # there the application limits every wait
+        self._due = math.inf if in_batch else now + self._settings.client_timeout_s
 
     def on_message_complete(self) -> None:
         """The client has sent its request."""
-        self._rest()
+        self._due = math.inf
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
         """Wait for the next request."""
-        self._rest()
-        if self._deadline is not None:
-            self._deadline.cancel()
+        self._due = self._end = math.inf
         self.waiting[self] = None
         super().on_response_complete()

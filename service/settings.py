@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError, field_validator
+from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 __all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
@@ -57,6 +57,17 @@ def _default_tables() -> tuple[Path, ...]:
     return (beside,) if any(beside.glob("*.nc")) else (Path("tables"),)
 
 
+def _usable(key: SecretStr) -> SecretStr:
+    # An empty variable must not count as "no key": a variable that is set shows that a key was intended.
+    if not re.fullmatch(r"[!-~]{1,512}", key.get_secret_value()):
+        raise ValueError("unusable key")
+    return key
+
+
+Key = Annotated[SecretStr, AfterValidator(_usable)]
+KeyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")]
+
+
 class Settings(BaseSettings):
     """All settings.  Each description says what a value must be."""
 
@@ -77,8 +88,8 @@ class Settings(BaseSettings):
     keep_alive_s: int = Field(75, ge=1, le=3600, description="an integer from 1 to 3600")
     client_timeout_s: int = Field(30, ge=1, le=3600, description="an integer from 1 to 3600")
     time_limit_s: int = Field(300, ge=1, le=86400, description="an integer from 1 to 86400")
-    api_key: SecretStr | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
-    api_keys: Annotated[dict[str, SecretStr], NoDecode, BeforeValidator(_split_keys)] = Field(
+    api_key: Key | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
+    api_keys: Annotated[dict[KeyName, Key], NoDecode, BeforeValidator(_split_keys)] = Field(
         default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -"
     )
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split_list)] = Field(
@@ -97,23 +108,9 @@ class Settings(BaseSettings):
     def _lower(cls, value: object) -> object:
         return value.lower() if isinstance(value, str) else value
 
-    @field_validator("api_key")
-    @classmethod
-    def _usable_key(cls, key: SecretStr | None) -> SecretStr | None:
-        # An empty variable must not count as "no key": a variable that is set shows that a key was intended.
-        if key is not None:
-            text = key.get_secret_value()
-            if not (1 <= len(text) <= 512 and all("!" <= character <= "~" for character in text)):
-                raise ValueError("unusable key")
-        return key
-
     @field_validator("api_keys")
     @classmethod
-    def _usable_keys(cls, keys: dict[str, SecretStr]) -> dict[str, SecretStr]:
-        for name, key in keys.items():
-            if not re.fullmatch(r"[A-Za-z0-9._-]{1,64}", name):
-                raise ValueError("unusable name")
-            cls._usable_key(key)
+    def _one_name_each(cls, keys: dict[str, SecretStr]) -> dict[str, SecretStr]:
         if len({key.get_secret_value() for key in keys.values()}) != len(keys):
             raise ValueError("two names for one key")
         return keys

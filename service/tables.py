@@ -4,14 +4,13 @@ import logging
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 from mumacro import Surrogate, TableError
 
 from . import API_VERSION
-from .problems import FieldFault, NotReadyError, refuse
+from .problems import FieldFault, Kind, RequestError, refuse
 
 __all__ = ["LoadedTable", "Tables", "table_files"]
 
@@ -45,7 +44,7 @@ def _stamp(path: Path) -> tuple[int, int, int]:
     return status.st_size, status.st_mtime_ns, status.st_ino
 
 
-@dataclass(frozen=True)
+@dataclass
 class LoadedTable:
     """A table in memory, and the state of its file when it was read."""
 
@@ -69,25 +68,13 @@ class LoadedTable:
         surrogate.self_check()
         return cls(surrogate, stamp)
 
-    @cached_property
-    def id(self) -> str:
-        """The table's name."""
-        return self.surrogate.id
-
-    @cached_property
-    def label(self) -> dict[str, object]:
-        """The table's label in every answer."""
-        return {"id": self.id, "tolerance": self.surrogate.tolerance}
-
-    @cached_property
-    def signature(self) -> dict[str, Any]:
-        """Fields of every answer: the table and the version of the interface."""
-        return {"table": self.label, "api_version": API_VERSION}
-
-    @property
-    def size_bytes(self) -> int:
-        """Size of the file when it was read."""
-        return self.stamp[0]
+    def __post_init__(self) -> None:
+        self.id = self.surrogate.id
+        #: the table's label in every answer
+        self.label = {"id": self.id, "tolerance": self.surrogate.tolerance}
+        #: fields of every answer: the table and the version of the interface
+        self.signature: dict[str, Any] = {"table": self.label, "api_version": API_VERSION}
+        self.size_bytes = self.stamp[0]
 
     def check(self) -> None:
         """Check the known answer again, and whether the file is unchanged.
@@ -135,21 +122,15 @@ class Tables:
             _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in tables]}})
 
     def check(self) -> None:
-        """Raise NotReadyError if a table does not give its known answer or its file was changed."""
+        """Raise RequestError if a table does not give its known answer or its file was changed."""
         try:
             for table in self._ready():
                 table.check()
         except TableError as error:
-            raise NotReadyError(f"table {error.path.name}: {error.reason}") from error
+            raise RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}") from error
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
-        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-]).
-
-        Raises
-        ------
-        NotReadyError, InvalidFieldsError
-            No table is loaded; none is tight enough.
-        """
+        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-])."""
         tables = self._ready()
         if tolerance is None:
             return tables[0]
@@ -160,20 +141,7 @@ class Tables:
             refuse([FieldFault(("tolerance",), reason, tolerance, parameter)], tightest_available=tightest)
         return min(fit, key=lambda table: (table.size_bytes, -table.surrogate.tolerance))
 
-    def named(self, identity: str) -> LoadedTable:
-        """The table of that name.
-
-        Raises
-        ------
-        NotReadyError, InvalidFieldsError
-            No table is loaded; none has that name.
-        """
-        found = {table.id: table for table in self._ready()}
-        if identity not in found:
-            refuse([FieldFault.of("id", f"must be one of {', '.join(found)}", identity)])
-        return found[identity]
-
     def _ready(self) -> tuple[LoadedTable, ...]:
         if self.fault is not None:
-            raise NotReadyError(self.fault)
+            raise RequestError(Kind.NOT_READY, self.fault)
         return self.loaded

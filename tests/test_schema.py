@@ -28,8 +28,6 @@ RELATIONS = (
     r"is required if include has std",
     r"must be left out: it is the unknown or swept input",
     r"must be >= 1e-12: no loaded table is tighter",
-    r"must be one of mumacro-1e-12, mumacro-1e-10, mumacro-1e-7, mumacro-1e-4",
-    r"choose by one id or by tolerance",
     r"is given in the query and in the body",
     r"must be two (ascending, finite )?numbers",
     r"must be (finite and )?> start",

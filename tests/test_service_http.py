@@ -74,27 +74,7 @@ def test_requests_are_logged_as_json_lines(client, case, caplog):
     assert json.loads(line)["message"].startswith("one\n")
 
 
-@pytest.fixture
-def broken(tables_dir):
-    """A client of an application whose tables raise an unexpected error."""
-    app = create_app(Settings(tables=(tables_dir,)))
-
-    def fail(*_args):
-        raise RuntimeError("secret detail")
-
-    app.state.tables.pick = fail
-    return TestClient(app)
-
-
-def test_an_unexpected_error_is_logged_and_not_shown(broken, case, problem, caplog):
-    response = broken.post("/v1/mu-macro", json=case)
-    problem(response, 500)
-    assert "secret" not in response.text
-    (record,) = [record for record in caplog.records if record.name == "mumacro.error"]
-    assert "secret detail" in JsonFormatter().format(record)
-
-
-def test_an_unexpected_error_of_a_plain_case_is_handled_like_any_other(client, case, problem, caplog, monkeypatch):
+def test_an_unexpected_error_is_logged_and_not_shown(client, case, problem, caplog, monkeypatch):
     def fail(*_args):
         raise RuntimeError("secret detail")
 
@@ -103,7 +83,8 @@ def test_an_unexpected_error_of_a_plain_case_is_handled_like_any_other(client, c
         assert problem(response, 500)["request_id"] == response.headers["x-request-id"]
         assert "secret" not in response.text
     assert [record.fields["status"] for record in caplog.records if record.name == "mumacro.access"] == [500, 500]
-    assert [record.name for record in caplog.records].count("mumacro.error") == 2
+    told = [record for record in caplog.records if record.name == "mumacro.error"]
+    assert ["secret detail" in JsonFormatter().format(record) for record in told] == [True, True]
 
 
 @pytest.fixture
@@ -331,41 +312,6 @@ def test_a_range_that_the_file_has_not_is_a_problem_document(client, problem, pa
     problem(response, status)
     size = client.get(path).headers["content-length"]
     assert response.headers.get("content-range") == (f"bytes */{size}" if status == 416 else None)
-
-
-def test_a_range_is_a_part_of_the_file(client):
-    whole = client.get("/v1/table.nc")
-    for given, part in (("bytes=0-7", whole.content[:8]), ("bytes=-5", whole.content[-5:])):
-        answer = client.get("/v1/table.nc", headers={"Range": given})
-        assert (answer.status_code, answer.content) == (206, part)
-    kept = client.get("/v1/table.nc", headers={"Range": "bytes=0-7", "If-Range": '"another"'})
-    assert (kept.status_code, kept.content) == (200, whole.content)
-
-
-OFFERS = {
-    "gzip": True, "GZIP": True, "*": True, "br, gzip;q=0.5": True, "gzip;q=0.001": True, "identity;q=0, *": True,
-    "gzip;q=0": False, "gzip; q=0": False, "gzip;q=0.000": False, "*;q=0": False, "gzip;q=0, *": False,
-    "*, gzip;q=0": False, "identity": False, "": False, "xgzip": False,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("offer", OFFERS)
-def test_large_answers_are_compressed_for_clients_that_accept_gzip(client, case, offer):
-    v0 = [1e-6 * i for i in range(1, 3001)]
-    law = {**{name: case[name] for name in case if name != "v0"}, "start": 1e-4, "stop": 1.0, "points": 3000}
-    asked = {"Accept-Encoding": offer}
-    answers = [client.get("/openapi.json", headers=asked)]
-    answers += [
-        client.get("/static/page/map.json", headers=asked),
-        client.get("/v1/law.csv", params=law, headers=asked),
-    ]
-    answers.append(client.post("/v1/law", json=law, headers=asked))
-    answers.append(client.post("/v1/mu-macro/batch", json={**case, "v0": v0}, headers=asked))
-    answers.append(client.post("/v1/mu-macro/batch", json=[{**case, "v0": x} for x in v0], headers=asked))
-    for answer in answers:
-        assert answer.status_code == 200, answer.text
-        assert ("content-encoding" in answer.headers) == OFFERS[offer], answer.request.url
-    assert "content-encoding" not in client.get("/v1/table.nc", headers=asked).headers
 
 
 def test_every_answer_has_the_security_headers(client, case):

@@ -73,13 +73,6 @@ def test_a_small_batch_is_counted_once(serving, surrogate, case):
         assert sum(asked) == 2
 
 
-def test_a_chunked_body_within_the_limit_is_read(server, case):
-    text = json.dumps(case).encode()
-    chunks = iter([text[:20], text[20:]])
-    status, _, _ = server.ask("POST", "/v1/mu-macro", chunks, {"Content-Type": "application/json"}, encode_chunked=True)
-    assert status == 200
-
-
 def test_a_connection_is_kept_over_errors(server, case):
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
     statuses = []
@@ -92,17 +85,6 @@ def test_a_connection_is_kept_over_errors(server, case):
     assert connection.getresponse().status == 200
     connection.close()
     assert statuses == [404, 400, 405]
-
-
-def test_head_has_no_body(server):
-    assert server.ask("HEAD", "/readyz")[::2] == (200, b"")
-
-
-def test_a_request_that_is_not_http_does_no_harm(server):
-    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as raw:
-        raw.sendall(b"nonsense\r\n\r\n")
-        assert raw.recv(100).startswith(b"HTTP/1.1 400")
-    assert server.ask("GET", "/livez")[0] == 200
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

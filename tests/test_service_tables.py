@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from mumacro import TableError
 from service.app import create_app
-from service.problems import InvalidFieldsError, NotReadyError
+from service.problems import Kind, RequestError
 from service.settings import Settings
 from service.tables import LoadedTable, Tables, table_files
 
@@ -36,8 +36,8 @@ def test_the_table_describes_itself(client, surrogate):
     assert answer["attributes"]
     assert answer["blocks"]
     assert answer["table"] in answer["loaded"]
-    for choice in ({"id": surrogate.id}, {"tolerance": surrogate.tolerance}):
-        assert client.get("/v1/table", params=choice).json()["tolerance"] == surrogate.tolerance
+    chosen = client.get("/v1/table", params={"tolerance": surrogate.tolerance}).json()
+    assert chosen["tolerance"] == surrogate.tolerance
 
 
 def test_the_file_is_the_table(client, surrogate):
@@ -56,8 +56,8 @@ def test_the_file_is_the_table(client, surrogate):
 @pytest.mark.parametrize("path", ["/v1/table", "/v1/table.nc"])
 @pytest.mark.parametrize(
     ("query", "parameter"),
-    [("id=other", "id"), ("tolerance=1e-30", "tolerance"), ("tolerance=x", "tolerance"), ("name=x", "name"),
-     ("id=a&tolerance=1", "id"), ("id=a&id=b", "id")],
+    [("id=../x", "id"), ("tolerance=1e-30", "tolerance"), ("tolerance=x", "tolerance"), ("name=x", "name"),
+     ("tolerance=1&tolerance=1", "tolerance")],
 )  # fmt: skip
 def test_a_table_that_is_not_there_is_refused(client, problem, path, query, parameter):
     (fault,) = problem(client.get(f"{path}?{query}"), 422)["errors"]
@@ -172,7 +172,6 @@ def test_tables_are_found_by_file_and_by_directory(tmp_path, table_copy, surroga
     with started(table_copy, other) as client:
         names = [label["id"] for label in client.get("/v1/table").json()["loaded"]]
         assert sorted(names) == sorted([table_copy.stem, "second"])
-        assert client.get("/v1/table", params={"id": "second"}).json()["id"] == "second"
 
 
 def test_two_tables_of_one_name_are_refused(tmp_path, table_copy, surrogate, problem):
@@ -202,11 +201,13 @@ def test_the_smallest_table_that_is_tight_enough_is_picked(tables, tolerance, na
 
 
 def test_no_table_is_tight_enough(tables):
-    with pytest.raises(InvalidFieldsError) as caught:
+    with pytest.raises(RequestError) as caught:
         tables.pick(1e-13)
+    assert caught.value.kind is Kind.INVALID_VALUE
     assert caught.value.members == {"tightest_available": 1e-12}
 
 
 def test_an_unloaded_tables_picks_nothing():
-    with pytest.raises(NotReadyError):
+    with pytest.raises(RequestError) as caught:
         Tables(()).pick()
+    assert caught.value.kind is Kind.NOT_READY

@@ -1,104 +1,135 @@
 """The endpoints.  Each is a function from a request to a response, and a record of what OpenAPI says of it.
 
-Starlette routes call them directly: the form of a request is checked by :mod:`service.case`, and what is refused is
-raised.
+FastAPI describes them; requests reach them through a look-up (:class:`Routes`): FastAPI's layers take longer than an
+answer.  What is refused is raised, see :mod:`service.problems`.
 """
 
-import gzip
+import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import parse_qsl
 
+from fastapi import Body, FastAPI, Query
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
-from starlette.types import Message, Receive, Scope, Send
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.inputs import NAMES as INPUTS
 
-from ..case import split_names
-from ..limits import SMALL_BODY, Work, media_type_of, read_body, wants_gzip
-from ..problems import FieldFault, MalformedBodyError, refuse
-from ..tables import Tables
+from ..limits import SMALL_BODY, media_type_of, read_body
+from ..options import split_names
+from ..problems import FieldFault, Kind, RequestError, refuse
 from ..wire.json import decode
 
 __all__ = [
-    "JSON", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "path_of", "reply",
-    "tables_of", "work_of",
-]  # fmt: skip
+    "JSON",
+    "Endpoint",
+    "Routes",
+    "file_answer",
+    "given_in_body",
+    "given_in_query",
+    "in_thread",
+    "path_of",
+    "reply",
+]
 
 JSON = "application/json"
 _JSON_ONLY = {JSON: JSON}
-_COMPRESS_FROM = 16 * 1024  # bytes
+_WHY = {
+    400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
+    401: "The service needs an API key, and none or a wrong one was sent",
+    408: "The request was not complete in time",
+    413: "The body or the batch is too large",
+    415: "The body has another media type",
+    416: "The file has no such part",
+    422: "Invalid, missing or unknown fields",
+    503: "Not ready or overloaded; see Retry-After",
+}
+_PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+_ID = {"X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}}
+_RETRY = {"description": "Seconds after which to send the request again", "schema": {"type": "integer"}}
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """One path and method, and its description.
-
-    Attributes
-    ----------
-    path, method : str
-        ``GET`` answers ``HEAD``, too.
-    answer : callable
-        From a request to a response; what it raises becomes a problem document.
-    name, summary : str
-        The operation's id and its title in OpenAPI; without a name it is not described.
-    query, body, model : type of BaseModel, optional
-        The forms of the query, the body and the answer.
-    statuses : tuple of int
-        Of the problems that it can give.
-    content : mapping
-        Further descriptions of the answer, by status.
-    request : mapping, optional
-        The description of a body that is no model.
-    open : bool
-        Whether it needs no API key.
-    """
+    """One path and method, and its description; without a summary it is not described."""
 
     path: str
-    method: str
-    answer: Callable[[Request], Awaitable[Response]]
-    name: str = ""
+    method: str  # GET answers HEAD, too
+    answer: Callable[[Request], Awaitable[Response]]  # its name is the operation's id
     summary: str = ""
     query: type[BaseModel] | None = None
     body: type[BaseModel] | None = None
-    model: Any = None
-    statuses: tuple[int, ...] = ()
-    content: Mapping[int, Any] = field(default_factory=dict)
-    request: Mapping[str, Any] | None = None
+    model: Any = None  # of the answer
+    statuses: tuple[int, ...] = ()  # of the problems that it can give, beside those of its kind
+    content: Mapping[int | str, Any] = field(default_factory=dict)  # further descriptions of answers, by status
+    request: Mapping[str, Any] | None = None  # the description of a body that is no model
     tag: str = "answers"
-    open: bool = False
+    open: bool = False  # whether it needs no API key
+
+    def describe_to(self, app: FastAPI) -> None:
+        """Add the route to an application, with its description."""
+        statuses = set(self.statuses)
+        if not self.open:
+            statuses |= {401, 503} | ({400, 422} if self.query else set())
+        if self.method == "POST":
+            statuses |= {400, 408, 413, 415, 422}
+        responses: dict[int | str, dict[str, Any]] = {200: {}, **self.content}
+        for status in sorted(statuses):
+            responses[status] = {"description": _WHY[status], "content": _PROBLEM}
+        for code, response in responses.items():
+            headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if code == 503 else {})}
+            responses[code] = {**response, "headers": headers}
+
+        async def answer(request: Request, **_: Any) -> Response:
+            return await self.answer(request)
+
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        kinds: dict[str, Any] = {"request": Request}
+        kinds |= {"query": Annotated[self.query, Query()]} if self.query else {}
+        kinds |= {"body": Annotated[self.body, Body()]} if self.body else {}
+        answer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [inspect.Parameter(name, keyword, annotation=kind) for name, kind in kinds.items()]
+        )
+        app.add_api_route(
+            self.path, answer, methods=[self.method], summary=self.summary, operation_id=self.answer.__name__,
+            description=" ".join((self.answer.__doc__ or "").split()), tags=[self.tag], responses=responses,
+            response_model=self.model, response_class=JSONResponse if self.model else Response,
+            response_description="The answer", include_in_schema=bool(self.summary),
+            openapi_extra={"requestBody": self.request} if self.request else None,
+        )  # fmt: skip
 
 
 class Routes:
-    """The application inside the middleware: finds the endpoint of a path and a method, and answers.
+    """Finds the endpoint of a path and a method, and answers; other paths go to ``others``.
 
     Paths have no parameters, so a look-up finds them.
     """
 
-    def __init__(self, endpoints: Iterable[Endpoint]) -> None:
-        self._found: dict[str, dict[str, Endpoint]] = {}
+    def __init__(self, endpoints: Iterable[Endpoint], others: ASGIApp) -> None:
+        self._others = others
+        self._found: dict[str, dict[str, Callable[[Request], Awaitable[Response]]]] = {}
         for endpoint in endpoints:
             methods = self._found.setdefault(endpoint.path, {})
-            methods[endpoint.method] = endpoint
-            if endpoint.method == "GET":
-                methods["HEAD"] = endpoint
+            for method in ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,):
+                methods[method] = endpoint.answer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        methods = self._found.get(path_of(scope)) if scope["type"] == "http" else None
+        methods = self._found.get(path_of(scope))
         if methods is None:
-            raise HTTPException(404, "There is nothing at this path.")
-        endpoint = methods.get(scope["method"])
-        if endpoint is None:
+            await self._others(scope, receive, send)
+            return
+        answer = methods.get(scope["method"])
+        if answer is None:
             allowed = ", ".join(sorted(methods))
             detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
             raise HTTPException(405, detail, headers={"Allow": allowed})
-        response = await endpoint.answer(Request(scope, receive, send))
+        response = await answer(Request(scope, receive, send))
         await response(scope, receive, send)
 
 
@@ -109,37 +140,11 @@ def path_of(scope: Scope) -> str:
     return path.removeprefix(root) if root else path
 
 
-def tables_of(request: Request) -> Tables:
-    """The tables of the application that the request came to."""
-    tables: Tables = request.app.state.tables
-    return tables
-
-
-def work_of(request: Request) -> Work:
-    """The slots and threads of the application that the request came to."""
-    work: Work = request.app.state.work
-    return work
-
-
-def reply(
-    content: bytes, headers: Mapping[str, str] | None = None, media_type: str = JSON, request: Request | None = None
-) -> Response:
-    """A complete answer; a large one to ``request`` is compressed if that accepts gzip, so this runs in a thread."""
-    if request is not None and len(content) >= _COMPRESS_FROM:
-        headers = {**(headers or {}), "Vary": "Accept-Encoding"}
-        if wants_gzip(request.headers.get("accept-encoding", "")):
-            content = gzip.compress(content, 1)
-            headers["Content-Encoding"] = "gzip"
-    return Response(content, headers=headers, media_type=media_type)
+# --- requests -------------------------------------------------------------------------------------------
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:
-    """The members of a small JSON body.
-
-    Raises
-    ------
-    UnsupportedBodyError, BodyTooLargeError, MalformedBodyError, InvalidFieldsError
-    """
+    """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
     media_type_of(headers, _JSON_ONLY)
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
@@ -153,37 +158,31 @@ async def given_in_body(request: Request) -> dict[str, Any]:
 
 
 def given_in_query(request: Request) -> dict[str, Any]:
-    """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within ``std``.
-
-    Raises
-    ------
-    InvalidFieldsError
-        A name is given twice.
-    """
+    """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within ``std``."""
     text = request.scope["query_string"].decode("latin-1")
     try:
         pairs = parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
     except (ValueError, UnicodeDecodeError) as error:
-        raise MalformedBodyError(f"the query cannot be read: {error}") from None
+        raise RequestError(Kind.MALFORMED_BODY, f"the query cannot be read: {error}") from None
     found: dict[str, Any] = {}
     names: list[str] = []
-    twice = []
+    twice: dict[str, None] = {}
     for name, value in pairs:
-        inner = name.removeprefix("std_")
+        place, inner = (found.setdefault("std", {}), name[4:]) if name in _STD else (found, name)
         if name == "include":
             names.append(value)
-        elif inner != name and inner in INPUTS:
-            if found.setdefault("std", {}).setdefault(inner, number := _number(value)) is not number:
-                twice.append(name)
-        elif name in found:
-            twice.append(name)
+        elif inner in place:
+            twice[name] = None
         else:
-            found[name] = _number(value)
+            place[inner] = _number(value)
     if twice:
-        refuse([FieldFault.of(name, "is given more than once") for name in dict.fromkeys(twice)])
+        refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
     if names:
         found["include"] = split_names(names)
     return found
+
+
+_STD = frozenset(f"std_{name}" for name in INPUTS)
 
 
 def _number(text: str) -> Any:
@@ -193,8 +192,22 @@ def _number(text: str) -> Any:
             number = float(text.replace("e ", "e+").replace("E ", "E+"))
         except ValueError:
             return text
-        return int(number) if number.is_integer() and text.isdigit() and len(text) < 16 else number
+        return int(number) if text.isdigit() and len(text) < 16 else number
     return text
+
+
+# --- responses ------------------------------------------------------------------------------------------
+
+
+def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = JSON) -> Response:
+    """A complete answer."""
+    return Response(content, headers=headers, media_type=media_type)
+
+
+async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
+    """The answer to the question of a person, made in a thread."""
+    answer: Response = await request.app.state.work.question(work)
+    return answer
 
 
 class _File(FileResponse):
@@ -202,12 +215,11 @@ class _File(FileResponse):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def send_checked(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                if message["status"] == 416:
-                    size = self.headers["content-length"]
-                    raise HTTPException(416, f"the file has {size} bytes", headers={"Content-Range": f"bytes */{size}"})
-                if message["status"] == 400:
-                    raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
+            if message.get("status") == 416:
+                size = self.headers["content-length"]
+                raise HTTPException(416, f"the file has {size} bytes", headers={"Content-Range": f"bytes */{size}"})
+            if message.get("status") == 400:
+                raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
             await send(message)
 
         await super().__call__(scope, receive, send_checked)
@@ -225,9 +237,7 @@ def file_answer(request: Request, path: Path, headers: Mapping[str, str], **opti
     """
     answer = _File(path, headers=headers, stat_result=path.stat(), **options)
     etag = answer.headers["etag"]
-    offered = request.headers.get("if-none-match")
-    if offered is not None and (
-        offered.strip() == "*" or etag in (part.strip().removeprefix("W/") for part in offered.split(","))
-    ):
+    offered = [part.strip().removeprefix("W/") for part in request.headers.get("if-none-match", "").split(",")]
+    if etag in offered or "*" in offered:
         return Response(status_code=304, headers={**headers, "ETag": etag})
     return answer

@@ -2,10 +2,9 @@
 
 A body is read whole, evaluated and answered in slices.  A stream of lines is answered line by line while it arrives.
 A slot is taken when more than a small body, or a large computation, is at hand; for a stream at its first complete
-line.  Computing, reading and compressing happen in threads.
+line.  Computing and reading happen in threads.
 """
 
-import zlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -14,21 +13,13 @@ from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from ..answers import answer_case, cost_of
-from ..case import OPTIONS, Columns, Options, OptionsQuery, options_of, read_form
-from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body, wants_gzip
-from ..problems import (
-    BodyTooLargeError,
-    FieldFault,
-    InvalidFieldsError,
-    MalformedBodyError,
-    RequestError,
-    in_query,
-    pieces_of_problem,
-    refuse,
-)
+from ..case import Columns
+from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
+from ..options import OPTIONS, Options, OptionsQuery, options_of, read_form
+from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..wire import Batch, Form, forms
 from ..wire.json import decode, dump
-from . import Endpoint, given_in_query, tables_of
+from . import Endpoint, given_in_query
 
 __all__ = ["ENDPOINTS"]
 
@@ -41,6 +32,8 @@ _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
 class _Answer(Response):
     """Reads the body of a batch, and answers in pieces."""
 
+    background = None
+
     def __init__(self, request: Request) -> None:
         self._request = request
         self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
@@ -49,7 +42,6 @@ class _Answer(Response):
         self._limit: int = self._state.settings.max_body_bytes
         self._most: int = self._state.settings.max_batch
         self._placed = False
-        self.background = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, and give the slot back if one was taken."""
@@ -61,10 +53,7 @@ class _Answer(Response):
                     name: form.media_type for form in forms().values() for name in (form.media_type, *form.aliases)
                 }
                 form = forms()[media_type_of(self._given, known)]
-                if form.streams:
-                    await self._stream(form, receive, send)
-                else:
-                    await self._whole(form, receive, send)
+                await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
             if self._placed:
                 self._work.batches.give_back()
@@ -80,16 +69,11 @@ class _Answer(Response):
         return await self._work.batches.run(work, cost)
 
     def _options_of_query(self) -> dict[str, Any]:
-        if not self._request.scope["query_string"]:
-            return {}
         given = given_in_query(self._request)
-        try:
-            _, rest, faults = options_of(Options, given, OptionsQuery.model_fields)
-            faults += [FieldFault.of(name, "is no option; inputs belong in the body") for name in rest]
-            if faults:
-                refuse(faults)
-        except InvalidFieldsError as error:
-            raise in_query(error) from None
+        _, rest, faults = options_of(Options, given, OptionsQuery.model_fields, parameter=True)
+        faults += [FieldFault((name,), "is no option; inputs belong in the body", parameter=True) for name in rest]
+        if faults:
+            refuse(faults)
         return given
 
     def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
@@ -98,9 +82,8 @@ class _Answer(Response):
         options, _, faults = options_of(Options, {**self._query, **given}, OPTIONS)
         if options is None:
             refuse(faults)
-        table = tables_of(self._request).pick(options.tolerance, "tolerance" in self._query)
-        count = self._state.metrics.cases
-        return Batch(table, columns, options.names(), options.deviations(), count=count)
+        table = self._state.tables.pick(options.tolerance, "tolerance" in self._query)
+        return Batch(table, columns, options.names(), options.deviations(), count=self._state.metrics.cases)
 
     def _only_once(self, given: Mapping[str, Any]) -> None:
         twice = [name for name in given if name in self._query]
@@ -112,23 +95,16 @@ class _Answer(Response):
     async def _whole(self, form: Form, receive: Receive, send: Send) -> None:
         text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
         if not text:
-            raise MalformedBodyError("the body is empty")
+            raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
         # Reading costs by the byte, computing by the case: a small body can request much computation.
         cost = len(text) / _BYTES_PER_UNIT
         columns, given = await self._run(lambda: form.read(text, self._most), cost)
         text = bytearray()  # freed, unless the columns are views of it
         batch = self._batch(columns, given)
         cost += columns.size * cost_of(batch.include)
-        packer = self._packer() if columns.size > 100 else None
-        pieces = _packed(form.write(batch), packer)
+        pieces = _gathered(form.write(batch))
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
-        headers = [
-            (b"content-type", form.media_type.encode("ascii")),
-            (b"x-table", batch.table.id.encode("latin-1")),
-            (b"vary", b"accept-encoding"),
-        ]
-        if packer is not None:
-            headers.append((b"content-encoding", b"gzip"))
+        headers = [(b"content-type", form.media_type.encode()), (b"x-table", batch.table.id.encode("latin-1"))]
         if following is None:
             headers.append((b"content-length", b"%d" % len(piece)))
         await send({"type": "http.response.start", "status": 200, "headers": headers})
@@ -136,11 +112,6 @@ class _Answer(Response):
             await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
             piece, following = following, await self._run(lambda: next(pieces, None), cost)
         await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": False}))
-
-    def _packer(self) -> Any:
-        """What compresses the answer, if the client accepts gzip."""
-        wanted = wants_gzip(self._given.get(b"accept-encoding", b"").decode("latin-1"))
-        return zlib.compressobj(1, zlib.DEFLATED, 31) if wanted else None
 
     # --- streams --------------------------------------------------------------------------------------
 
@@ -152,50 +123,46 @@ class _Answer(Response):
         text = bytearray()
         if not more:
             text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
-        options, _, _ = options_of(Options, self._query, OPTIONS)
-        tables_of(self._request).pick(options.tolerance if options else None, parameter=True)
-        head = [(b"content-type", form.media_type.encode("ascii")), (b"x-accel-buffering", b"no")]
+        self._state.tables.pick(self._query.get("tolerance"), parameter=True)
+        head = [(b"content-type", form.media_type.encode()), (b"x-accel-buffering", b"no")]
         await send({"type": "http.response.start", "status": 200, "headers": head})
         number = 0
         while True:
             if not more and text and not text.endswith(b"\n"):
                 text += b"\n"
-            cut = text.rfind(b"\n") + 1
-            if cut:
+            while cut := text.rfind(b"\n", 0, _LINES) + 1 or text.find(b"\n") + 1:
                 self._place()
-                for start, stop in _cut(text, cut):
-                    lines = bytes(text[start:stop]).split(b"\n")[:-1]
-                    pieces = await self._run(lambda lines=lines, first=number: self._lines(form, lines, first), 1e9)
-                    number += len(lines)
-                    for piece in pieces:
-                        await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
+                lines = bytes(text[:cut]).split(b"\n")[:-1]
                 del text[:cut]
+                pieces = await self._run(lambda lines=lines, first=number: self._lines(form, lines, first), 1e9)
+                number += len(lines)
+                for piece in pieces:
+                    await self._work.client(send({"type": "http.response.body", "body": piece, "more_body": True}))
             if not more:
                 break
             if len(text) > SMALL_BODY:
                 self._place()
             if len(text) > self._limit:
-                raise BodyTooLargeError(f"a line may have up to {self._limit} bytes")
+                raise RequestError(Kind.BODY_TOO_LARGE, f"a line may have up to {self._limit} bytes")
             more = await self._work.client(_next_line(receive, text))
         await self._work.client(send({"type": "http.response.body", "body": b"", "more_body": False}))
 
     def _lines(self, form: Form, lines: list[bytes], first: int) -> list[bytes]:
         """The answers to some lines; blank ones are counted and have none."""
         answers = (self._line(form, line, first + i + 1) for i, line in enumerate(lines) if line.strip())
-        return list(_packed((piece for answer in answers for piece in answer), None))
+        return list(_gathered(piece for answer in answers for piece in answer))
 
     def _line(self, form: Form, line: bytes, number: int) -> Iterator[bytes]:
         """Answer one line: one case, or a block of columns or a list of rows as a batch of its own."""
         try:
-            if b"[" in line:
-                columns, given = form.read(bytearray(line), self._most)
-                batch = self._batch(columns, given)
-                yield from form.write(batch) if columns.listed else [self._case(decode(line))]
+            columns, given = form.read(bytearray(line), self._most) if b"[" in line else (None, {})
+            if columns is not None and columns.listed:
+                yield from form.write(self._batch(columns, given))
             else:
                 yield self._case(decode(line))
         except RequestError as error:
             scope = {**self._request.scope, "path": f"{self._request.scope['path']}#line={number}"}
-            yield dump(pieces_of_problem(error, scope)[1])
+            yield dump(document_of(error, scope))
         yield b"\n"
 
     def _case(self, given: Any) -> bytes:
@@ -204,7 +171,7 @@ class _Answer(Response):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
         self._only_once(given)
         options, case = read_form(Options, {**given, **self._query}, null_is_rigid=False)
-        table = tables_of(self._request).pick(options.tolerance)
+        table = self._state.tables.pick(options.tolerance)
         values, source = answer_case(table.surrogate, case, options.names(), options.deviations())
         self._state.metrics.case(table, source)
         return dump({**values, **table.signature})
@@ -222,33 +189,21 @@ async def _next_line(receive: Receive, text: bytearray) -> bool:
             return more
 
 
-def _cut(text: bytearray, stop: int) -> Iterator[tuple[int, int]]:
-    """Where some whole lines of the text before ``stop`` begin and end, one after another."""
-    start = 0
-    while start < stop:
-        end = stop if stop - start <= _LINES else text.find(b"\n", start + _LINES, stop) + 1 or stop
-        yield start, end
-        start = end
-
-
-def _packed(pieces: Iterator[bytes], packer: Any) -> Iterator[bytes]:
-    """The same bytes in larger pieces, compressed if there is a packer."""
+def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    """The same bytes in larger pieces."""
     gathered: list[bytes] = []
     size = 0
     for piece in pieces:
-        gathered.append(piece if packer is None else packer.compress(piece))
-        size += len(gathered[-1])
+        gathered.append(piece)
+        size += len(piece)
         if size >= _PIECE:
             yield b"".join(gathered)
             gathered, size = [], 0
-    if packer is not None:
-        gathered.append(packer.flush())
-        size = 1
     if size:
         yield b"".join(gathered)
 
 
-async def post_batch(request: Request) -> Response:
+async def post_mu_macro_batch(request: Request) -> Response:
     """Answer in the form of the request, order kept.  A bad case has the result null and an entry in ``errors``.
 
     A stream of lines (NDJSON) is answered line by line: a line is a block of columns, a list of rows, or one case.
@@ -256,16 +211,14 @@ async def post_batch(request: Request) -> Response:
     return _Answer(request)
 
 
+_ANSWER = {
+    "description": "The answers, in the form of the request",
+    "content": {form.media_type: form.answer for form in forms().values()},
+}
 ENDPOINTS = [
     Endpoint(
-        PATH, "POST", post_batch, "post_mu_macro_batch", "Macroscopic friction of many cases",
-        query=OptionsQuery, statuses=(400, 401, 408, 413, 415, 422, 503),
+        PATH, "POST", post_mu_macro_batch, "Macroscopic friction of many cases", query=OptionsQuery,
         request={"required": True, "content": {form.media_type: form.body for form in forms().values()}},
-        content={
-            200: {
-                "description": "The answers, in the form of the request",
-                "content": {form.media_type: form.answer for form in forms().values()},
-            }
-        },
+        content={200: _ANSWER},
     )
 ]  # fmt: skip

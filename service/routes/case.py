@@ -8,11 +8,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from ..answers import answer_case, cost_of
-from ..case import CaseQuery, CaseRequest, Options, read_form
 from ..models import CaseAnswer
+from ..options import CaseQuery, CaseRequest, Options, read_form
 from ..problems import FieldFault, refuse
 from ..wire.json import dump
-from . import Endpoint, given_in_body, given_in_query, reply, tables_of
+from . import Endpoint, given_in_body, given_in_query, reply
 
 __all__ = ["ENDPOINTS"]
 
@@ -22,15 +22,16 @@ _LARGE = 100  # cost from which one case is computed in a thread, in times of a 
 
 async def _answered(request: Request, given: Mapping[str, Any]) -> dict[str, Any]:
     options, case = read_form(Options, given)
-    table = tables_of(request).pick(options.tolerance)
+    state = request.app.state
+    table = state.tables.pick(options.tolerance)
     include, std = options.names(), options.deviations()
 
     def answer() -> tuple[dict[str, Any], int]:
         return answer_case(table.surrogate, case, include, std)
 
     large = bool(include) and cost_of(include) > _LARGE
-    values, source = await request.app.state.work.question(answer) if large else answer()
-    request.app.state.metrics.case(table, source)
+    values, source = await state.work.question(answer) if large else answer()
+    state.metrics.case(table, source)
     return {**values, **table.signature}
 
 
@@ -69,16 +70,16 @@ _value: Any = (str, Field("mu_macro", description="Name in the answer, such as m
 ValueQuery: Any = create_model("ValueQuery", __base__=CaseQuery, value=_value)
 ENDPOINTS = [
     Endpoint(
-        PATH, "GET", get_mu_macro, "get_mu_macro", "Macroscopic friction of one case",
-        query=CaseQuery, model=CaseAnswer, statuses=(400, 401, 422, 503), content={200: _CACHED},
+        PATH, "GET", get_mu_macro, "Macroscopic friction of one case",
+        query=CaseQuery, model=CaseAnswer, content={200: _CACHED},
     ),
     Endpoint(
-        PATH, "POST", post_mu_macro, "post_mu_macro", "Macroscopic friction of one case, as JSON",
-        body=CaseRequest, model=CaseAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+        PATH, "POST", post_mu_macro, "Macroscopic friction of one case, as JSON",
+        body=CaseRequest, model=CaseAnswer,
     ),
     Endpoint(
-        f"{PATH}.txt", "GET", get_mu_macro_text, "get_mu_macro_text",
-        "One value of one case, for spreadsheets (WEBSERVICE)", query=ValueQuery, statuses=(400, 401, 422, 503),
+        f"{PATH}.txt", "GET", get_mu_macro_text,
+        "One value of one case, for spreadsheets (WEBSERVICE)", query=ValueQuery,
         content={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, **_CACHED}},
     ),
 ]  # fmt: skip

@@ -5,7 +5,7 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import Response
 
-from . import Endpoint, file_answer, reply, work_of
+from . import Endpoint, file_answer, in_thread, reply
 from .page import asset
 
 __all__ = ["ASSETS", "ENDPOINTS"]
@@ -33,7 +33,7 @@ async def _docs(request: Request) -> Response:
 
 
 async def _description(request: Request) -> Response:
-    return await work_of(request).question(lambda: reply(request.app.state.openapi, request=request))
+    return await in_thread(request, lambda: reply(request.app.state.openapi))
 
 
 ENDPOINTS = [

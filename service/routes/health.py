@@ -7,7 +7,7 @@ from starlette.responses import Response
 from .. import API_VERSION, __version__
 from ..models import Health
 from ..wire.json import dump
-from . import Endpoint, reply, tables_of
+from . import Endpoint, reply
 
 __all__ = ["ENDPOINTS"]
 
@@ -22,9 +22,14 @@ async def livez(_request: Request) -> Response:
 
 async def readyz(request: Request) -> Response:
     """Check that every table is loaded, has the right checksum, gives its known answer and has an unchanged file."""
-    tables = tables_of(request)
+    tables = request.app.state.tables
     tables.check()
     return reply(dump({"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}), _NO_STORE)
+
+
+async def healthz(request: Request) -> Response:
+    """Answer as /readyz."""
+    return await readyz(request)
 
 
 async def get_metrics(request: Request) -> Response:
@@ -38,16 +43,8 @@ _TEXT = {
     "content": {"text/plain": {"schema": {"type": "string"}}},
 }
 ENDPOINTS = [
-    Endpoint("/livez", "GET", livez, "livez", "The process is alive", model=Health, tag="health", open=True),
-    *(
-        Endpoint(
-            path, "GET", readyz, path[1:], "The service is ready", model=Health, statuses=(503,), tag="health",
-            open=True,
-        )
-        for path in ("/readyz", "/healthz")
-    ),
-    Endpoint(
-        "/metrics", "GET", get_metrics, "get_metrics", "Counters for Prometheus", statuses=(401, 503),
-        content={200: _TEXT}, tag="health",
-    ),
+    Endpoint("/livez", "GET", livez, "The process is alive", model=Health, tag="health", open=True),
+    Endpoint("/readyz", "GET", readyz, "The service is ready", model=Health, statuses=(503,), tag="health", open=True),
+    Endpoint("/healthz", "GET", healthz, "As /readyz", model=Health, statuses=(503,), tag="health", open=True),
+    Endpoint("/metrics", "GET", get_metrics, "Counters for Prometheus", content={200: _TEXT}, tag="health"),
 ]  # fmt: skip

@@ -15,13 +15,14 @@ from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, SI
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 
 from ..answers import answer_columns, nested, parts_of
-from ..case import INPUTS, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
+from ..case import INPUTS
 from ..models import Answered, default, included
+from ..options import NO_NULL, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
 from ..problems import FieldFault, refuse
 from ..quantities import INCLUDES
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, given_in_query, reply, tables_of, work_of
+from . import Endpoint, given_in_body, given_in_query, in_thread, reply
 from .solve_for import FIVE, FIVE_QUERY, Name, in_si, per_value
 
 __all__ = ["ENDPOINTS"]
@@ -48,10 +49,9 @@ class LawOptions(Options):
         f"an object with one input and 1 to {MAX_CURVES} values of it, finite and >= 0",
         "One input that is left out elsewhere: one curve per value", None,
     )  # fmt: skip
-    include: list[LawInclude] | None = bounded(
-        f"a list of names from: approximations, {', '.join(INCLUDES)}", "More to compute at every value", None,
-        max_length=2 + 2 * len(INCLUDES),
-    )  # fmt: skip
+    include: Annotated[list[LawInclude], Field(max_length=2 + 2 * len(INCLUDES))] | None = bounded(
+        f"a list of names from: approximations, {', '.join(INCLUDES)}", "More to compute at every value", None
+    )
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
@@ -79,8 +79,8 @@ def _read(given: Mapping[str, Any]) -> tuple[LawOptions, dict[str, float]]:
 async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
     form, case = _read(await given_in_body(request))
-    table = tables_of(request).pick(form.tolerance)
-    return await work_of(request).question(lambda: reply(dump(_answer(table, form, case)), request=request))
+    table = request.app.state.tables.pick(form.tolerance)
+    return await in_thread(request, lambda: reply(dump(_answer(table, form, case))))
 
 
 async def get_law_csv(request: Request) -> Response:
@@ -93,15 +93,13 @@ async def get_law_csv(request: Request) -> Response:
         refuse(
             [FieldFault.of("include", "must be approximations; POST /v1/law has the other quantities", form.names()[0])]
         )
-    table = tables_of(request).pick(form.tolerance)
+    table = request.app.state.tables.pick(form.tolerance)
     headers = {
         "Content-Disposition": f'attachment; filename="friction-law-{form.along}.csv"',
         "Cache-Control": "no-cache",
     }
     kind = "text/csv; charset=utf-8; header=present"
-    return await work_of(request).question(
-        lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind, request)
-    )
+    return await in_thread(request, lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind))
 
 
 def _answer(table: LoadedTable, form: LawOptions, case: dict[str, float]) -> dict[str, Any]:
@@ -162,8 +160,8 @@ LawRequest.model_config["json_schema_extra"] = {
     ]
 }
 _only: Any = (
-    list[Literal["approximations"]] | None,
-    Field(None, max_length=4, description="approximations: those of the paper beside the exact values"),
+    Annotated[list[Literal["approximations"]], Field(max_length=4)] | NO_NULL,
+    Field(None, description="approximations: those of the paper beside the exact values"),
 )
 LawQuery: Any = query_of("LawQuery", LawRequest, include=_only, k=FIVE_QUERY["k"])
 
@@ -221,12 +219,12 @@ class LawFamilyAnswer(_Swept):
 
 ENDPOINTS = [
     Endpoint(
-        "/v1/law", "POST", post_law, "post_law", "mu_macro over a range of one input",
-        body=LawRequest, model=LawAnswer | LawFamilyAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+        "/v1/law", "POST", post_law, "mu_macro over a range of one input",
+        body=LawRequest, model=LawAnswer | LawFamilyAnswer,
     ),
     Endpoint(
-        "/v1/law.csv", "GET", get_law_csv, "get_law_csv", "mu_macro over a range of one input, as a table",
-        query=LawQuery, statuses=(400, 401, 422, 503),
+        "/v1/law.csv", "GET", get_law_csv, "mu_macro over a range of one input, as a table",
+        query=LawQuery,
         content={200: {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}},
     ),
 ]  # fmt: skip

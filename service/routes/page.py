@@ -9,7 +9,7 @@ from mumacro.page import POLICY, map_of, names
 
 from .. import __version__
 from ..wire.json import dump
-from . import Endpoint, file_answer, reply, tables_of, work_of
+from . import Endpoint, file_answer, in_thread, reply
 
 __all__ = ["ASSETS", "ENDPOINTS", "FOLDER", "POLICY"]
 
@@ -40,12 +40,12 @@ async def _names(request: Request) -> Response:
 
 async def _map(request: Request) -> Response:
     """The data of the map: mu~ on a grid, rows of constant y~ from below, and borders by name."""
-    surrogate = tables_of(request).pick().surrogate
+    surrogate = request.app.state.tables.pick().surrogate
     etag = f'"{surrogate.checksum[:32]}-{__version__}"'
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return await work_of(request).question(lambda: reply(dump(map_of(surrogate)), headers, request=request))
+    return await in_thread(request, lambda: reply(dump(map_of(surrogate)), headers))
 
 
 ENDPOINTS = [

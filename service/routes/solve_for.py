@@ -1,5 +1,7 @@
 """The inverse problem: ``POST /v1/solve-for``."""
 
+import itertools
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -8,14 +10,15 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE, SI
-from mumacro.inverse import Reach, Solution, solve_for
+from mumacro.inverse import Solution, solve_for
 
-from ..answers import answer_columns, nested, parts_of
-from ..case import INPUTS, NotNegative, Options, bounded, example, input_fields, read_form, relation
+from ..answers import DEFAULT, answer_columns, nested, parts_of
+from ..case import INPUTS
 from ..models import Answered, included
+from ..options import NotNegative, Options, bounded, example, input_fields, read_form, relation
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, reply, tables_of, work_of
+from . import Endpoint, given_in_body, in_thread, reply
 
 __all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "Name", "in_si", "per_value"]
 
@@ -53,8 +56,8 @@ async def post_solve_for(request: Request) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
     given = await given_in_body(request)
     form, case = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in INPUTS else [])
-    table = tables_of(request).pick(form.tolerance)
-    return await work_of(request).question(lambda: reply(dump(_answer(table, form, case)), request=request))
+    table = request.app.state.tables.pick(form.tolerance)
+    return await in_thread(request, lambda: reply(dump(_answer(table, form, case))))
 
 
 def in_si(name: str) -> str:
@@ -71,24 +74,17 @@ def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -
     per = per_value(form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    wanted = [target * unit for target in form.target]
-    solution = solve_for(table.surrogate, in_si(form.unknown), wanted, case, within)
+    solution = solve_for(table.surrogate, in_si(form.unknown), [x * unit for x in form.target], case, within)
     more = _included(table, form, solution, case)
-    results = []
+    results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
-        result: dict[str, Any] = {
-            "target": target,
-            "roots": [
-                {
-                    "value": root.value / per, "low": root.low / per, "high": root.high / per,
-                    "mu_macro": root.mu_macro, "regime": root.regime, **next(more, {}),
-                }
-                for root in roots
-            ],
-        }  # fmt: skip
+        told = [
+            {**root._asdict(), "value": root.value / per, "low": root.low / per, "high": root.high / per, **next(more)}
+            for root in roots
+        ]
+        results.append({"target": target, "roots": told})
         if not roots:
-            result["reason"] = _reason(form, target, solution.reach, solution.constant, unit)
-        results.append(result)
+            results[-1]["reason"] = _reason(form, target, solution, unit)
     reach = solution.reach
     return {
         "unknown": form.unknown,
@@ -96,34 +92,32 @@ def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -
         "quantity": form.quantity,
         "range": [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per],
         "reachable": {
-            "min": reach.mu_min / unit,
-            "max": reach.mu_max / unit,
-            "min_included": reach.min_included,
-            "max_included": reach.max_included,
+            "min": reach.mu_min / unit, "max": reach.mu_max / unit,
+            "min_included": reach.min_included, "max_included": reach.max_included,
         },
         "results": results,
         **table.signature,
-    }
+    }  # fmt: skip
 
 
-def _included(table: LoadedTable, form: SolveForOptions, solution: Solution, case: dict[str, float]) -> Any:
+def _included(
+    table: LoadedTable, form: SolveForOptions, solution: Solution, case: dict[str, float]
+) -> Iterator[dict[str, Any]]:
     """The included quantities of every root, in order."""
-    include = form.names()
     values = np.array([root.value for roots in solution.roots for root in roots])
-    if not include or values.size == 0:
-        return iter(())
+    parts = parts_of(form.names())[len(DEFAULT) :]
+    if not parts or values.size == 0:
+        return itertools.repeat({})
     six = [values if name == in_si(form.unknown) else np.array([case[name]]) for name in FIELDS]
-    found, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations())
-    parts = parts_of(include)[len(parts_of(())) :]
-    columns = [part.values(found[part.path]) for part in parts]
-    return iter(
-        [nested(dict(zip((part.path for part in parts), row, strict=True))) for row in zip(*columns, strict=True)]
-    )
+    found, _ = answer_columns(table.surrogate, six, values.size, form.names(), form.deviations())
+    rows = zip(*(part.values(found[part.path]) for part in parts), strict=True)
+    return (nested(dict(zip((part.path for part in parts), row, strict=True))) for row in rows)
 
 
-def _reason(form: SolveForOptions, target: float, reach: Reach, constant: bool, unit: float) -> str:
+def _reason(form: SolveForOptions, target: float, solution: Solution, unit: float) -> str:
+    reach = solution.reach
     low, high = reach.mu_min / unit, reach.mu_max / unit
-    if constant:
+    if solution.constant:
         return f"{form.unknown} has no influence here: {form.quantity} is {low!r} for every value in the range"
     left, right = "[" if reach.min_included else "(", "]" if reach.max_included else ")"
     return f"{target!r} is not in the reachable range {left}{low!r}, {high!r}{right}"
@@ -187,8 +181,8 @@ class SolveForAnswer(Answered):
 
 ENDPOINTS = [
     Endpoint(
-        "/v1/solve-for", "POST", post_solve_for, "post_solve_for",
+        "/v1/solve-for", "POST", post_solve_for,
         "The value of one input that gives a wanted mu_macro",
-        body=SolveForRequest, model=SolveForAnswer, statuses=(400, 401, 408, 413, 415, 422, 503),
+        body=SolveForRequest, model=SolveForAnswer,
     )
 ]  # fmt: skip

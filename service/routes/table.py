@@ -1,53 +1,46 @@
 """The table itself: ``GET /v1/table`` (metadata) and ``GET /v1/table.nc`` (the file)."""
 
-from typing import Any, Self
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError
 from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.errors import TableError
 
 from .. import __version__
-from ..case import Positive, bounded, relation
 from ..models import TableAnswer
+from ..options import Positive, bounded, query_of
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, file_answer, given_in_query, reply, tables_of
+from . import Endpoint, file_answer, given_in_query, reply
 
 __all__ = ["ENDPOINTS"]
 
 
 class TableChoice(BaseModel):
-    """Choice of a table: by id or by tolerance; with neither, the tightest."""
+    """Choice of a table; without a tolerance, the tightest."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
-    id: str | None = bounded("the name of a table", default=None)
     tolerance: Positive | None = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
-        if self.id is not None and self.tolerance is not None:
-            raise relation("id", "choose by one id or by tolerance")
-        return self
+
+TableQuery: Any = query_of("TableQuery", TableChoice)
 
 
 def _chosen(request: Request) -> LoadedTable:
-    given = given_in_query(request)
-    if "id" in given:
-        given["id"] = str(given["id"])
     try:
-        choice = TableChoice.model_validate(given)
+        choice = TableChoice.model_validate(given_in_query(request))
     except ValidationError as error:
         refuse(faults_of(error, TableChoice, TableChoice.model_fields))
-    tables = tables_of(request)
-    return tables.pick(choice.tolerance) if choice.id is None else tables.named(choice.id)
+    table: LoadedTable = request.app.state.tables.pick(choice.tolerance)
+    return table
 
 
 async def get_table(request: Request) -> Response:
-    """Describe the default table, or the one chosen by ``id`` or ``tolerance``; list all that are loaded."""
+    """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
     table = _chosen(request)
     surrogate = table.surrogate
     answer = {
@@ -60,7 +53,7 @@ async def get_table(request: Request) -> Response:
         "max_rel_error": surrogate.max_rel_error,
         "attributes": surrogate.attributes,
         "blocks": surrogate.blocks,
-        "loaded": [other.label for other in tables_of(request).loaded],
+        "loaded": [other.label for other in request.app.state.tables.loaded],
         "service_version": __version__,
         **table.signature,
     }
@@ -82,12 +75,12 @@ async def get_table_file(request: Request) -> Response:
 _FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
 ENDPOINTS = [
     Endpoint(
-        "/v1/table", "GET", get_table, "get_table", "Properties of a table",
-        query=TableChoice, model=TableAnswer, statuses=(400, 401, 422, 503), tag="table",
+        "/v1/table", "GET", get_table, "Properties of a table",
+        query=TableQuery, model=TableAnswer, tag="table",
     ),
     Endpoint(
-        "/v1/table.nc", "GET", get_table_file, "get_table_file", "The table as a netCDF-4 file",
-        query=TableChoice, statuses=(400, 401, 416, 422, 503), tag="table",
+        "/v1/table.nc", "GET", get_table_file, "The table as a netCDF-4 file",
+        query=TableQuery, statuses=(416,), tag="table",
         content={
             200: {"description": "The file", "content": _FILE},
             206: {"description": "The part of it that Range requests", "content": _FILE},

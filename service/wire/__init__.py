@@ -73,7 +73,7 @@ class Form(NamedTuple):
 
     media_type: str
     aliases: tuple[str, ...]
-    #: the cases of a body and its options; raises MalformedBodyError, InvalidFieldsError, BatchTooLargeError
+    #: the cases of a body and its options; raises RequestError
     read: Callable[[bytearray, int], tuple[Columns, dict[str, Any]]]
     #: the answer, piece by piece
     write: Callable[[Batch], Iterator[bytes]]

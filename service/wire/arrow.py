@@ -1,6 +1,7 @@
 """Arrow streams in and out, without copies of the columns and without text.  Needs pyarrow."""
 
 import io
+import math
 from collections.abc import Iterator
 from struct import error, unpack_from
 from typing import Any
@@ -8,10 +9,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mumacro.inputs import GAP, unknown_name
+from mumacro.inputs import RIGID, unknown_name
 
-from ..case import INPUTS, MAX_ERRORS, Columns, Reason, columns_of, faults_in, too_large
-from ..problems import FieldFault, MalformedBodyError, refuse
+from ..case import INPUTS, Columns, columns_of, faults_in, joined, too_large
+from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 from .json import dump
 
@@ -22,7 +23,6 @@ _SLICE = 32768  # cases of a record batch of the answer
 
 def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
     parts: dict[str, list[Any]] = {}
-    reasons: dict[int, Reason] = {}
     size = 0
     try:
         buffer = pa.py_buffer(text)
@@ -33,21 +33,18 @@ def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
                 message.type == "record batch" and _is_compressed(message.metadata)
                 for message in pa.ipc.MessageReader.open_stream(buffer)
             ):
-                raise MalformedBodyError("the body is a compressed Arrow stream: send it uncompressed")
+                raise RequestError(Kind.MALFORMED_BODY, "the body is a compressed Arrow stream: send it uncompressed")
             for batch in reader:
                 batch.validate()
-                for name in sorted(parts, key=INPUTS.index):
-                    parts[name].append(_column(batch.column(name), name, size, reasons))
                 size += batch.num_rows
                 if size > max_batch:
                     raise too_large(max_batch)
+                for name, found in parts.items():
+                    found.append(_column(batch.column(name), name))
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OSError, ValueError) as fault:
         reason = (str(fault).splitlines() or [type(fault).__name__])[0][:200]
-        raise MalformedBodyError(f"the body is not an Arrow stream: {reason}") from None
-    columns = {name: found[1] if len(found) == 2 else np.concatenate(found) for name, found in parts.items()}
-    made = columns_of(columns, max_batch)
-    made.reasons = reasons
-    return made, {}
+        raise RequestError(Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}") from None
+    return columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch), {}
 
 
 def _check(schema: Any) -> None:
@@ -65,17 +62,13 @@ def _check(schema: Any) -> None:
         refuse(faults)
 
 
-def _column(column: Any, name: str, first: int, reasons: dict[int, Reason]) -> Any:
-    """A column as float64; a null is NaN, and so is an infinity but in k, where it is a rigid contact."""
+def _column(column: Any, name: str) -> Any:
+    """A column as float64; as a list where it has nulls, with the word rigid for an infinite k."""
     if column.type != pa.float64():
         column = column.cast(pa.float64(), safe=False)
-    values = column.to_numpy(zero_copy_only=False)
     if column.null_count:
-        missing = column.is_null().to_numpy(zero_copy_only=False)
-        values = np.where(missing, np.nan, values)
-        for i in np.flatnonzero(missing)[:MAX_ERRORS].tolist():
-            reasons.setdefault(first + i, (name, GAP if name == "k" else "is required"))
-    return np.ascontiguousarray(values)
+        return [RIGID if name == "k" and value == math.inf else value for value in column.to_pylist()]
+    return column.to_numpy()
 
 
 def _is_compressed(metadata: Any) -> bool:

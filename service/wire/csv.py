@@ -3,14 +3,16 @@
 import csv
 import io
 from collections.abc import Iterator
+from contextlib import suppress
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from mumacro.inputs import FIELDS, GAP, RAD_PER_CYCLE, SI, UNITS_OF, Scale, is_rigid, scale_of, split_unit, unknown_name
+from mumacro.inputs import RIGID, SI, UNITS_OF, Scale, is_rigid, scale_of, split_unit, unknown_name
 
-from ..case import INPUTS, MAX_ERRORS, Columns, Reason, faults_in, number, too_large
-from ..problems import FieldFault, MalformedBodyError, refuse
+from ..case import INPUTS, MAX_ERRORS, Columns, Reason, columns_of, faults_in, joined, too_large
+from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
 __all__ = ["FORM"]
@@ -22,21 +24,25 @@ _DIGITS = b"0123456789.eE+-"
 
 def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
     lines = csv.reader(_lines(text, max_batch), strict=True)
-    reasons: dict[int, Reason] = {}
-    parts: list[Any] = []
+    short: dict[int, Reason] = {}
     size = 0
     try:
         names, scales = _head(next(lines, []))
-        while rows := [row for _, row in zip(range(_SLICE), lines, strict=False)]:
+        parts: dict[str, list[Any]] = {name: [np.empty(0)] for name in names}
+        while rows := list(islice(lines, _SLICE)):
             rows = [row for row in rows if row]
-            parts.append(_values(rows, names, scales, size, reasons))
+            for i, row in enumerate(rows):
+                if len(row) != len(names):
+                    short[size + i] = None, f"has {len(row)} cells where the head has {len(names)}"
+                    rows[i] = ["nan"] * len(names)
+            for name, scale, cells in zip(names, scales, zip(*rows, strict=True), strict=False):
+                parts[name].append(_values(name, scale, cells))
             size += len(rows)
     except (UnicodeDecodeError, csv.Error) as error:
-        raise MalformedBodyError(f"the body is not CSV: {error}") from None
-    if size > max_batch:
-        raise too_large(max_batch)
-    six = np.concatenate(parts, axis=1) if parts else np.empty((6, 0))
-    return Columns(size, list(six), reasons, "f" in names), {}
+        raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {error}") from None
+    columns = columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch)
+    columns.reasons |= dict(islice(short.items(), MAX_ERRORS))
+    return columns, {}
 
 
 def _lines(text: bytearray, max_batch: int) -> Iterator[str]:
@@ -46,7 +52,9 @@ def _lines(text: bytearray, max_batch: int) -> Iterator[str]:
     while line := lines.readline(_LONGEST_LINE + 1):
         count += 1
         if len(line) > _LONGEST_LINE:
-            raise MalformedBodyError(f"line {count} of the body has more than {_LONGEST_LINE} characters")
+            raise RequestError(
+                Kind.MALFORMED_BODY, f"line {count} of the body has more than {_LONGEST_LINE} characters"
+            )
         if count > max_batch + 2:
             raise too_large(max_batch)
         yield line
@@ -73,56 +81,25 @@ def _head(cells: list[str]) -> tuple[list[str], list[Scale]]:
     return names, scales
 
 
-def _values(
-    rows: list[list[str]], names: list[str], scales: list[Scale], first: int, reasons: dict[int, Reason]
-) -> Any:
-    """The six columns of some lines, (6, n), NaN where a line cannot be read."""
-    out = np.full((6, len(rows)), np.nan)
-    short = {i for i, row in enumerate(rows) if len(row) != len(names)}
-    for i in short:
-        if len(reasons) < MAX_ERRORS:
-            reasons[first + i] = None, f"has {len(rows[i])} cells where the head has {len(names)}"
-    rows = [[""] * len(names) if i in short else row for i, row in enumerate(rows)]
-    for name, scale, cells in sorted(
-        zip(names, scales, zip(*rows, strict=True), strict=False), key=lambda entry: INPUTS.index(entry[0])
-    ):
-        column = out[FIELDS.index("omega" if name == "f" else name)]
-        if not "".join(cells).encode().translate(None, _DIGITS) and all(cells):
-            try:
-                column[:] = list(map(float, cells))
-            except ValueError:
-                _each(name, cells, column, short, first, reasons)
-        else:
-            _each(name, cells, column, short, first, reasons)
-        with np.errstate(over="ignore"):  # infinite, which is refused
-            if scale != Scale():
-                np.divide(column * scale.times, scale.over, out=column)
-            if name == "f":
-                column *= RAD_PER_CYCLE
-        if name != "k":
-            column[np.isinf(column)] = np.inf
-    return out
+def _values(name: str, scale: Scale, cells: tuple[str, ...]) -> Any:
+    """A part of a column: an array, or a list where a cell is no number; a gap is None."""
+    if all(cells) and not "".join(cells).encode().translate(None, _DIGITS):
+        with suppress(ValueError), np.errstate(over="ignore"):  # infinite, which is refused
+            column = np.array(list(map(float, cells)))
+            if name != "k" or np.isfinite(column).all():  # a number of too many digits is not rigid
+                return np.divide(column * scale.times, scale.over) if scale != Scale() else column
+    return [_value(name, scale, cell.strip()) for cell in cells]
 
 
-def _each(
-    name: str, cells: tuple[str, ...], column: Any, short: set[int], first: int, reasons: dict[int, Reason]
-) -> None:
-    """Read the cells of a column one by one; the word rigid is infinite, a number of too many digits is refused."""
-    for i, cell in enumerate(cells):
-        if i in short:
-            continue
-        text = cell.strip()
-        value: Any = text
-        if name != "k" or not is_rigid(text):
-            try:
-                if text and not text.encode().translate(None, _DIGITS):
-                    value = float(text)
-            except ValueError:
-                pass
-        gap = not text or text.lower() == "nan"
-        column[i], reason = (np.nan, GAP if name == "k" else "is required") if gap else number(name, value)
-        if reason is not None and len(reasons) < MAX_ERRORS:
-            reasons.setdefault(first + i, (name, reason))
+def _value(name: str, scale: Scale, text: str) -> Any:
+    if not text or text.lower() == "nan":
+        return None
+    if name == "k" and is_rigid(text):
+        return RIGID
+    with suppress(ValueError):
+        if not text.encode().translate(None, _DIGITS):
+            return scale.si(float(text))
+    return text
 
 
 def _write(batch: Batch) -> Iterator[bytes]:

@@ -10,7 +10,8 @@ import math
 import re
 import secrets
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from contextlib import suppress
 from itertools import chain
 from operator import attrgetter
 from typing import Any, Literal
@@ -22,10 +23,11 @@ import simdjson
 
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE
 
-from ..answers import nested
-from ..case import INPUTS, MAX_ERRORS, OPTIONS, Columns, Reason, checked, columns_of, example, options_of, too_large
-from ..case import Options as OptionsModel
-from ..problems import FieldFault, InvalidFieldsError, MalformedBodyError, refuse
+from ..answers import Part, nested
+from ..case import INPUTS, MAX_ERRORS, Columns, Reason, checked, columns_of, too_large
+from ..options import OPTIONS, example, options_of
+from ..options import Options as OptionsModel
+from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
 __all__ = ["FORMS", "decode", "dump", "read"]
@@ -59,30 +61,25 @@ _PATIENT = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole, parse_f
 
 
 def decode(text: bytes | bytearray, large: bool = False) -> Any:
-    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later.
-
-    Raises
-    ------
-    MalformedBodyError, InvalidFieldsError
-        Not JSON; an object that names a member twice.
-    """
+    """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
     if not text:
-        raise MalformedBodyError("the body is empty")
+        raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
+    if not large:
+        with suppress(ValueError):
+            quick = orjson.loads(text)
+            # One colon for each member: none is named twice, and none stands in an object within.
+            if type(quick) is dict and text.count(b":") == len(quick):
+                return quick
     try:
         return (_PATIENT if large else _DECODER).decode(text.decode())
     except RecursionError:
-        raise MalformedBodyError("the body is nested too deeply") from None
+        raise RequestError(Kind.MALFORMED_BODY, "the body is nested too deeply") from None
     except ValueError as error:
-        raise MalformedBodyError(f"the body is not JSON: {error}") from None
+        raise RequestError(Kind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
 
 
 def read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
-    """The cases and the options of a body: columns or one case, or a list of rows.
-
-    Raises
-    ------
-    MalformedBodyError, InvalidFieldsError, BatchTooLargeError
-    """
+    """The cases and the options of a body: columns or one case, or a list of rows."""
     _limit_values(text, max_batch)
     if bytes(text[:4096]).lstrip()[:1] == b"[":
         return _quick_rows(text, max_batch) or _rows(decode(text, large=True), max_batch), {}
@@ -107,7 +104,7 @@ def _limit_values(text: bytearray, max_batch: int) -> None:
     if text.count(b",") > len(NAMES) * room or text.count(b"[") + objects > room:
         raise too_large(max_batch)
     if text.count(b":") > _MEMBERS * objects + 64:
-        raise InvalidFieldsError("the body has objects with more members than there are fields")
+        raise RequestError(Kind.INVALID_VALUE, "the body has objects with more members than there are fields")
 
 
 def _columns(text: bytearray) -> dict[str, Any] | None:
@@ -151,7 +148,7 @@ def _numbers(text: bytearray, start: int, end: int) -> Any:
         except (ValueError, TypeError, RuntimeError):  # a word, a null, no number at all; 1e400, which json reads
             try:
                 values = decode(b"[%b]" % bytes(text[start:end]), large=True)
-            except MalformedBodyError:
+            except RequestError:
                 return None
             return None if any(isinstance(value, (list, dict)) for value in values) else values
         at = stop + 1
@@ -255,73 +252,55 @@ def dump(values: Any) -> bytes:
 
 
 def write(batch: Batch) -> Iterator[bytes]:
-    """An object of lists, piece by piece."""
-    size, parts = batch.columns.size, batch.parts
-    whole: dict[str, Any] = {part.path: np.empty(size, np.int8 if part.names else np.float64) for part in parts}
+    """An object of lists, or of the list of results, piece by piece."""
+    return _write_rows(batch) if batch.columns.rows else _write_columns(batch)
+
+
+def _write_columns(batch: Batch) -> Iterator[bytes]:
+    size = batch.columns.size
+    whole = {part: np.empty(size, np.int8 if part.names else np.float64) for part in batch.parts}
     for start, found, source in batch.slices(_ROWS):
-        for path, column in whole.items():
-            column[start : start + source.size] = found[path]
-    kinds = {part.path: part for part in parts}
-    opening = b"{"
-    for name, inner in nested({path: path for path in whole}).items():
-        yield opening + dump(name) + b":"
-        if isinstance(inner, str):
-            yield from _list_text(kinds[inner], whole[inner])
-        else:
-            opening = b"{"
-            for key, path in inner.items():
-                yield opening + dump(key) + b":"
-                yield from _list_text(kinds[path], whole[path])
-                opening = b","
-            yield b"}"
+        for part, column in whole.items():
+            column[start : start + source.size] = found[part.path]
+    form, parts = _form(batch, b"[\0]")
+    for opening, part in zip(form, parts, strict=False):
+        yield opening
+        for start in range(0, size, _CELLS):
+            text = _texts(part, whole[part][start : start + _CELLS])
+            yield b"," + text if start else text
+    yield form[-1][:-1] + b"," + dump(batch.end)[1:]
+
+
+def _write_rows(batch: Batch) -> Iterator[bytes]:
+    form, parts = _form(batch, b"\0")
+    row = b"%b".join(text.replace(b"%", b"%%") for text in form)
+    opening = b'{"results":['
+    for _, found, source in batch.slices(_ROWS):
+        columns = [_texts(part, found[part.path]).split(b",") for part in parts]
+        made = [row % cells for cells in zip(*columns, strict=True)] if source.size else []
+        for i in np.flatnonzero(source < 0).tolist():
+            made[i] = b"null"
+        yield opening + b",".join(made)
         opening = b","
-    yield b"," + dump(batch.end)[1:]
-
-
-def _list_text(part: Any, column: Any) -> Iterator[bytes]:
-    # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
-    texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)]) if part.names else None
-    yield b"["
-    for start in range(0, column.size, _CELLS):
-        piece = column[start : start + _CELLS]
-        if texts is not None:
-            text = texts.take(piece).tobytes().translate(None, b"\0")[:-1]
-        else:
-            text = dump(piece if part.kind is float else part.values(piece))[1:-1]
-        yield b"," + text if start else text
-    yield b"]"
-
-
-def write_rows(batch: Batch) -> Iterator[bytes]:
-    """An object with the list of results, piece by piece."""
-    yield b'{"results":['
-    for start, found, source in batch.slices(_ROWS):
-        text = dump(objects(batch, found, source))[1:-1]
-        yield b"," + text if start else text
     yield b"]," + dump(batch.end)[1:]
 
 
-def objects(batch: Batch, found: Mapping[str, Any], source: Any) -> list[Any]:
-    """Answers as objects; None for a bad case."""
-    bad = np.flatnonzero(source < 0).tolist()
-    if bad:
-        source = source.copy()
-        source[bad] = 0  # has a name; the whole object is dropped below
-        found = {**found, **{part.path: source for part in batch.parts if part.names}}
-    paths = [part.path for part in batch.parts]
-    made: list[Any] = [
-        dict(zip(paths, row, strict=True))
-        for row in zip(*(part.values(found[part.path]) for part in batch.parts), strict=True)
-    ]
-    if batch.include:
-        made = [nested(row) for row in made]
-    for i in bad:
-        made[i] = None
-    return made
+def _form(batch: Batch, place: bytes) -> tuple[list[bytes], list[Part]]:
+    """What stands around the values of an answer, and their columns in order; each ``place`` has a zero for a value."""
+    parts = {part.path: part for part in batch.parts}
+    shape = nested({path: path for path in parts})
+    order = [path for inner in shape.values() for path in (inner.values() if isinstance(inner, dict) else [inner])]
+    text = dump(nested(dict.fromkeys(order, "\0"))).replace(b'"\\u0000"', place)
+    return text.split(b"\0"), [parts[path] for path in order]
 
 
-def _write_like(batch: Batch) -> Iterator[bytes]:
-    return write_rows(batch) if batch.columns.rows else write(batch)
+def _texts(part: Part, column: Any) -> bytes:
+    """The values of a column, separated by commas."""
+    if part.names:
+        # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
+        texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)])
+        return bytes(texts.take(column).tobytes().translate(None, b"\0")[:-1])
+    return dump(column if part.kind is float else part.values(column))[1:-1]
 
 
 def _refs(*names: str) -> list[dict[str, Any]]:
@@ -334,7 +313,7 @@ FORMS = (
         "application/json",
         (),
         read,
-        _write_like,
+        write,
         body={"schema": {"oneOf": [*_refs("CaseColumns"), _LIST]}, "example": {**example, "v0": [0.01, 0.1]}},
         answer={"schema": {"oneOf": _refs("ColumnsAnswer", "RowsAnswer")}},
     ),
@@ -342,7 +321,7 @@ FORMS = (
         "application/x-ndjson",
         ("application/ndjson", "application/jsonl", "application/x-jsonlines"),
         read,
-        _write_like,
+        write,
         body={
             "schema": {"anyOf": [*_refs("CaseColumns", "Case"), _LIST], "description": "One of these per line"},
             "example": {**example, "v0": [0.01, 0.1]},
