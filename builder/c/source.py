@@ -126,12 +126,12 @@ def table_text(table: Table, linkage: str) -> str:
         quantities.append(f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}")
     rows.append("{" + ",\n      ".join(quantities) + "}")
     about = table.attributes
-    pieces = []
+    quadrature = []
     for place, (points, errors) in enumerate(rules(float(about["tolerance"]))):
         arrays[f"rule_{place}"] = points
         numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
-        pieces.append(f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}")
-    rows.append("{" + ",\n      ".join(pieces) + "}")
+        quadrature.append(f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}")
+    rows.append("{" + ",\n      ".join(quadrature) + "}")
     text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
     whole = (
         f"{linkage}const mumacro_export mumacro_table = {{\n    {{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"

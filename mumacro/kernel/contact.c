@@ -11,7 +11,7 @@ enum { MU_SPRING, MU_BALL, MU_CONTACTS };
 /* The pieces: before stick-slip; in it below y~ = 1, just above that, further above; after it. */
 enum { MU_BEFORE, MU_BELOW, MU_CLOSE, MU_ABOVE, MU_BEYOND, MU_RULES };
 /* Errors of a rule: first those of the quantities. */
-enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y, MU_ERROR_ALONG, MU_ERROR_ALONG_SLOPE };
+enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y, MU_ERROR_ALONG, MU_ERROR_ALONG_SLOPE, MU_ERROR_ALONG_STICK };
 
 #define MU_MIDDLE 1.5 /* load of the middle spring over the mean: gross slip begins at y0 = 1.5 l0 */
 #define MU_STEEPEST 0.33516779066085 /* the largest v~crit / y~, and its amplitude */
@@ -98,6 +98,7 @@ static double mu_ball_at_rest(double y, double *slope) {
     const double k = 0.5 * MU_PI * outer.first * outer.h;
     *slope = 0.0;
     if (!(e < 1.0)) return 0.0;
+    if (e < 1e-300) return 1.0;
     *slope = -1.5 * e * (e * k) / root;
     return mu_min(mu_max(root * (0.5 * MU_PI * outer.i3 - e * k), 0.0), 1.0);
 }
@@ -149,6 +150,8 @@ static mu_answer mu_ball_answer(const mumacro_data *data, int quantity, double v
         out.bound += errors + mu_left_out(&data->rules[k], quantity, sum, load, quantity != MU_POWER);
     }
     out.bound += MU_ROUNDING * out.value;
+    if (quantity == MU_STICK && fabs(v - MU_STEEPEST * y) < 0.01 * v) /* whether a spring sticks at all is not known */
+        out.bound += 4.0 * mu_border_error(data);
     out.value = mu_min(out.value, MU_QUANTITY[quantity].most);
     return out;
 }
@@ -282,7 +285,7 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     out.bound_v += slopes;
     out.bound_y += slopes;
     out.power_bound += v * out.bound + MU_ROUNDING * y;
-    out.stick_bound += data->rules[MU_ABOVE].errors[0][MU_ERROR_ALONG];
+    out.stick_bound += data->rules[MU_ABOVE].errors[0][MU_ERROR_ALONG_STICK];
     return out;
 }
 

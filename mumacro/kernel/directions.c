@@ -200,7 +200,7 @@ static mu_line mu_line_at(int direction, double v, double y) {
         out.mu = out.along_v = out.along_y = out.stick = out.power = NAN;
         out.source = -1;
     } else if (y == 0.0) out.source = MU_NO_OSCILLATION;
-    if (y == 0.0 || !(v < y)) return out;
+    if (out.source < 0 || y == 0.0 || !(v < y)) return out;
     at = mu_turning_of(v, y);
     if (direction == MU_ALONG && y * at.travel > 2.0) {
         const mu_reverse found = mu_reverse_of(&at, y);
