@@ -161,23 +161,26 @@ _RULES: dict[float, tuple[tuple[int, tuple[float, ...], tuple[float, ...]], ...]
 
 
 def rules(tolerance: float) -> list[tuple[Array, Array]]:
-    """Points (nodes, 2) and errors (2, 8) of every piece, for a table of this tolerance.
-
-    Points are the share of the piece beyond a node, and its weight.
-    """
-    chosen = _RULES[min((known for known in _RULES if known >= 0.99 * tolerance), default=max(_RULES))]
+    """Points (nodes, 2) and errors (2, 8) of every piece, for a table of this tolerance."""
+    chosen = _RULES[max((known for known in _RULES if known <= 1.01 * tolerance), default=min(_RULES))]
     found = []
-    for (p, q), (nodes, absolute, relative) in zip(_POWERS, chosen, strict=True):
-        x, weight = np.polynomial.legendre.leggauss(nodes)
-        t = 0.5 * (1.0 + x)
-        # the share beyond is a polynomial in 1 - t, exact where it is small
-        slope = Polynomial([0.0, 1.0]) ** (q - 1) * Polynomial([1.0, -1.0]) ** (p - 1)
-        beyond = slope.integ() / slope.integ()(1.0)
-        points = np.stack([beyond(1.0 - t), 0.5 * weight * beyond.deriv()(1.0 - t)], axis=1)
+    for piece, (nodes, *stated) in enumerate(chosen):
         errors = np.zeros((2, 8))
-        errors[0, : len(absolute)], errors[1, : len(relative)] = absolute, relative
-        found.append((np.ascontiguousarray(points), errors))
+        for row, numbers in zip(errors, stated, strict=True):
+            row[: len(numbers)] = numbers
+        found.append((points(piece, nodes), errors))
     return found
+
+
+def points(piece: int, nodes: int) -> Array:
+    """The rule of a piece, (nodes, 2): the share of the piece beyond a node, and its weight."""
+    p, q = _POWERS[piece]
+    x, weight = np.polynomial.legendre.leggauss(nodes)
+    t = 0.5 * (1.0 + x)
+    # the share beyond is a polynomial in 1 - t, exact where it is small
+    slope = Polynomial([0.0, 1.0]) ** (q - 1) * Polynomial([1.0, -1.0]) ** (p - 1)
+    beyond = slope.integ() / slope.integ()(1.0)
+    return np.ascontiguousarray(np.stack([beyond(1.0 - t), 0.5 * weight * beyond.deriv()(1.0 - t)], axis=1))
 
 
 def put_rules(data: Data, tolerance: float) -> None:
