@@ -203,3 +203,22 @@ def test_refusals(table):
     assert bad.source_code.tolist() == [-1, SOURCES.index("ball_partial_slip")]
     with pytest.raises(InputError, match="index 0"):
         table.evaluate(**{**CASE, "v0": [-1.0, 0.01]}, **BALL, illegal="raise")
+
+
+def test_labels(table):
+    """Every contact and direction, and an interval, keep the labels and give the bits of arrays."""
+    pd, xr = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    v0 = np.array([0.01, 0.02, 0.05])
+    plain = table.evaluate(**{**CASE, "v0": v0}, **BALL, gradient=True)
+    series = table.evaluate(**{**CASE, "v0": pd.Series(v0, index=list("abc"))}, **BALL, gradient=True)
+    assert series.mu_macro.index.tolist() == list("abc")
+    assert series.mu_macro.tolist() == plain.mu_macro.tolist()
+    assert series.regime_certain.tolist() == plain.regime_certain.tolist()
+    frame = table.evaluate(pd.DataFrame({**CASE, "v0": v0}), **BALL)
+    assert (frame.mu_macro.tolist(), set(frame.regime)) == (plain.mu_macro.tolist(), {"partial_slip"})
+    case = {name: x for name, x in CASE.items() if name not in ("k", "y0")}
+    force = xr.DataArray([1.0, 4.0], dims="force")
+    found = table.evaluate(**case, k_range=(1e6, 2e6), Fz_amplitude=force, direction="normal", gradient=True)
+    assert found.mu_macro_low.dims == ("force",)
+    assert found.gradient["Fz_amplitude"].name == "d_mu_macro_d_Fz_amplitude"
+    assert np.all(found.mu_macro_low <= found.mu_macro_high)
