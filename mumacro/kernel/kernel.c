@@ -24,4 +24,6 @@
 #include "records.c"
 #include "points.c"
 #include "passes.c"
+#include "directions.c"
+#include "contact.c"
 #include "dimensional.c"

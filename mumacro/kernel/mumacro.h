@@ -44,14 +44,42 @@ enum {
     MUMACRO_SOURCE_NO_OSCILLATION,
     MUMACRO_SOURCE_STATIC_LIMIT,
     MUMACRO_SOURCE_RIGID,
+    /* of mumacro_evaluate_as alone: springs of the table in a ball, closed forms */
+    MUMACRO_SOURCE_BALL_CONTINUOUS,
+    MUMACRO_SOURCE_BALL_PARTIAL_SLIP,
+    MUMACRO_SOURCE_ALONG_CONTINUOUS,
+    MUMACRO_SOURCE_ALONG_STICK_SLIP,
+    MUMACRO_SOURCE_ALONG_REVERSE_SLIP,
+    MUMACRO_SOURCE_NORMAL_CONTINUOUS,
+    MUMACRO_SOURCE_NORMAL_STICK_SLIP,
     MUMACRO_SOURCES
 };
 
-/* The regime of an answer: slips all the time, sticks during a part of each period, at rest (v0 -> 0). */
-enum { MUMACRO_REGIME_CONTINUOUS, MUMACRO_REGIME_STICK_SLIP, MUMACRO_REGIME_STATIC };
+/* The regime of an answer: slips all the time, sticks during a part of each period, at rest (v0 -> 0); some springs of a
+ * ball slip all the time and others do not; slips backwards, too. */
+enum {
+    MUMACRO_REGIME_CONTINUOUS,
+    MUMACRO_REGIME_STICK_SLIP,
+    MUMACRO_REGIME_STATIC,
+    MUMACRO_REGIME_PARTIAL_SLIP,
+    MUMACRO_REGIME_REVERSE_SLIP
+};
 
-/* Returned where there is nothing to write to, or no such quantity; 0 is success, 1 and more are bad inputs. */
-enum { MUMACRO_NO_OUTPUT = -1, MUMACRO_NO_QUANTITY = -2 };
+/* The contact: one spring, or a ball on a flat (Hertz, k = 8 a G*); the direction of the oscillation: across the sliding
+ * direction, along it, or of the normal force. */
+enum { MUMACRO_SPRING, MUMACRO_BALL };
+enum { MUMACRO_ACROSS, MUMACRO_ALONG, MUMACRO_NORMAL };
+
+/* Returned where there is nothing to write to, no such quantity, no such contact or direction, a ball whose normal force
+ * oscillates (its contact radius changes, which is not modelled); 0 is success, 1 to 6 are bad inputs, 7 is an amplitude
+ * of the normal force that is not below it. */
+enum {
+    MUMACRO_NO_NORMAL_BALL = -4,
+    MUMACRO_NO_CONTACT,
+    MUMACRO_NO_QUANTITY,
+    MUMACRO_NO_OUTPUT,
+    MUMACRO_LIFT_OFF = 7
+};
 
 /* An answer to a dimensional case: mu_macro and mu_ratio = mu_macro / mu0 [-]; the bound of mu_macro's absolute error;
  * v_tilde and y_tilde [-], infinite for rigid contact; where the answer comes from (mumacro_source_name) and the
@@ -82,6 +110,11 @@ typedef struct {
  * numbers of *out are NaN, source and regime -1. */
 MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
                                  mumacro_answer *out);
+
+/* As mumacro_evaluate, for a contact and a direction of those above.  Where the normal force oscillates, y0 is its
+ * amplitude [N], below Fz, in the gradient too, and y_tilde is Fz_amplitude / Fz. */
+MUMACRO_API int mumacro_evaluate_as(int contact, int direction, double mu0, double Fz, double k, double y0,
+                                    double omega, double v0, mumacro_answer *out);
 
 /* As mumacro_evaluate. */
 MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y0, double omega, double v0,
