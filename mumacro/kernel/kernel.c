@@ -25,3 +25,4 @@
 #include "points.c"
 #include "passes.c"
 #include "dimensional.c"
+#include "element.c"
