@@ -7,7 +7,8 @@ try:
     from mumacro.charts import REGIMES, SOURCES
     from mumacro.element import Element
     from mumacro.errors import InputError, MumacroError, TableError
-    from mumacro.fitting import Fit, fit
+    from mumacro.fitted import Fit
+    from mumacro.fitting import fit
     from mumacro.surrogate import Surrogate
     from mumacro.version import __version__
 except ImportError as _error:
