@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
-from mumacro.measured import STD, UNKNOWNS, Measured
+from mumacro.measured import HARDLY, STD, UNKNOWNS, Measured
 from mumacro.surrogate import Surrogate
 
 __all__ = ["fit"]
 
 Array = NDArray[np.float64]
-HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
 _PER_DECADE, _MOST_NODES = 16, 600  # of the sweep
 
 

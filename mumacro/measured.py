@@ -12,10 +12,11 @@ from mumacro.errors import InputError
 from mumacro.inputs import NAMES, as_columns, check_inputs, real, unknown_name
 from mumacro.surrogate import Surrogate
 
-__all__ = ["STD", "UNKNOWNS", "Measured"]
+__all__ = ["HARDLY", "STD", "UNKNOWNS", "Measured", "chosen"]
 
 Array = NDArray[np.float64]
 UNKNOWNS = ("k", "mu0")
+HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
 STD = "std"  # the column of standard deviations
 _SCATTER = 5.0  # standard deviations that a point may lie outside of what is possible
 
@@ -52,9 +53,7 @@ class Measured:
         if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
             raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
         self.unknowns, self.contact, self.direction, self.surrogate = unknowns, contact, direction, surrogate
-        # what evaluate takes beside the inputs; nothing where its defaults do
-        chosen = {"contact": (contact, "spring"), "direction": (direction, "across")}
-        self.said = {name: value for name, (value, usual) in chosen.items() if value != usual}
+        self.said = chosen(contact, direction)
         self.amplitude = "Fz_amplitude" if direction == "normal" else "y0"
         self._read(self._given(data, fixed))
         self._check()
@@ -150,6 +149,12 @@ class Measured:
         rows = {"k": k[:, None], "mu0": mu0[:, None]}
         inputs: dict[str, Any] = {**self.columns, **self.said, **{name: rows[name] for name in self.unknowns}}
         return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
+
+
+def chosen(contact: str, direction: str) -> dict[str, str]:
+    """What evaluate takes beside the inputs; nothing where its defaults do."""
+    said = {"contact": (contact, "spring"), "direction": (direction, "across")}
+    return {name: value for name, (value, usual) in said.items() if value != usual}
 
 
 def _refuse(name: str, column: Array, legal: NDArray[np.bool_], bound: str) -> None:
