@@ -151,7 +151,7 @@ class Measured:
         return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
 
 
-def chosen(contact: str, direction: str) -> dict[str, str]:
+def chosen(contact: str, direction: str) -> dict[str, Any]:
     """What evaluate takes beside the inputs; nothing where its defaults do."""
     said = {"contact": (contact, "spring"), "direction": (direction, "across")}
     return {name: value for name, (value, usual) in said.items() if value != usual}

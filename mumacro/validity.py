@@ -71,7 +71,7 @@ def model_rows(
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
     >>> [found] = [row for row in model_rows(Surrogate.open(), case) if row["row"] == "k is known"]
     >>> found["text"]
-    'k known to 10 % leaves mu_macro uncertain by 6.1 %: give k_range, or fit k'
+    'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
     """
     mu = surrogate.evaluate(**case, **chosen(contact, direction)).mu_macro
     six = _six(case)
@@ -108,7 +108,7 @@ def k_effect(
 
 
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
-    """Significant digits to show of a number that is known to ``uncertainty``, relatively: one beyond the first it moves.
+    """Digits to show of a number that is known to ``uncertainty``, relatively: one beyond the first that it moves.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
 
 
 def _six(case: Mapping[str, Any]) -> dict[str, float]:
-    """The six inputs as numbers, omega from f; an infinite k for a rigid contact; y0 = 0 where the normal force swings."""
+    """The six inputs as numbers: omega from f, k infinite for a rigid contact, y0 = 0 where the normal force swings."""
     six = as_columns({"y0": 0.0, **case})
     if any(x.ndim for x in six.values()):
         raise InputError("case", {name: x.shape for name, x in six.items()}, "one case: numbers")
@@ -172,7 +172,7 @@ def _cycle(surrogate: Surrogate, six: dict[str, float]) -> list[Row]:
     way, frequency = float(found.slip_path) * force / six["k"], six["omega"] / RAD_PER_CYCLE  # [m], [Hz]
     watts, rows = force * way * frequency, list[Row]()
     if math.isinf(found.periods):
-        text = "nothing slips: the force is that of the last motion, for which this is the largest"
+        text = "nothing slips at rest: this is the largest force that the contact can hold"
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     elif found.periods > _PERIODS:
         text = f"creeping: a disturbance falls to 1 % within {found.periods:.3g} periods, {found.time:.3g} s"
