@@ -148,7 +148,7 @@ class _Problem(Measured):
             if one[0] - chi2 <= width**2 * least and all(wall > one[0] + least for wall in walls):
                 solutions.append(one)
         values = solutions[0][1]
-        logs = self._covariance(values) * variance if math.isfinite(variance) else np.full((len(values),) * 2, math.inf)
+        logs = self._covariance(values, variance)
         scale = np.array([x if math.isfinite(x) else 1.0 for x in values.values()])
         covariance = logs * np.outer(scale, scale)
         std = {name: float(math.sqrt(x)) for name, x in zip(values, np.diag(covariance), strict=True)}
@@ -191,15 +191,15 @@ class _Problem(Measured):
         columns = [slopes[name] * (x if math.isfinite(x) else 0.0) for name, x in values.items()]
         return np.stack(columns, axis=-1) * self.weight[:, None]
 
-    def _covariance(self, values: Mapping[str, float]) -> Array:
-        """Of the logarithms, at unit variance; infinite on the diagonal where the points do not tell."""
+    def _covariance(self, values: Mapping[str, float], variance: float) -> Array:
+        """Of the logarithms; infinite on the diagonal where the points do not tell."""
         slopes = self._log_slopes(values)
         told = np.abs(slopes).max(axis=0) > 1e-12 * np.abs(self.weight * self.mu).max()
         out = np.diag(np.where(told, 0.0, math.inf))
         _, sizes, right = np.linalg.svd(slopes[:, told], full_matrices=False)
-        if sizes.size and sizes[-1] <= 1e-10 * sizes[0]:
+        if math.isinf(variance) or (sizes.size and sizes[-1] <= 1e-10 * sizes[0]):
             return np.diag(np.full(told.size, math.inf))
-        out[np.ix_(told, told)] = right.T / sizes**2 @ right
+        out[np.ix_(told, told)] = right.T * (variance / sizes**2) @ right
         return out
 
     def _interval(

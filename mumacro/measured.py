@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 UNKNOWNS = ("k", "mu0")
 HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
 STD = "std"  # the column of standard deviations
-_SCATTER = 5.0  # standard deviations that a point may lie outside of what is possible
+#: how far a point may lie outside of what is possible: standard deviations; where they are not given, of mu0
+_SCATTER, _SHARE = 5.0, 0.05
 
 
 class Measured:
@@ -105,12 +106,14 @@ class Measured:
         self.n = n
 
     def _check(self) -> None:
-        spread = np.zeros(self.n) if self.std is None else self.std
         if self.std is not None:
-            _refuse("std", self.std, (spread > 0.0) & np.isfinite(spread), "finite and > 0")
+            _refuse("std", self.std, (self.std > 0.0) & np.isfinite(self.std), "finite and > 0")
         self.weight = np.ones(self.n) if self.std is None else 1.0 / self.std
-        _refuse("mu_macro", self.mu, np.isfinite(self.mu) & (self.mu >= -_SCATTER * spread),
-                f"finite and >= 0, within {_SCATTER:g} standard deviations")  # fmt: skip
+        top = self.columns.get("mu0", np.full(self.n, np.abs(self.mu).max()))
+        scatter, told = _SHARE * top, f"within {100.0 * _SHARE:g} %; give std where the points scatter more"
+        if self.std is not None:
+            scatter, told = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"
+        _refuse("mu_macro", self.mu, np.isfinite(self.mu) & (self.mu >= -scatter), f"finite and >= 0, {told}")
         settings = len(np.unique(np.column_stack([*self.columns.values()]), axis=0))
         if settings < len(self.unknowns):
             raise InputError(
@@ -126,10 +129,8 @@ class Measured:
                              f"points with {self.amplitude} > 0 and omega > 0: without oscillation mu_macro = mu0 for "
                              "every k")  # fmt: skip
         if "mu0" not in self.unknowns:
-            most = self.columns["mu0"] * (1.0 + 1e-9) + _SCATTER * spread
-            bound = f"<= mu0, within {_SCATTER:g} standard deviations: oscillation only lowers friction; "
-            bound += "give std where the points scatter, fit mu0, or look at the units"
-            _refuse("mu_macro", self.mu, self.mu <= most, bound)
+            bound = f"<= mu0, {told}: oscillation only lowers friction; or fit mu0, or look at the units"
+            _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
 
     # --- the model ------------------------------------------------------------------------------------
 
