@@ -109,7 +109,7 @@ class Measured:
         if self.std is not None:
             _refuse("std", self.std, (self.std > 0.0) & np.isfinite(self.std), "finite and > 0")
         self.weight = np.ones(self.n) if self.std is None else 1.0 / self.std
-        top = self.columns.get("mu0", np.full(self.n, np.abs(self.mu).max()))
+        top = self.columns.get("mu0", np.full(self.n, np.fmax.reduce(np.abs(self.mu), initial=0.0)))
         scatter, told = _SHARE * top, f"within {100.0 * _SHARE:g} %; give std where the points scatter more"
         if self.std is not None:
             scatter, told = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"

@@ -104,7 +104,7 @@ def k_effect(
     k = found * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
     mu = surrogate.evaluate(**{**case, "k": k}, **chosen(contact, direction)).mu_macro
     apart = float(np.abs(mu - mu[3]).max())
-    return apart / float(mu[3]) if apart else 0.0
+    return 0.0 if apart == 0.0 else apart / float(mu[3]) if mu[3] > 0.0 else math.inf
 
 
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
@@ -117,8 +117,9 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
     """
     if not uncertainty >= 0.0:
         raise InputError("uncertainty", uncertainty, ">= 0")
-    meant = math.inf if uncertainty == 0.0 else math.ceil(-math.log10(uncertainty)) + 1
-    return int(min(max(meant, least), most))
+    if uncertainty == 0.0 or math.isinf(uncertainty):
+        return least if uncertainty else most
+    return min(max(math.ceil(-math.log10(uncertainty)) + 1, least), most)
 
 
 def _six(case: Mapping[str, Any]) -> dict[str, float]:
