@@ -192,6 +192,11 @@ class Kernel:
         self._found.places(data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b))
         return block, a, b
 
+    def element_steps(self, limit: Array, k: Array, dx: Array, dy: Array, forces: Array, sums: Array) -> None:
+        """Move contacts (n,) by (dx, dy): ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
+        given = map(_numbers, (limit, k, dx, dy, forces, sums))
+        self._found.element_steps(limit.size, forces.shape[1], *given)
+
     # --- for the builder ------------------------------------------------------------------------------
 
     def forms(self, quantity: int, block: int, v: Array, y: Array, eta: Array) -> tuple[Array, Array]:

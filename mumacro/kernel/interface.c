@@ -148,6 +148,31 @@ MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde) {
 
 MUMACRO_API double mumacro_v_tilde_crit(double y_tilde) { return mu_border_at(MU_TABLE, y_tilde); }
 
+MUMACRO_API double mumacro_force(double v0, double v_rest, double mu0, double Fz, double k, double y0, double omega) {
+    const double speed = fabs(v0), share = v0 / v_rest;
+    double slope;
+    mumacro_answer at;
+    if (!(speed < HUGE_VAL && v_rest > 0.0 && v_rest < HUGE_VAL)) return NAN;
+    if (speed >= v_rest) return (v0 < 0.0 ? -Fz : Fz) * mumacro_mu_macro(mu0, Fz, k, y0, omega, speed);
+    if (mumacro_evaluate(mu0, Fz, k, y0, omega, v_rest, &at)) return NAN;
+    /* d ln mu / d ln v0 lies between 0 and 1; nothing else where double range ends */
+    slope = mu_min(mu_max(0.0, v_rest * at.gradient[5] / at.mu_macro), 1.0);
+    return Fz * at.mu_macro * share * (1.0 + 0.5 * (1.0 - slope) * (1.0 - share * share));
+}
+
+MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double k, double dx, double dy, double *state,
+                                     double force[2]) {
+    double limit;
+    if (state == NULL || force == NULL) return MUMACRO_NO_OUTPUT;
+    if (springs < 1 || !(fabs(dx) < HUGE_VAL && fabs(dy) < HUGE_VAL)) return MUMACRO_NO_STEP;
+    if (!(mu0 > 0.0 && mu0 < HUGE_VAL)) return 1;
+    limit = mu0 * Fz;
+    if (!(Fz >= 0.0 && limit < HUGE_VAL)) return 2;
+    if (!(k > 0.0 && k < HUGE_VAL)) return 3;
+    mu_element_steps(1, springs, &limit, &k, &dx, &dy, state, force);
+    return 0;
+}
+
 MUMACRO_API const char *mumacro_source_name(int source) {
     return source < 0 || source >= MU_SOURCES ? "illegal" : MU_SOURCE_NAME[source];
 }
@@ -157,7 +182,8 @@ MUMACRO_API const char *mumacro_regime_name(int regime) {
 }
 
 MUMACRO_API const char *mumacro_error_text(int error) {
-    static const char *const texts[12] = {
+    static const char *const texts[13] = {
+        "dx and dy must be finite, and there must be a spring",
         "the normal force of a ball cannot oscillate: its contact radius would change, which is not modelled",
         "there is no such contact or direction",
         "there is no such quantity",     "there is no place for the answer", "",
@@ -165,8 +191,7 @@ MUMACRO_API const char *mumacro_error_text(int error) {
         "y0 must be finite and >= 0",    "omega must be finite and >= 0",    "v0 must be finite and >= 0",
         "the amplitude of the normal force must be >= 0 and below Fz: at Fz the contact lifts off",
     };
-    return error < MUMACRO_NO_NORMAL_BALL || error > MUMACRO_LIFT_OFF ? "there is no such error"
-                                                       : texts[error - MUMACRO_NO_NORMAL_BALL];
+    return error < MUMACRO_NO_STEP || error > MUMACRO_LIFT_OFF ? "there is no such error" : texts[error - MUMACRO_NO_STEP];
 }
 
 MUMACRO_API double mumacro_tolerance(void) { return mumacro_table.tolerance; }

@@ -27,3 +27,4 @@
 #include "directions.c"
 #include "contact.c"
 #include "dimensional.c"
+#include "element.c"
