@@ -5,7 +5,10 @@ import sys as _sys
 try:
     from mumacro.answer import Answer
     from mumacro.charts import REGIMES, SOURCES
+    from mumacro.element import Element
     from mumacro.errors import InputError, MumacroError, TableError
+    from mumacro.fitted import Fit
+    from mumacro.fitting import fit
     from mumacro.surrogate import Surrogate
     from mumacro.version import __version__
 except ImportError as _error:
@@ -19,5 +22,6 @@ except ImportError as _error:
 open = Surrogate.open  # noqa: A001 (mumacro.open(), as users of other data libraries expect)
 
 __all__ = [
-    "REGIMES", "SOURCES", "Answer", "InputError", "MumacroError", "Surrogate", "TableError", "__version__", "open",
+    "REGIMES", "SOURCES", "Answer", "Element", "Fit", "InputError", "MumacroError", "Surrogate", "TableError",
+    "__version__", "fit", "open",
 ]  # fmt: skip

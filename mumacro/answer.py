@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-__all__ = ["Answer", "AnswerWithGradient"]
+__all__ = ["Answer", "AnswerWithGradient", "IntervalAnswer", "single"]
 
 #: float for one case; an array of float64 for many, or what holds labels in its place
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ class Answer(Generic[Number]):
 
     @property
     def y_tilde(self) -> Number:
-        """Dimensionless amplitude y0 k/(mu0 Fz) [-]; as v_tilde."""
+        """Dimensionless amplitude y0 k/(mu0 Fz), for direction normal Fz_amplitude/Fz [-]; as v_tilde."""
         return self._group(1, "y_tilde")
 
     @property
@@ -114,7 +115,11 @@ class Answer(Generic[Number]):
 
     @property
     def regime(self) -> Any:
-        """``"continuous"``, ``"stick_slip"`` or ``"static"`` (v0 = 0): str, or ndarray of shared str."""
+        """One of :data:`mumacro.REGIMES`: str, or ndarray of shared str.
+
+        ``"continuous"``, ``"stick_slip"``, ``"static"`` (v0 = 0); ``"partial_slip"`` where some springs of a ball slide
+        continuously and others do not; ``"reverse_slip"`` where an oscillation along slides backwards, too.
+        """
         return self._by_source("regime", _REGIME_NAMES[_REGIME_CODES])
 
     @property
@@ -131,6 +136,7 @@ class Answer(Generic[Number]):
 
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
+        names += [name for name in IntervalAnswer.__slots__ if hasattr(self, name)]
         names += ["v_tilde", "y_tilde", "length_scale"] if self._groups is not None else []
         names += ["gradient", "gradient_bound"] if self.gradient is not None else []
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
@@ -143,3 +149,34 @@ class AnswerWithGradient(Answer[Number]):
 
     gradient: dict[str, Number]
     gradient_bound: dict[str, Number]
+
+
+class IntervalAnswer(AnswerWithGradient[Number]):
+    """An answer for an interval of stiffnesses: mu_macro and all beside it at the geometric middle.
+
+    Attributes
+    ----------
+    mu_macro_low, mu_macro_high : float or ndarray
+        Smallest and largest mu_macro over the interval [-]; ``error_bound`` holds for them, too.
+    """
+
+    __slots__ = ("mu_macro_high", "mu_macro_low")
+
+    mu_macro_low: Number
+    mu_macro_high: Number
+
+
+def single(answer: Answer[Any]) -> Answer[float]:
+    """The answer of one case that an answer of arrays with one element holds."""
+    out = copy.copy(answer)
+    for name in ("mu_macro", "mu_ratio", "error_bound", *IntervalAnswer.__slots__):
+        if hasattr(out, name):
+            setattr(out, name, getattr(out, name).item())
+    out.source_code = int(out.source_code.item())
+    if out._groups is not None:
+        v, y, length = out._groups
+        out._groups = v.item(), y.item(), length.item()
+    for name in ("gradient", "gradient_bound"):
+        if (slopes := getattr(out, name)) is not None:
+            setattr(out, name, {field: slope.item() for field, slope in slopes.items()})
+    return out

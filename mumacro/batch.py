@@ -21,16 +21,18 @@ Codes = NDArray[np.int8]
 
 SLICE = 16_384  # points of a slice: its arrays stay in the second cache
 FEW = 65_536  # points that one thread evaluates before a second one has started
+COST = 64  # of a ball, about, in springs
 _KERNEL = kernels[-1]
 
 
-def share_out(n: int, threads: int, work: Callable[[slice], None]) -> None:
-    """Call ``work`` with every slice of n points."""
-    if n <= SLICE:
+def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1) -> None:
+    """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those of one spring."""
+    length = SLICE // cost
+    if n <= length:
         work(slice(0, n))
         return
-    parts = [slice(low, min(low + SLICE, n)) for low in range(0, n, SLICE)]
-    if threads <= 1 or n < FEW:
+    parts = [slice(low, min(low + length, n)) for low in range(0, n, length)]
+    if threads <= 1 or n < FEW // cost:
         for part in parts:
             work(part)
         return
@@ -39,14 +41,16 @@ def share_out(n: int, threads: int, work: Callable[[slice], None]) -> None:
             pass
 
 
-def values(quantity: int, data: Data, v: Array, y: Array, threads: int) -> tuple[Array, Array, Codes]:
+def values(
+    quantity: int, data: Data, v: Array, y: Array, threads: int, kind: tuple[int, int] | None = None
+) -> tuple[Array, Array, Codes]:
     """A quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
     value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
 
     def work(part: slice) -> None:
-        _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part])
+        _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part], kind)
 
-    share_out(v.size, threads, work)
+    share_out(v.size, threads, work, COST if kind else 1)
     return value, bound, source
 
 
@@ -69,13 +73,15 @@ def derivatives(quantity: int, data: Data, v: Array, y: Array, order: int) -> Ar
     return (_KERNEL.partials if order == 1 else _KERNEL.bends)(data, quantity, v, y)
 
 
-def cases(data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int) -> tuple[Array, Codes]:
+def cases(
+    data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int, kind: tuple[int, int] | None = None
+) -> tuple[Array, Codes]:
     """Answers to n cases, see :meth:`mumacro.library.Kernel.cases`: rows (3, 5 or 17, n), and sources (n,)."""
     out, source = np.empty((rows, n)), np.empty(n, np.int8)
 
     def work(part: slice) -> None:
         six = columns if part.stop - part.start == n else [c if isinstance(c, float) else c[part] for c in columns]
-        _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start)
+        _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start, kind)
 
-    share_out(n, threads, work)
+    share_out(n, threads, work, COST if kind else 1)
     return out, source

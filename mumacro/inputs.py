@@ -41,6 +41,7 @@ __all__ = [
     "length_scale",
     "number_hint",
     "read_number",
+    "read_quantity",
     "real",
     "refusal",
     "scale_of",
@@ -175,7 +176,11 @@ def scale_of(name: str, unit: str) -> Scale | None:
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
     """
-    return UNITS_OF[name].get(unit.replace(" ", "").replace("·", ""))
+    return _scale(UNITS_OF[name], unit)
+
+
+def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
+    return units.get(unit.replace(" ", "").replace("·", ""))
 
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
@@ -255,21 +260,25 @@ def read_number(name: str, text: str) -> float:
     ...
     ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
     """
-    words = SI[name][1]
+    return read_quantity(name, text, SI[name][1], UNITS_OF[name], rigid=name == "k")
+
+
+def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False) -> float:
+    """As :func:`read_number`, of any quantity: what it is in ``words``, its ``units``, whether it may be ``rigid``."""
     text = text.strip()
-    if name == "k" and is_rigid(text):
+    if rigid and is_rigid(text):
         return math.inf
     if _PLAIN.fullmatch(text):
         return float(text)
     with_unit = _WITH_UNIT.fullmatch(text)
-    scale = scale_of(name, with_unit[2].strip(" []()")) if with_unit else None
+    scale = _scale(units, with_unit[2].strip(" []()")) if with_unit else None
     if with_unit and scale:
         return scale.si(float(with_unit[1]))
     if _PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
-    units = ", ".join([unit for unit in UNITS_OF[name] if unit][:4])
-    hint = ", or rigid" if name == "k" else ""
-    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {units}, ...{hint}")
+    known = ", ".join([unit for unit in units if unit][:4])
+    hint = ", or rigid" if rigid else ""
+    raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, ...{hint}")
 
 
 # --- columns --------------------------------------------------------------------------------------------

@@ -55,6 +55,8 @@ class Data:
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _FFI.new("mumacro_data *")
         self._kept: list[Any] = []
+        #: points (nodes, 2) and errors (2, 8) of the pieces of a ball, see ``mumacro_rule``; none until they are put
+        self.rules: list[tuple[Array, Array]] = []
         #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
         self.border, self.pieces, self.blocks, self.outer = (
@@ -72,6 +74,14 @@ class Data:
             self._keep(place, "errors", errors),
             self._keep(place, "slope_errors", slope_errors),
         )
+
+    def put_rules(self, rules: Sequence[tuple[Array, Array]]) -> None:
+        """Add the quadrature of a ball, see :attr:`rules`."""
+        for place, (points, errors) in zip(self.pointer.rules, rules, strict=True):
+            self._keep(place, "points", points)
+            place.errors = errors.tolist()
+            place.nodes = points.shape[0]
+        self.rules = list(rules)
 
     def _keep(self, place: Any, name: str, array: Array) -> Array:
         """Point ``place.name`` to the numbers, which live as long as this object."""
@@ -104,11 +114,19 @@ class Kernel:
         return self._found.quantity(code)
 
     def values(
-        self, data: Data, quantity: int, v: Array, y: Array, value: Array, bound: Array | None, source: Codes | None
-    ) -> None:
-        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where wanted."""
+        self, data: Data, quantity: int, v: Array, y: Array, value: Array, bound: Array | None, source: Codes | None,
+        kind: tuple[int, int] | None = None,
+    ) -> None:  # fmt: skip
+        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where wanted.
+
+        Of another ``kind``, see :meth:`cases`, all three are.
+        """
         codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
-        self._values(data.pointer, quantity, v.size, _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes)
+        arrays = v.size, _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
+        if kind is None:
+            self._values(data.pointer, quantity, *arrays)
+        else:
+            self._found.values_as(data.pointer, *kind, quantity, *arrays)
 
     def slopes(self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0) -> None:
         """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column ``start`` on."""
@@ -116,12 +134,13 @@ class Kernel:
         self._found.slopes(data.pointer, quantity, v.size, _numbers(v), _numbers(y), out, rows.shape[1])
 
     def cases(
-        self, data: Data, n: int, columns: Sequence[Array | float], rows: Array, source: Codes, start: int = 0
-    ) -> None:
+        self, data: Data, n: int, columns: Sequence[Array | float], rows: Array, source: Codes, start: int = 0,
+        kind: tuple[int, int] | None = None,
+    ) -> None:  # fmt: skip
         """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
 
         ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~, y~; slopes by input
-        and their bounds.
+        and their bounds.  ``kind``: another contact and direction, see :class:`mumacro.contact.Kind`.
         """
         constants, strides, pointers = _FFI.new(_SIX), _FFI.new(_STRIDES), _FFI.new(_COLUMNS)
         kept = []
@@ -134,7 +153,12 @@ class Kernel:
                 kept.append(pointer)
         out = _numbers(rows.reshape(-1)[start:] if start else rows)
         codes = _FFI.from_buffer(_CODES, source)
-        self._cases(data.pointer, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
+        if kind is None:
+            self._cases(data.pointer, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
+        else:
+            self._found.cases_as(
+                data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
+            )  # fmt: skip
 
     def one(self, data: Data, six: tuple[float, ...], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
@@ -155,10 +179,10 @@ class Kernel:
         self._found.bends(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1], out[2])))
         return out
 
-    def border(self, data: Data, y: Array) -> Array:
+    def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
         """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
         out = np.empty(y.size)
-        self._found.border(data.pointer, y.size, _numbers(y), _numbers(out))
+        self._found.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
         return out
 
     def places(self, data: Data, v: Array, y: Array) -> tuple[Codes, Array, Array]:
@@ -167,6 +191,11 @@ class Kernel:
         codes = _FFI.from_buffer(_CODES, block)
         self._found.places(data.pointer, v.size, _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b))
         return block, a, b
+
+    def element_steps(self, limit: Array, k: Array, dx: Array, dy: Array, forces: Array, sums: Array) -> None:
+        """Move contacts (n,) by (dx, dy): ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
+        given = map(_numbers, (limit, k, dx, dy, forces, sums))
+        self._found.element_steps(limit.size, forces.shape[1], *given)
 
     # --- for the builder ------------------------------------------------------------------------------
 

@@ -9,9 +9,13 @@ Half-space elasticity, two smooth elastic bodies, small strains:
     rigid flat punch                  a is its radius
     cylinder of length L lying        half width b = sqrt(4 Fz R / (pi L E*)), k of an elliptic contact: two values
 
-k is the stiffness of a contact that sticks everywhere.  Under a curved body the rim slips first: gross slip begins at
-the displacement 3/2 mu0 Fz/k, not at mu0 Fz/k, so that 2/3 k is the secant stiffness (docs/validity.md says what
-that does to mu_macro).  Under a flat punch with full contact all of it slips at once, and one spring is exact.
+k is the stiffness of a contact that sticks everywhere.  Under a ball the rim slips first, and gross slip begins at the
+displacement 3/2 mu0 Fz/k: ``contact="ball"``, which no single spring stands for.  Under a flat punch with full contact
+all of it slips at once, and one spring is exact.  A result holds both, k and the kind of the contact:
+
+    surrogate.evaluate(**ball_on_flat(5e-3, 10.0, steel, steel), mu0=0.3, Fz=10.0, y0=2e-6, f=20e3, v0=0.01)
+
+Every function raises :class:`mumacro.InputError` for a value out of bounds and for two rigid bodies.
 
 Not included: roughness, which adds compliance in series (:func:`in_series`); layers; plastic flow, which begins below
 the surface at a Hertz pressure of about 1.6 times the yield strength; the compliance of the holder, in series as well.
@@ -27,10 +31,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from mumacro.errors import InputError
 
-__all__ = ["Contact", "Material", "ball_on_flat", "cylinder_on_flat", "flat_punch", "in_series"]
+__all__ = ["AXES", "Contact", "Material", "ball_on_flat", "cylinder_on_flat", "flat_punch", "in_series"]
+
+AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
 
 
 def _positive(**values: float) -> None:
@@ -49,11 +56,6 @@ class Material:
         Young's modulus [Pa], > 0; ``math.inf`` for a rigid body.
     nu : float
         Poisson's ratio [-], -1 < nu <= 0.5.
-
-    Raises
-    ------
-    InputError
-        A value out of bounds.
 
     Examples
     --------
@@ -79,7 +81,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Contact:
-    """What a contact of two bodies is.
+    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its ``contact``.
 
     Attributes
     ----------
@@ -91,12 +93,24 @@ class Contact:
         Radius of a circular contact, half width of a line contact [m].
     pressure : float
         Largest pressure [Pa]: Hertz's, or the mean one under a flat punch.
+    contact : str
+        The kind of contact that ``evaluate`` computes with this k: "spring" or "ball".
     """
 
     k: float
     k_normal: float
     half_width: float
     pressure: float
+    contact: str = "spring"
+
+    def keys(self) -> tuple[str, ...]:
+        """What is passed on: k, and the kind of contact where it is not the usual one."""
+        return ("k",) if self.contact == "spring" else ("k", "contact")
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self.keys():
+            raise KeyError(name)
+        return getattr(self, name)
 
     def length_scale(self, mu0: float, Fz: float) -> float:
         """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
@@ -128,12 +142,7 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     Returns
     -------
     Contact
-        k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
-
-    Raises
-    ------
-    InputError
-        A value out of bounds, or two rigid bodies.
+        A "ball"; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
 
     Notes
     -----
@@ -153,7 +162,7 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
     _positive(half_width=a)
-    return Contact(8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a))
+    return Contact(8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball")
 
 
 def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> Contact:
@@ -173,11 +182,6 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
     Contact
         ``pressure`` is the mean one; at the edge it is singular in elasticity.
 
-    Raises
-    ------
-    InputError
-        A value out of bounds, or two rigid bodies.
-
     Examples
     --------
     >>> steel, rigid = Material(E=210e9, nu=0.3), Material(E=float("inf"), nu=0.3)
@@ -191,14 +195,17 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
 
 
 def cylinder_on_flat(
-    radius: float, length: float, Fz: float, first: Material, second: Material, along: bool = False
+    radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
 ) -> Contact:
-    """A cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact across or along its axis.
+    """A cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact in one of two directions.
 
-    A line contact of unlimited length has no defined stiffness, since its displacement grows with the logarithm of
-    the size of the bodies.  Here the contact is finite, and is replaced by the ellipse of the same area and
-    proportions, which under a tangential force moves as one.  An estimate: right to about 10 % as far as the bodies are
-    large beside ``length``.
+    With nu > 0 k across the axis is the larger one, by up to 1/(1 - nu); the model has one k.  **The direction of the
+    oscillation decides**: where the two differ by 1.3, mu~ with its k is right to 0.02, with the other one to 0.13 only
+    (y~ from 0.3 to 10, v~ from 0.2 to 2).
+
+    A line contact of unlimited length has no stiffness.  Here it is finite, and is replaced by the ellipse of the same
+    area and proportions, which under a tangential force moves as one: right to about 10 % where the bodies are large
+    beside ``length``.
 
     Parameters
     ----------
@@ -208,21 +215,18 @@ def cylinder_on_flat(
         Normal force [N].
     first, second : Material
         The two bodies.
-    along : bool
-        False for k across the cylinder's axis, True for k along it; the model wants the direction of the oscillation.
+    oscillation : str
+        "across" or "along" the cylinder's axis: how the contact oscillates, whichever way it slides.
 
     Returns
     -------
     Contact
-        With nu > 0 k across the axis is the larger one, by up to 1/(1 - nu).  The model has one k for both directions.
-        Where they differ by 1.3, mu~ with k of the oscillation is right to 0.02, with k of the sliding to 0.13 only
-        (y~ from 0.3 to 10, v~ from 0.2 to 2): a cylinder that slides across its axis and oscillates along it takes
-        ``along=True``.
+        k in the direction of the oscillation.
 
     Raises
     ------
     InputError
-        A value out of bounds, two rigid bodies, or a contact wider than long, which is no line contact.
+        Also for a contact wider than long, which is no line contact.
 
     Notes
     -----
@@ -232,12 +236,15 @@ def cylinder_on_flat(
     Examples
     --------
     >>> steel = Material(E=210e9, nu=0.3)
-    >>> contact = cylinder_on_flat(radius=5e-3, length=5e-3, Fz=100.0, first=steel, second=steel)
-    >>> f"across {contact.k:.3g} N/m, {1e6 * contact.half_width:.1f} um"
-    'across 1.67e+08 N/m, 33.2 um'
-    >>> f"along {cylinder_on_flat(5e-3, 5e-3, 100.0, steel, steel, along=True).k:.3g} N/m"
-    'along 1.32e+08 N/m'
+    >>> for oscillation in AXES:
+    ...     contact = cylinder_on_flat(5e-3, 5e-3, 100.0, steel, steel, oscillation)
+    ...     print(f"{oscillation} {contact.k:.3g} N/m, {1e6 * contact.half_width:.1f} um")
+    across 1.67e+08 N/m, 33.2 um
+    along 1.32e+08 N/m, 33.2 um
     """
+    if oscillation not in AXES:
+        raise InputError("oscillation", oscillation, f"{' or '.join(AXES)} the axis: its k is the one of the model")
+    along = oscillation == "along"
     _positive(radius=radius, length=length, Fz=Fz)
     modulus, _ = _moduli(first, second)
     b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
@@ -272,10 +279,7 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
 def in_series(*stiffnesses: float) -> float:
     """Stiffness [N/m] of springs in series, such as contact, roughness and holder: 1/k = sum of 1/k_i.
 
-    Raises
-    ------
-    InputError
-        A stiffness that is not > 0; ``math.inf`` is a rigid part.
+    A stiffness is > 0; ``math.inf`` is a rigid part.
 
     Examples
     --------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,12 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro import batch, charts, closed_forms
-from mumacro.answer import Answer, AnswerWithGradient
+from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.border import Border
 from mumacro.bundled import bundled_tables
 from mumacro.cells import block_rows, outer_cells, quantity_cells
+from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
 from mumacro.errors import InputError, TableError
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, real
+from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
 from mumacro.processors import default_threads
 from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
@@ -196,10 +199,10 @@ class Surrogate:
             _refuse_illegal(-1, v, y, "finite and >= 0")
         return _shaped(found, shape)
 
-    def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+    def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any, Any]:
         """mu~ [-], the bound of its absolute error [-], and the source code (index into SOURCES).
 
-        Arguments, shapes and errors as in :meth:`mu_ratio`.
+        Arguments, shapes and errors as in :meth:`mu_ratio`; ``contact`` and ``direction`` as in :meth:`quantity`.
 
         Examples
         --------
@@ -207,12 +210,13 @@ class Surrogate:
         >>> round(mu, 6), bound < 1e-12, int(source)
         (0.942004, True, 5)
         """
-        return self.quantity("mu_ratio", v_tilde, y_tilde)
+        return self.quantity("mu_ratio", v_tilde, y_tilde, **kind)
 
-    def v_tilde_crit(self, y_tilde: ArrayLike) -> Any:
+    def v_tilde_crit(self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across") -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
 
         Scalar in, float out; infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.
+        For a ball all springs slide from there on; along and normal it is the amplitude itself, for normal below 1.
 
         Raises
         ------
@@ -224,28 +228,29 @@ class Surrogate:
         >>> round(Surrogate.open().v_tilde_crit(1.0), 7)
         0.3251783
         """
-        if type(y_tilde) is float and y_tilde >= 0.0:
+        kind = kind_of(contact, direction)
+        if type(y_tilde) is float and y_tilde >= 0.0 and kind == SPRING:
             return float(self.border(np.array((y_tilde,)))[0])
         _, y, shape = _points(0.0, y_tilde)
-        found = self.border(y)
+        found = _KERNEL.border(self._data, y, kind)
         if not shape and math.isnan(found[0]):
-            raise InputError("y_tilde", float(y[0]), ">= 0")
+            raise InputError("y_tilde", float(y[0]), ">= 0 and < 1" if kind.normal else ">= 0")
         return _shaped(found, shape)
 
-    def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
+    def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
         """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
 
         Slip turns v~ mu~ plus this power into heat.  Arguments and errors as in :meth:`mu_ratio`; an infinite amplitude
-        gives infinite power.  The first call prepares the cells.
+        gives infinite power.  The first call prepares the cells.  ``contact`` and ``direction`` as in :meth:`quantity`.
 
         Examples
         --------
         >>> round(Surrogate.open().power(0.1, 0.5), 6)
         0.012142
         """
-        return self.power_with_bound(v_tilde, y_tilde)[0]
+        return self.power_with_bound(v_tilde, y_tilde, **kind)[0]
 
-    def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> Any:
+    def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
         """Share of the period during which the contact sticks [-], 0 to 1; arguments and errors as :meth:`power`.
 
         Examples
@@ -253,19 +258,19 @@ class Surrogate:
         >>> round(Surrogate.open().stick_fraction(0.1, 0.5), 6)
         0.224881
         """
-        return self.stick_fraction_with_bound(v_tilde, y_tilde)[0]
+        return self.stick_fraction_with_bound(v_tilde, y_tilde, **kind)[0]
 
-    def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+    def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
         """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
-        return self.quantity("power", v_tilde, y_tilde)[:2]
+        return self.quantity("power", v_tilde, y_tilde, **kind)[:2]
 
-    def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any]:
+    def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
         """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
 
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
         """
-        return self.quantity("stick_fraction", v_tilde, y_tilde)[:2]
+        return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[:2]
 
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
@@ -335,10 +340,14 @@ class Surrogate:
             self._with(name)
         return self._data
 
-    def quantity(self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike) -> tuple[Any, Any, Any]:
+    def quantity(
+        self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across"
+    ) -> tuple[Any, Any, Any]:
         """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
 
         ``name`` is one of ``table.quantities``; the other arguments, shapes and errors are those of :meth:`mu_ratio`.
+        Of a ball the stick fraction is a share of the load, too.  For direction "normal" ``y_tilde`` is Fz_amplitude/Fz
+        [-], below 1; it has no power, because the model does not know how far the load moves.
 
         Examples
         --------
@@ -348,11 +357,16 @@ class Surrogate:
         """
         if name not in charts.QUANTITY_NAMES:
             raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
-        data = self._with(name)
+        kind = kind_of(contact, direction)
+        if kind.normal and name == "power":
+            raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
+        self._data_of(kind)
         v, y, shape = _points(v_tilde, y_tilde)
-        value, bound, source = batch.values(_CODES[name], data, v, y, self.threads)
+        code = None if kind == SPRING else kind
+        value, bound, source = batch.values(_CODES[name], self._with(name), v, y, self.threads, code)
         if not shape:
-            _refuse_illegal(int(source[0]), v, y, "finite and >= 0" if name == "mu_ratio" else ">= 0")
+            finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
+            _refuse_illegal(int(source[0]), v, y, ">= 0 and < 1" if kind.normal else finite)
         return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
     # --- dimensional ----------------------------------------------------------------------------------
@@ -360,35 +374,46 @@ class Surrogate:
     @overload
     def evaluate(
         self, *, mu0: float, Fz: float, k: float | None, y0: float, v0: float, omega: float = ..., f: float = ...,
-        gradient: Literal[True], groups: bool = ..., illegal: str = ...,
+        gradient: Literal[True], groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        direction: DirectionName = ...,
     ) -> AnswerWithGradient[float]: ...  # fmt: skip
 
     @overload
     def evaluate(
         self, *, mu0: float, Fz: float, k: float | None, y0: float, v0: float, omega: float = ..., f: float = ...,
-        gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ...,
+        gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        direction: DirectionName = ...,
     ) -> Answer[float]: ...  # fmt: skip
 
     @overload
     def evaluate(
+        self, *, mu0: float, Fz: float, k_range: tuple[float, float], y0: float, v0: float, omega: float = ...,
+        f: float = ..., gradient: bool = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        direction: DirectionName = ...,
+    ) -> IntervalAnswer[float]: ...  # fmt: skip
+
+    @overload
+    def evaluate(
         self, cases: Mapping[str, Any] = ..., /, *, gradient: Literal[True], groups: bool = ..., illegal: str = ...,
-        **inputs: ArrayLike | None,
+        contact: ContactName = ..., direction: DirectionName = ..., **inputs: ArrayLike | None,
     ) -> AnswerWithGradient[Array]: ...  # fmt: skip
 
     @overload
     def evaluate(
         self, cases: Mapping[str, Any] = ..., /, *, gradient: Literal[False] = ..., groups: bool = ...,
-        illegal: str = ..., **inputs: ArrayLike | None,
+        illegal: str = ..., contact: ContactName = ..., direction: DirectionName = ..., **inputs: ArrayLike | None,
     ) -> Answer[Array]: ...  # fmt: skip
 
     @overload
     def evaluate(
-        self, cases: Any = ..., /, *, gradient: bool = ..., groups: bool = ..., illegal: str = ..., **inputs: Any
-    ) -> Any: ...
+        self, cases: Any = ..., /, *, gradient: bool = ..., groups: bool = ..., illegal: str = ...,
+        contact: ContactName = ..., direction: DirectionName = ..., **inputs: Any
+    ) -> Any: ...  # fmt: skip
 
     def evaluate(  # type: ignore[misc]  # mypy does not match named inputs with **inputs
-        self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan", **inputs: Any
-    ) -> Any:
+        self, cases: Any = None, /, *, gradient: bool = False, groups: bool = False, illegal: str = "nan",
+        contact: str = "spring", direction: str = "across", **inputs: Any
+    ) -> Any:  # fmt: skip
         """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
 
         Parameters
@@ -415,10 +440,20 @@ class Surrogate:
             Also keep v~, y~ and l0 of arrays, which takes a quarter of the time again; scalars and gradients have them.
         illegal : str
             Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case, "raise" raises.
+        contact : str
+            "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip is k = 8 a G*.
+        direction : str
+            "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the force is
+            Fz + Fz_amplitude cos(omega t), for a spring only.
+        Fz_amplitude : array_like
+            Amplitude of the normal force [N], >= 0 and below Fz, in place of y0 where the direction is "normal".
+        k_range : pair of array_like
+            Lowest and highest stiffness [N/m] in place of k; or two columns, ``k_low`` and ``k_high``.
 
         Returns
         -------
         Answer
+            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k (:class:`mumacro.answer.IntervalAnswer`).
             Or the container of the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
             (see :mod:`mumacro.interop.labels`).  Arrow and Polars give an answer of arrays.
 
@@ -438,7 +473,15 @@ class Surrogate:
         >>> a = s.evaluate(mu0=0.3, Fz=10, k=[1e6, None][0], y0=[0.0, 2e-6, -1.0], f=20e3, v0=0.01)
         >>> a.source_code.tolist()
         [13, 5, -1]
+        >>> case = dict(mu0=0.3, Fz=10, y0=2e-6, f=20e3, v0=0.01)
+        >>> s.evaluate(k=1e6, contact="ball", **case).regime
+        'partial_slip'
+        >>> a = s.evaluate(k_range=(0.8e6, 1.2e6), **case)
+        >>> a.mu_macro_low < a.mu_macro < a.mu_macro_high
+        True
         """
+        if contact != "spring" or direction != "across":
+            return self._evaluate(cases, inputs, gradient, groups, illegal, kind_of(contact, direction))
         six = _six(inputs) if cases is None and len(inputs) == 6 else None
         if six is not None and illegal in ("nan", "raise"):
             kinds = set(map(type, six))
@@ -493,22 +536,41 @@ class Surrogate:
             answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
         return answer
 
-    def _evaluate(self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str) -> Any:
+    def _evaluate(
+        self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str, kind: Kind = SPRING
+    ) -> Any:
         if illegal not in ("nan", "raise"):
             raise InputError("illegal", illegal, '"nan" or "raise"')
-        unknown = inputs.keys() - {*FIELDS, "f"}
+        unknown = inputs.keys() - {*FIELDS, "f", AMPLITUDE, "k_range", *ENDS}
         if unknown:
-            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(FIELDS)} or f")
+            raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(kind.fields)} or f")
         if cases is not None:
-            picked = _picked(cases)
+            picked = _picked(cases, kind.columns)
             if twice := picked.keys() & inputs.keys():
                 raise InputError(min(twice), inputs[min(twice)], "given once: in the cases or as a keyword")
             inputs = {**picked, **inputs}
-        inputs = {name: _from_arrow(x) for name, x in inputs.items()}
+        inputs = kind.as_six({name: _from_arrow(x) for name, x in inputs.items()})
+        interval = not inputs.keys().isdisjoint(("k_range", *ENDS))
+        if interval:
+            inputs = as_ends(inputs)
         if _labelled(inputs, cases):
             from mumacro.interop.labels import evaluate_labelled  # loads pandas, xarray or Dask only where used
 
-            return evaluate_labelled(self, cases, inputs, gradient=gradient, groups=groups, illegal=illegal)
+            options = {"gradient": gradient, "groups": groups, "illegal": illegal, **kind.names}
+            return evaluate_labelled(self, cases, kind.as_given(inputs), kind, interval, options)
+        try:
+            return self._plain(inputs, gradient, groups, illegal, kind, interval)
+        except InputError as error:
+            raise kind.refused(error) from error.__cause__
+
+    def _plain(
+        self, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str, kind: Kind, interval: bool
+    ) -> Answer[Any]:
+        """The answer to inputs without labels, the amplitude by the name y0."""
+        ends = None
+        if interval:
+            *ends, between = middle(inputs, illegal)
+            inputs = {name: x for name, x in inputs.items() if name not in ENDS} | {"k": between}
         columns = as_columns(inputs)
         try:
             shape = _common_shape([*columns.values()])
@@ -517,33 +579,75 @@ class Surrogate:
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         if not shape or illegal == "raise":
             check_inputs(columns, inputs.get("f"))
-        if not shape:
-            return self._one(tuple(float(column) for column in columns.values()), gradient)
-        return self._arrays(list(columns.values()), shape, gradient, gradient or groups)
+            if kind.normal:
+                kind.check_lift_off(columns["y0"], columns["Fz"])
+        if not shape and kind == SPRING and ends is None:
+            one: Any = self._one(tuple(float(column) for column in columns.values()), gradient)
+            return one  # type: ignore[no-any-return]  # legal, so it is no None
+        answer = self._arrays([*columns.values()], shape or (1,), gradient, gradient or groups or not shape, kind)
+        if ends is not None:
+            answer = self._with_extremes(answer, columns, ends, kind)
+        return answer if shape else single(answer)
 
-    def _arrays(self, columns: Sequence[Any], shape: tuple[int, ...], gradient: bool, groups: bool) -> Answer[Array]:
+    def _arrays(
+        self, columns: Sequence[Any], shape: tuple[int, ...], gradient: bool, groups: bool, kind: Kind = SPRING
+    ) -> Answer[Array]:
         # a value that holds for all cases stays one value
         flat = [
             float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape) for c in columns
         ]
         found, source = batch.cases(
-            self._data, flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3
-        )
+            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3,
+            None if kind == SPRING else kind,
+        )  # fmt: skip
         rows = found.reshape(len(found), *shape)
-        kind: type[Answer[Array]] = AnswerWithGradient if gradient else Answer
-        answer = kind(rows[0], rows[1], rows[2], source.reshape(shape))
+        answer: Answer[Array] = (AnswerWithGradient if gradient else Answer)(
+            rows[0], rows[1], rows[2], source.reshape(shape)
+        )
         if groups:
             length = np.where(answer.source_code == -1, np.nan, length_scale(*columns[:3]))
-            answer._groups, answer._certain = (rows[3], rows[4], length), self._certain
+            answer._groups = rows[3], rows[4], length
+            answer._certain = self._certain if kind == SPRING else functools.partial(self._certain, kind=kind)
         if gradient:
-            answer.gradient = dict(zip(FIELDS, rows[5:11], strict=True))
-            answer.gradient_bound = dict(zip(FIELDS, rows[11:], strict=True))
+            answer.gradient = dict(zip(kind.fields, rows[5:11], strict=True))
+            answer.gradient_bound = dict(zip(kind.fields, rows[11:], strict=True))
         return answer
 
-    def _certain(self, v_tilde: Any, y_tilde: Any) -> Any:
+    def _with_extremes(
+        self, answer: Answer[Array], columns: dict[str, Array], ends: Sequence[Array], kind: Kind
+    ) -> IntervalAnswer[Array]:
+        """``answer`` for the middle of an interval of k, and the extremes over it."""
+        shape = answer.mu_macro.shape
+        flat = {name: _flat(column, shape) for name, column in columns.items()}
+        data, code = self._data_of(kind), None if kind == SPRING else kind
+
+        def evaluate(k: Array, places: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+            six = [_contiguous(k if name == "k" else column[places]) for name, column in flat.items()]
+            rows = batch.cases(data, six, k.size, self.threads, 17, code)[0]
+            return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k
+
+        low, high, bound = extremes(evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends))
+        out: IntervalAnswer[Array] = IntervalAnswer(
+            answer.mu_macro, answer.mu_ratio, np.maximum(answer.error_bound, bound.reshape(shape)),
+            answer.source_code, answer._groups, answer._certain,
+        )  # fmt: skip
+        if answer.gradient is not None and answer.gradient_bound is not None:
+            out.gradient, out.gradient_bound = answer.gradient, answer.gradient_bound
+        legal = answer.source_code != -1
+        out.mu_macro_low = np.where(legal, np.minimum(low.reshape(shape), answer.mu_macro), np.nan)
+        out.mu_macro_high = np.where(legal, np.maximum(high.reshape(shape), answer.mu_macro), np.nan)
+        return out
+
+    def _data_of(self, kind: Kind) -> Data:
+        """What the kernel reads; a ball needs rules of quadrature."""
+        if kind.contact:
+            put_rules(self._data, self.tolerance)
+        return self._data
+
+    def _certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Any:
         """Whether v~ is further from v~crit than that is known, and than rounding may move v~ and y~."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
-        crit = self.border(np.atleast_1d(np.asarray(y, dtype=np.float64))).reshape(y.shape)
+        crit = _KERNEL.border(self._data, np.atleast_1d(np.asarray(y, dtype=np.float64)), kind).reshape(y.shape)
         margin = self.border.max_rel_error + 4.0 * charts.ROUNDING
         with np.errstate(all="ignore"):
             # groups beyond double range are not near the border, or it cannot be decided
@@ -619,12 +723,14 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
         return None
 
 
-def _picked(cases: Any) -> dict[str, Any]:
+def _picked(cases: Any, columns: Sequence[str]) -> dict[str, Any]:
     """The inputs among the columns of a mapping, a data frame, an Arrow table or a Dataset."""
     try:
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
         there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
-        picked = {name: cases[name] for name in (*FIELDS, "f") if name in there}
+        picked = {name: cases[name] for name in columns if name in there}
+        if "k" not in there:
+            picked |= {name: cases[name] for name in ENDS if name in there}
     except (AttributeError, TypeError, KeyError) as error:
         kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(

@@ -1,20 +1,22 @@
-"""Contact stiffness: the textbook's relations, the ellipse by brute force, bounds."""
+"""Contact stiffness: the textbook's relations, the ellipse by brute force, bounds, the list of geometries."""
 
 import doctest
+import inspect
 import math
 
 import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import InputError, stiffness
-from mumacro.stiffness import Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
+from mumacro import InputError, geometries, stiffness
+from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
+from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
 
 STEEL, RUBBER, RIGID = Material(210e9, 0.3), Material(5e6, 0.5), Material(math.inf, 0.3)
 
 
 def test_the_examples_run() -> None:
-    assert doctest.testmod(stiffness).failed == 0
+    assert doctest.testmod(stiffness).failed == doctest.testmod(geometries).failed == 0
 
 
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.5])
@@ -56,13 +58,12 @@ def test_the_ellipse_is_the_integral_over_all_directions(narrow: float, wide: fl
 
 
 def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_load() -> None:
-    across = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL)
-    along = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL, along=True)
+    across, along = (cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL, axis) for axis in AXES)
     assert 1.0 < across.k / along.k < 1.0 / (1.0 - 0.3)
-    assert 1.0 < cylinder_on_flat(5e-3, 5e-3, 400.0, STEEL, STEEL).k / across.k < 1.3
+    assert 1.0 < cylinder_on_flat(5e-3, 5e-3, 400.0, STEEL, STEEL, "across").k / across.k < 1.3
     assert across.pressure == close(2.0 * 100.0 / (math.pi * across.half_width * 5e-3), rel=1e-14)
     incompressible = Material(1e9, 0.0)
-    same = cylinder_on_flat(1e-2, 1e-2, 10.0, incompressible, incompressible)
+    same = cylinder_on_flat(1e-2, 1e-2, 10.0, incompressible, incompressible, "along")
     assert same.k == close(same.k_normal, rel=1e-14)
 
 
@@ -93,8 +94,8 @@ def test_of_two_stiffnesses_the_one_of_the_oscillation_belongs_in_the_model(surr
 
 def test_stiffness_has_its_scaling_laws() -> None:
     # lengths times 2, forces times 4: the same strains, k twice
-    small = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL)
-    large = cylinder_on_flat(1e-2, 1e-2, 400.0, STEEL, STEEL)
+    small = cylinder_on_flat(5e-3, 5e-3, 100.0, STEEL, STEEL, "across")
+    large = cylinder_on_flat(1e-2, 1e-2, 400.0, STEEL, STEEL, "across")
     assert large.k == close(2.0 * small.k, rel=1e-13)
     assert large.pressure == close(small.pressure, rel=1e-13)
 
@@ -117,9 +118,10 @@ def test_springs_in_series() -> None:
         (lambda: ball_on_flat(1.0, math.inf, STEEL, STEEL), "Fz"),
         (lambda: ball_on_flat(1.0, 1.0, RIGID, RIGID), "E"),
         (lambda: ball_on_flat(1e-300, 1e-300, STEEL, STEEL), "half_width"),
-        (lambda: cylinder_on_flat(1e-300, 1.0, 1e-300, STEEL, STEEL), "half_width"),
+        (lambda: cylinder_on_flat(1e-300, 1.0, 1e-300, STEEL, STEEL, "across"), "half_width"),
+        (lambda: cylinder_on_flat(1.0, 1.0, 1.0, STEEL, STEEL, "axial"), "oscillation"),
         (lambda: flat_punch(0.0, 1.0, STEEL, STEEL), "radius"),
-        (lambda: cylinder_on_flat(1.0, 1e-6, 1e3, STEEL, STEEL), "length"),
+        (lambda: cylinder_on_flat(1.0, 1e-6, 1e3, STEEL, STEEL, "across"), "length"),
         (lambda: in_series(1.0, -1.0), "stiffness"),
         (lambda: Contact(1.0, 1.0, 1.0, 1.0).length_scale(0.0, 1.0), "mu0"),
     ],
@@ -128,3 +130,59 @@ def test_a_bad_value_is_named(call, field) -> None:
     with pytest.raises(InputError) as caught:
         call()
     assert caught.value.field == field
+
+
+# --- geometries by name -----------------------------------------------------------------------------------
+
+
+def test_the_list_has_the_arguments_of_the_functions() -> None:
+    used = {name for geometry in GEOMETRIES.values() for name in geometry.arguments}
+    assert used | {*BODIES} == {*ARGUMENTS}
+    for geometry in GEOMETRIES.values():
+        named = [name for name in inspect.signature(geometry.function).parameters if name not in ("first", "second")]
+        assert named == list(geometry.arguments)
+
+
+def test_a_named_geometry_is_its_function() -> None:
+    steel = {"E": 210e9, "nu": 0.3}
+    assert contact_of("ball", radius=5e-3, Fz=10.0, **steel) == ball_on_flat(5e-3, 10.0, STEEL, STEEL)
+    assert contact_of("flat", radius=1e-3, Fz=10.0, **steel, E2=5e6, nu2=0.5) == flat_punch(1e-3, 10.0, STEEL, RUBBER)
+    for axis in AXES:
+        found = contact_of("cylinder", radius=5e-3, length=5e-3, Fz=1e2, oscillation=axis, E2=math.inf, **steel)
+        assert found == cylinder_on_flat(5e-3, 5e-3, 1e2, STEEL, RIGID, axis)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "given", "said"),
+    [
+        ("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
+        ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
+        ("cylinder", {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3}, "oscillation must be given: how"),
+        ("ball", {"length": 1.0}, "length must be left out: unknown field"),
+        ("ball", {"radius": "5mm"}, "radius must be a real number"),
+        ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
+        ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0"),
+    ],
+)
+def test_a_bad_argument_is_named_with_the_remedy(geometry, given, said) -> None:
+    with pytest.raises(InputError, match=said):
+        contact_of(geometry, **given)
+
+
+def test_arguments_are_read_with_units() -> None:
+    read = {"E": ("210 GPa", 210e9), "radius": ("5mm", 5e-3), "Fz": ("10N", 10.0), "nu": ("0.3", 0.3)}
+    for name, (text, value) in {**read, "E2": ("Rigid", math.inf), "oscillation": (" along ", "along")}.items():
+        assert read_argument(name, text) == value
+    with pytest.raises(ValueError, match=r"E=210 N: give Young's modulus .* with a unit: Pa, kPa, MPa"):
+        read_argument("E", "210 N")
+    with pytest.raises(ValueError, match="the decimal sign is a point"):
+        read_argument("nu", "0,3")
+
+
+def test_a_result_can_be_passed_on(surrogate) -> None:
+    case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+    punch, ball = flat_punch(1e-3, 10.0, STEEL, STEEL), ball_on_flat(5e-3, 10.0, STEEL, STEEL)
+    assert surrogate.evaluate(**punch, **case).mu_macro == surrogate.evaluate(k=punch.k, **case).mu_macro
+    assert dict(ball) == {"k": ball.k, "contact": "ball"}
+    with pytest.raises(KeyError):
+        ball["pressure"]

@@ -13,6 +13,7 @@ from pathlib import Path
 import mumacro
 from mumacro import charts
 from mumacro.cells import block_rows, border_cells, outer_cells, quantity_cells
+from mumacro.contact import rules
 from mumacro.errors import MumacroError
 from mumacro.library import Array
 from mumacro.table import Table
@@ -125,6 +126,12 @@ def table_text(table: Table, linkage: str) -> str:
         quantities.append(f"{{{first}, {len(polynomials) - first}, {_names(f'{name}_', parts)}}}")
     rows.append("{" + ",\n      ".join(quantities) + "}")
     about = table.attributes
+    quadrature = []
+    for place, (points, errors) in enumerate(rules(float(about["tolerance"]))):
+        arrays[f"rule_{place}"] = points
+        numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
+        quadrature.append(f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}")
+    rows.append("{" + ",\n      ".join(quadrature) + "}")
     text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
     whole = (
         f"{linkage}const mumacro_export mumacro_table = {{\n    {{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"

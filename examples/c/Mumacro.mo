@@ -30,14 +30,22 @@ package Mumacro "Macroscopic friction of an oscillated sliding contact, by mumac
     annotation (Include = "#include \"mumacro_modelica.h\"", IncludeDirectory = "modelica://Mumacro");
   end gradient;
 
-  model SlidingMass "a mass that is pulled over an oscillated contact: m dv/dt = F - mu_macro Fz"
+  pure function force "friction force [N] at a velocity of either sign, a steep damper below v_rest"
+    input Real v(unit="m/s") "sliding velocity";
+    input Real v_rest(unit="m/s") "below it the force is regularised, > 0";
+    input Real mu0(min=0), Fz(unit="N"), k(unit="N/m"), y0(unit="m"), omega(unit="rad/s");
+    output Real F(unit="N") "along v";
+  external "C" F = mumacro_force(v, v_rest, mu0, Fz, k, y0, omega)
+    annotation (Include = "#include \"mumacro.h\"", IncludeDirectory = "modelica://Mumacro");
+  end force;
+
+  model SlidingMass "a mass that is pulled over an oscillated contact: m dv/dt = F - friction"
     parameter Real m(unit="kg") = 1.0;
     parameter Real F(unit="N") = 2.7;
     parameter Real Fz(unit="N") = 10.0;
+    parameter Real v_rest(unit="m/s") = 1e-4;
     Real v(unit="m/s", start = 0.01, fixed = true);
-    Real mu;
   equation
-    mu = muMacro(0.3, Fz, 1e6, 2e-6, 1.3e5, v);
-    m*der(v) = F - mu*Fz;
+    m*der(v) = F - force(v, v_rest, 0.3, Fz, 1e6, 2e-6, 1.3e5);
   end SlidingMass;
 end Mumacro;

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mumacro.answer import Answer
+from mumacro.answer import Answer, IntervalAnswer
+from mumacro.charts import REGIMES
+from mumacro.contact import AMPLITUDE, Kind
 from mumacro.errors import InputError
-from mumacro.inputs import FIELDS, PER_UNIT
+from mumacro.inputs import PER_UNIT
 
 if TYPE_CHECKING:
     from mumacro.surrogate import Surrogate
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["evaluate_labelled"]
 
 _GROUPS = ("v_tilde", "y_tilde", "length_scale")
+_ENDS = ("mu_macro_low", "mu_macro_high")
 #: name -> units and long_name, as xarray and CF write them
 _ABOUT = {
     "mu_macro": ("1", "macroscopic friction coefficient"),
@@ -31,25 +34,26 @@ _ABOUT = {
     "v_tilde": ("1", "dimensionless sliding speed"),
     "y_tilde": ("1", "dimensionless oscillation amplitude"),
     "length_scale": ("m", "mu0 Fz / k"),
-    "regime": ("1", "continuous, stick_slip or static"),
+    "mu_macro_low": ("1", "smallest mu_macro over the interval of k"),
+    "mu_macro_high": ("1", "largest mu_macro over the interval of k"),
+    "regime": ("1", ", ".join(REGIMES)),
     "regime_code": ("1", "index of the regime, -1 for an illegal case"),
     "regime_certain": ("1", "whether the regime is certain"),
     "source": ("1", "block or closed form that gave the value"),
 } | {
-    f"d_mu_macro_d_{name}{end}": (PER_UNIT[name].replace("-", "1"), f"{what} of mu_macro along {name}")
+    f"d_mu_macro_d_{name}{end}": (unit.replace("-", "1"), f"{what} of mu_macro along {name}")
     for end, what in (("", "slope"), ("_bound", "bound of the absolute error of the slope"))
-    for name in FIELDS
+    for name, unit in {**PER_UNIT, AMPLITUDE: PER_UNIT["Fz"]}.items()
 }
-_SLOPES = [name for name in _ABOUT if name.startswith("d_")]
 _KINDS = {"source_code": np.int8, "regime_code": np.int8, "regime_certain": np.bool_, "source": object,
           "regime": object}  # fmt: skip
 Apply = Callable[[Callable[..., Any], Mapping[str, Any], Sequence[str]], list[Any]]
 
 
 def evaluate_labelled(
-    surrogate: Surrogate, cases: Any, inputs: Mapping[str, Any], *, gradient: bool, groups: bool, illegal: str
+    surrogate: Surrogate, cases: Any, inputs: Mapping[str, Any], kind: Kind, interval: bool, options: dict[str, Any]
 ) -> Any:
-    """:meth:`mumacro.Surrogate.evaluate` for labelled inputs.
+    """:meth:`mumacro.Surrogate.evaluate` for labelled inputs, ``options`` are its other keywords.
 
     Returns
     -------
@@ -72,17 +76,19 @@ def evaluate_labelled(
     table = surrogate if library == "pandas" else surrogate.on_one_thread()  # Dask has its own threads
     if kinds[""] == "dask":
         beside = {name: value for name, value in inputs.items() if name not in cases.columns}
-        return _parts(table, cases, {"gradient": gradient, "groups": groups, "illegal": illegal, **beside})
+        return _parts(table, cases, {**options, **beside})
     for name, value in given.items():
         if hasattr(value, "to_dask_array"):
             raise InputError(name, type(value).__name__, "a Dask array: .to_dask_array(lengths=True)")
-    names = ["mu_macro", "mu_ratio", "error_bound", "source_code"]
-    names += [*(_GROUPS if groups or gradient else ()), *(_SLOPES if gradient else ())]
+    gradient, groups = options["gradient"], options["groups"] or options["gradient"]
+    slopes = [f"d_mu_macro_d_{name}{end}" for end in ("", "_bound") for name in kind.fields] if gradient else []
+    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(_ENDS if interval else ())]
+    names += [*(_GROUPS if groups else ()), *slopes]
 
     def chunk(*values: Any) -> list[Any]:
-        found = table.evaluate(dict(zip(given, values, strict=True)), gradient=gradient, groups=groups, illegal=illegal)
-        slopes = [*found.gradient.values(), *found.gradient_bound.values()] if gradient else []
-        return [getattr(found, name) for name in names if name not in _SLOPES] + slopes
+        found = table.evaluate(dict(zip(given, values, strict=True)), **options)
+        rows = [*found.gradient.values(), *found.gradient_bound.values()] if gradient else []
+        return [getattr(found, name) for name in names if name not in slopes] + rows
 
     apply = _APPLY[library]
     found = dict(zip(names, apply(chunk, given, names), strict=True))
@@ -93,18 +99,22 @@ def evaluate_labelled(
         return apply(lambda codes: [entries[codes]], {"source_code": code}, [name])[0]
 
     def certain(v: Any, y: Any) -> Any:
-        return apply(lambda *both: [table._certain(*both)], {"v_tilde": v, "y_tilde": y}, ["regime_certain"])[0]
+        both = {"v_tilde": v, "y_tilde": y}
+        return apply(lambda v, y: [table._certain(v, y, kind)], both, ["regime_certain"])[0]
 
     mu_macro, mu_ratio, bound, code = (found[name] for name in names[:4])
-    answer = Answer(mu_macro, mu_ratio, bound, code, look_up=look_up)
-    if groups or gradient:
+    answer: Any = (IntervalAnswer if interval else Answer)(mu_macro, mu_ratio, bound, code, look_up=look_up)
+    for name in _ENDS if interval else ():
+        setattr(answer, name, found[name])
+    if groups:
         answer._groups, answer._certain = (found["v_tilde"], found["y_tilde"], found["length_scale"]), certain
     if gradient:
-        answer.gradient = {name: found[f"d_mu_macro_d_{name}"] for name in FIELDS}
-        answer.gradient_bound = {name: found[f"d_mu_macro_d_{name}_bound"] for name in FIELDS}
+        answer.gradient = {name: found[f"d_mu_macro_d_{name}"] for name in kind.fields}
+        answer.gradient_bound = {name: found[f"d_mu_macro_d_{name}_bound"] for name in kind.fields}
     if kinds[""] not in ("pandas", "xarray"):
         return answer
-    columns = {name: getattr(answer, name) for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source")}
+    shown = ("mu_macro", *(_ENDS if interval else ()), "mu_ratio", "regime", "error_bound", "source")
+    columns = {name: getattr(answer, name) for name in shown}
     whole = importlib.import_module(kinds[""])
     return whole.DataFrame(columns) if library == "pandas" else whole.Dataset(columns)
 

@@ -29,11 +29,12 @@
 #define MU_LN_Y_TAIL 11.783502069519070
 #define MU_LN_RHO_MAX 4.852030263919617
 
-enum { MU_CONTINUOUS, MU_STICK_SLIP, MU_STATIC, MU_REGIMES };
+enum { MU_CONTINUOUS, MU_STICK_SLIP, MU_STATIC, MU_PARTIAL_SLIP, MU_REVERSE_SLIP, MU_REGIMES };
 /* Sources: first the blocks, those of a regime in the order of y~; then what is known in closed form. */
 enum {
     MU_C_LOW, MU_C_MID_1, MU_C_MID_2, MU_C_HIGH, MU_C_TAIL, MU_S_LOW, MU_S_MID, MU_CORNER, MU_S_MID_1, MU_S_MID_2,
-    MU_S_HIGH, MU_S_TAIL, MU_CHARTS, MU_FAST = MU_CHARTS, MU_NO_OSCILLATION, MU_STATIC_LIMIT, MU_RIGID, MU_SOURCES,
+    MU_S_HIGH, MU_S_TAIL, MU_CHARTS, MU_FAST = MU_CHARTS, MU_NO_OSCILLATION, MU_STATIC_LIMIT, MU_RIGID, MU_BALL_SLIDES, MU_BALL_PARTLY, MU_ALONG_SLIDES,
+    MU_ALONG_STICKS, MU_ALONG_REVERSES, MU_NORMAL_SLIDES, MU_NORMAL_STICKS, MU_SOURCES,
     MU_OTHER = MU_SOURCES /* not placed yet: zero, extreme or illegal inputs, and y~ > MU_Y_TAIL */
 };
 enum { MU_MU_RATIO, MU_POWER, MU_STICK, MU_QUANTITIES };
@@ -96,7 +97,11 @@ MU_LISTED mumacro_piece MU_PIECE[MU_PIECES] = {
 static const char *const MU_SOURCE_NAME[MU_SOURCES] = {
     "continuous_low", "continuous_mid_1", "continuous_mid_2", "continuous_high", "continuous_tail", "stick_slip_low",
     "stick_slip_mid", "corner", "stick_slip_mid_1", "stick_slip_mid_2", "stick_slip_high", "stick_slip_tail",
-    "tail_fast", "no_oscillation", "static_limit", "rigid",
+    "tail_fast", "no_oscillation", "static_limit", "rigid", "ball_continuous", "ball_partial_slip", "along_continuous",
+    "along_stick_slip", "along_reverse_slip", "normal_continuous", "normal_stick_slip",
 };
-static const char *const MU_REGIME_NAME[MU_REGIMES] = {"continuous", "stick_slip", "static"};
-static const signed char MU_REGIME_OF_SOURCE[MU_SOURCES] = {0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 2, 0};
+static const char *const MU_REGIME_NAME[MU_REGIMES] = {
+    "continuous", "stick_slip", "static", "partial_slip", "reverse_slip",
+};
+static const signed char MU_REGIME_OF_SOURCE[MU_SOURCES] = {0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
+                                                            0, 0, 2, 0, 0, 3, 0, 1, 4, 0, 1};

@@ -12,15 +12,26 @@ typedef struct {
     const double *polynomials, *errors, *slope_errors;
 } mumacro_cells;
 
+/* Quadrature over one piece of a ball: points (nodes, 2), the share of the piece that lies beyond a node, and its weight;
+ * the largest errors found, absolute and relative to the smaller of the integral and what it lacks of the piece's load:
+ * of mu~, power, stick fraction, of both slopes; for oscillation along the sliding direction of mu~, of slopes, of the stick
+ * fraction. */
+typedef struct {
+    int64_t nodes;
+    const double *points;
+    double errors[2][8];
+} mumacro_rule;
+
 /* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, 4): first cell, offset, step,
  * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused; step
  * times coordinate plus offset counts cells.  Rows of sources without cells are zero.  outer (outer_cells, 2, 8): the
  * two terms of large speed, in cells of ln(1 + y~^2/v~^2).  Whatever numbers stand in these arrays, nothing outside of
- * them is read. */
+ * them is read.  rules: of a ball's pieces, see contact.c; no nodes where they are not wanted. */
 typedef struct {
     int64_t border_cells;
     const double *border, *pieces, *blocks, *outer;
     mumacro_cells quantities[8];
+    mumacro_rule rules[5];
 } mumacro_data;
 
 /* A table as the export writes it: mumacro_table. */

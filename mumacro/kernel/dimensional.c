@@ -10,12 +10,13 @@ typedef struct {
     int source;
 } mu_case;
 
-/* 0 for a legal case, else 1 + the place of its first bad input. */
-static int mu_first_bad(const mu_inputs *in) {
+/* 0 for a legal case, else 1 + the place of its first bad input.  Where the normal force oscillates y0 stands for its
+ * amplitude, which is below Fz: else the contact lifts off. */
+static int mu_first_bad(int direction, const mu_inputs *in) {
     if (!(in->mu0 > 0.0 && in->mu0 < HUGE_VAL)) return 1;
     if (!(in->Fz > 0.0 && in->Fz < HUGE_VAL)) return 2;
     if (!(in->k > 0.0)) return 3;
-    if (!(in->y0 >= 0.0 && in->y0 < HUGE_VAL)) return 4;
+    if (!(in->y0 >= 0.0 && in->y0 < (direction == MU_NORMAL ? in->Fz : HUGE_VAL))) return 4;
     if (!(in->omega >= 0.0 && in->omega < HUGE_VAL)) return 5;
     return in->v0 >= 0.0 && in->v0 < HUGE_VAL ? 0 : 6;
 }
@@ -26,11 +27,13 @@ static double mu_amplitude_ratio(const mu_inputs *in) {
     return product > 1e-290 && product < 1e290 ? product / in->v0 : mu_quotient(in->y0, in->omega, in->v0, 1.0, 1.0);
 }
 
-/* The groups of any legal case: v~ is infinite where nothing oscillates, both are for rigid contact. */
-static void mu_groups(const mu_inputs *in, double *v, double *y) {
+/* The groups of any legal case: v~ is infinite where nothing oscillates, both are for rigid contact; z for y~ where the
+ * normal force oscillates. */
+static void mu_groups(int direction, const mu_inputs *in, double *v, double *y) {
     const int rigid = in->k == HUGE_VAL;
     *v = in->v0 > 0.0 ? HUGE_VAL : 0.0;
     *y = in->y0 == 0.0 ? 0.0 : rigid ? HUGE_VAL : mu_quotient(in->y0, in->k, in->mu0, in->Fz, 1.0);
+    if (direction == MU_NORMAL) *y = in->y0 / in->Fz;
     if (in->y0 > 0.0 && in->omega > 0.0 && in->v0 > 0.0 && !rigid)
         *v = mu_quotient(in->v0, in->k, in->mu0, in->Fz, in->omega);
 }
@@ -45,26 +48,43 @@ static mu_case mu_case_of(double mu, double bound, int source, double v, double 
     return out;
 }
 
-/* Any case: zero inputs, rigid contact, groups beyond double precision. */
-static mu_case mu_unusual_case(const mumacro_data *data, const mu_inputs *in) {
+/* mu~ of rigid contact at r = y~/v~: eq. (35), or the mean direction of slip. */
+static double mu_rigid_ratio(int direction, double r) {
+    if (direction == MU_ACROSS) return mu_outer_expansion(r).first;
+    return r > 1.0 ? MU_TWO_OVER_PI * mu_arcsine(1.0 / r) : 1.0;
+}
+
+/* Its slope along ln r. */
+static double mu_rigid_slope(int direction, double r) {
+    if (direction == MU_ACROSS) return mu_outer_expansion(r).first_slope;
+    return r > 1.0 ? -MU_TWO_OVER_PI / sqrt((r - 1.0) * (r + 1.0)) : 0.0;
+}
+
+/* Any case of any contact: zero inputs, rigid contact, groups beyond double precision. */
+static mu_case mu_any_case(const mumacro_data *data, int contact, int direction, const mu_inputs *in) {
     double v, y, r, mu;
-    if (mu_first_bad(in)) return mu_case_of(NAN, NAN, -1, NAN, NAN);
-    mu_groups(in, &v, &y);
+    if (mu_first_bad(direction, in)) return mu_case_of(NAN, NAN, -1, NAN, NAN);
+    mu_groups(direction, in, &v, &y);
     if (in->y0 == 0.0 || in->omega == 0.0) return mu_case_of(1.0, 0.0, MU_NO_OSCILLATION, v, y);
-    if (in->v0 == 0.0 && in->k == HUGE_VAL) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
+    if (in->v0 == 0.0 && y == HUGE_VAL) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
     if (y == 0.0 && in->v0 > 0.0) return mu_case_of(1.0, MU_ROUNDING, MU_NO_OSCILLATION, v, y);
-    if (v < HUGE_VAL && y < HUGE_VAL) {
+    if ((v < HUGE_VAL && y < HUGE_VAL) || direction == MU_NORMAL) {
         double bound;
         int8_t source;
-        mu_chunk_of_ratios(data, 1, &v, &y, &mu, &bound, &source);
+        if (contact == MU_SPRING && direction == MU_ACROSS) mu_chunk_of_ratios(data, 1, &v, &y, &mu, &bound, &source);
+        else {
+            const mu_answer found = mu_answer_as(data, contact, direction, MU_MU_RATIO, v, y);
+            mu = found.value;
+            bound = found.bound;
+            source = (int8_t)found.source;
+        }
         /* v~ below 5e-324: the static limit holds to rounding, mu~ itself underflows for y~ > 1 */
         return mu_case_of(mu, bound + (v == 0.0 && in->v0 > 0.0 ? MU_DENORMAL : 0.0), source, v, y);
     }
-    if (in->v0 == 0.0) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
     r = mu_amplitude_ratio(in);
     if (r == 0.0) return mu_case_of(1.0, MU_RIGID_ROUNDING, MU_RIGID, v, y);
     if (r == HUGE_VAL) return mu_case_of(0.0, 3.0 * MU_DENORMAL, MU_RIGID, v, y); /* eq. (35) is 2.5e-306 there */
-    mu = mu_outer_expansion(r).first;
+    mu = mu_rigid_ratio(direction, r);
     /* y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large */
     return mu_case_of(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
 }
@@ -72,8 +92,8 @@ static mu_case mu_unusual_case(const mumacro_data *data, const mu_inputs *in) {
 /* d mu_macro / d input and the bounds, 12 numbers stride apart.  One-sided at the edges: d/dy0 = 0 at y0 = 0,
  * d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, infinite on y~ = 1 and for rigid contact.
  * Relative to k the slope is 0 for rigid contact.  slopes: those of mu~, or NULL where they are not known yet. */
-MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const mu_case *found, const mu_slopes *known,
-                           double *out, int64_t stride) {
+MU_INLINE void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
+                           const mu_case *found, const mu_slopes *known, double *out, int64_t stride) {
     const double mu0 = in->mu0;
     double slope[6] = {found->mu, 0.0, 0.0, 0.0, 0.0, 0.0}, error[6] = {found->bound, 0.0, 0.0, 0.0, 0.0, 0.0};
     if (found->source == -1) {
@@ -82,7 +102,7 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
         double along = 0.0;
         const double rounding = 8.0 * MU_ROUNDING * found->mu;
         const double all = rounding + (found->bound > rounding ? found->bound : 0.0);
-        if (found->mu < 1.0 || in->y0 * in->omega > 0.0) along = mu_outer_expansion(mu_amplitude_ratio(in)).first_slope;
+        if (found->mu < 1.0 || in->y0 * in->omega > 0.0) along = mu_rigid_slope(direction, mu_amplitude_ratio(in));
         slope[3] = mu0 * along / in->y0;
         slope[4] = mu0 * along / in->omega;
         slope[5] = -mu0 * along / in->v0;
@@ -92,14 +112,17 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
     } else if (found->source == MU_STATIC_LIMIT && found->y == HUGE_VAL) {
         slope[5] = error[5] = HUGE_VAL;
     } else if (found->source != MU_NO_OSCILLATION) {
-        const mu_slopes at = known ? *known : mu_slopes_at(data, MU_MU_RATIO, found->v, found->y);
+        const mu_slopes at = known ? *known : mu_slopes_as(data, contact, direction, found->v, found->y);
         const double both = at.along_v + at.along_y, errors = at.bound_v + at.bound_y;
-        slope[0] = found->mu - both;
-        error[0] = (found->source < MU_CHARTS ? mu_min(found->bound, at.bound) : found->bound) + errors;
+        /* z = Fz_amplitude / Fz has neither mu0 nor k */
+        const double stiff = direction == MU_NORMAL ? at.along_v : both;
+        const double unsure = direction == MU_NORMAL ? at.bound_v : errors;
+        slope[0] = found->mu - stiff;
+        error[0] = (found->source < MU_CHARTS ? mu_min(found->bound, at.bound) : found->bound) + unsure;
         slope[1] = -mu0 * both / in->Fz;
         error[1] = mu0 * errors / in->Fz;
-        slope[2] = mu0 * both / in->k;
-        error[2] = mu0 * errors / in->k;
+        slope[2] = mu0 * stiff / in->k;
+        error[2] = mu0 * unsure / in->k;
         slope[3] = mu0 * at.along_y / in->y0;
         error[3] = mu0 * at.bound_y / in->y0;
         slope[4] = -mu0 * at.along_v / in->omega;
@@ -109,7 +132,7 @@ MU_INLINE void mu_gradient(const mumacro_data *data, const mu_inputs *in, const 
             error[5] = mu0 * at.bound_v / in->v0;
         } else {
             const double unit = (in->k / in->Fz) / in->omega;
-            slope[5] = mu_speed_slope_at_zero(data, found->y, &error[5]) * unit;
+            slope[5] = mu_speed_slope_as(data, contact, direction, found->y, &error[5]) * unit;
             error[5] *= unit;
         }
     }
@@ -163,7 +186,7 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
                 const double *error = errors + 2 * c.block[i];
                 const mu_case found = mu_case_of(at.value, fabs(c.factor[i]) * error[0] + error[1],
                                                  (int)c.block[i], v[i], y[i]);
-                mu_gradient(data, &six, &found, &at, slopes + i, stride);
+                mu_gradient(data, MU_SPRING, MU_ACROSS, &six, &found, &at, slopes + i, stride);
             }
         }
     }
@@ -177,7 +200,7 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
         const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
         mu_case found;
         if (!mu_is_left(c.block[i])) continue;
-        if (v[i] == -1.0) found = mu_unusual_case(data, &six);
+        if (v[i] == -1.0) found = mu_any_case(data, MU_SPRING, MU_ACROSS, &six);
         else {
             const mu_answer at = mu_answer_left(data, MU_MU_RATIO, &c, i, v[i], y[i]);
             found = mu_case_of(at.value, at.bound, at.source, v[i], y[i]);
@@ -187,7 +210,7 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
         source[i] = (int8_t)found.source;
         v[i] = found.v;
         y[i] = found.y;
-        if (slopes) mu_gradient(data, &six, &found, NULL, slopes + i, stride);
+        if (slopes) mu_gradient(data, MU_SPRING, MU_ACROSS, &six, &found, NULL, slopes + i, stride);
     }
     for (int i = 0; i < n; ++i) {
         out[i] = mu[i] * in[0][i];
@@ -210,6 +233,29 @@ static void mu_cases(const mumacro_data *data, int64_t n, const double *const *c
             for (int j = strides[i] ? few : 0; j < whole; ++j) in[i][j] = strides[i] ? 1.0 : columns[i][0];
         }
         mu_chunk_of_cases(data, few, in, rows, out + start, stride, source + start);
+    }
+}
+
+/* As mu_cases, of any contact and direction; where the normal force oscillates, y0's column holds its amplitude. */
+static void mu_cases_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
+                        const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
+    for (int64_t i = 0; i < n; ++i) {
+        double in[6];
+        mu_inputs six;
+        mu_case found;
+        for (int j = 0; j < 6; ++j) in[j] = columns[j][strides[j] ? i : 0];
+        memcpy(&six, in, sizeof six);
+        found = mu_any_case(data, contact, direction, &six);
+        out[MU_ROW_MACRO * stride + i] = found.mu * six.mu0;
+        out[MU_ROW_RATIO * stride + i] = found.mu;
+        out[MU_ROW_BOUND * stride + i] = found.bound * six.mu0;
+        source[i] = (int8_t)found.source;
+        if (rows > MU_ROW_V) {
+            out[MU_ROW_V * stride + i] = found.v;
+            out[MU_ROW_Y * stride + i] = found.y;
+        }
+        if (rows == MU_ROWS)
+            mu_gradient(data, contact, direction, &six, &found, NULL, out + MU_ROW_SLOPES * stride + i, stride);
     }
 }
 

@@ -15,28 +15,49 @@ static double mu_held_value(int quantity, double v, double y, double *bound) {
     return value;
 }
 
+/* An answer from its rows; the bad input, or 0. */
+static int mu_fill(const double *rows, int source, int bad, mumacro_answer *out) {
+    out->mu_macro = rows[MU_ROW_MACRO];
+    out->mu_ratio = rows[MU_ROW_RATIO];
+    out->error_bound = rows[MU_ROW_BOUND];
+    out->v_tilde = rows[MU_ROW_V];
+    out->y_tilde = rows[MU_ROW_Y];
+    out->source = source;
+    out->regime = source < 0 ? -1 : MU_REGIME_OF_SOURCE[source];
+    memcpy(out->gradient, rows + MU_ROW_SLOPES, sizeof out->gradient);
+    memcpy(out->gradient_bound, rows + MU_ROW_SLOPES + 6, sizeof out->gradient_bound);
+    return bad;
+}
+
 MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
                                  mumacro_answer *out) {
+    return mumacro_evaluate_as(MU_SPRING, MU_ACROSS, mu0, Fz, k, y0, omega, v0, out);
+}
+
+MUMACRO_API int mumacro_evaluate_as(int contact, int direction, double mu0, double Fz, double k, double y0,
+                                    double omega, double v0, mumacro_answer *out) {
     const mu_inputs in = {mu0, Fz, k, y0, omega, v0};
-    double found[MU_ONE_WITH_SLOPES];
+    const double *const columns[6] = {&mu0, &Fz, &k, &y0, &omega, &v0};
+    static const int64_t strides[6] = {0, 0, 0, 0, 0, 0};
+    double rows[MU_ROWS];
+    int8_t source = -1;
+    int bad;
     if (out == NULL) return MUMACRO_NO_OUTPUT;
-    mu_one(MU_TABLE, mu0, Fz, k, y0, omega, v0, MU_ONE_WITH_SLOPES, found);
-    out->mu_macro = found[MU_ROW_MACRO];
-    out->mu_ratio = found[MU_ROW_RATIO];
-    out->error_bound = found[MU_ROW_BOUND];
-    out->v_tilde = found[MU_ROW_V];
-    out->y_tilde = found[MU_ROW_Y];
-    out->source = (int)found[MU_ONE_SOURCE];
-    out->regime = out->source < 0 ? -1 : MU_REGIME_OF_SOURCE[out->source];
-    memcpy(out->gradient, found + MU_ONE_SLOPES, sizeof out->gradient);
-    memcpy(out->gradient_bound, found + MU_ONE_SLOPES + 6, sizeof out->gradient_bound);
-    return mu_first_bad(&in);
+    for (int i = 0; i < MU_ROWS; ++i) rows[i] = NAN;
+    if (contact < 0 || contact >= MU_CONTACTS || direction < 0 || direction >= MU_DIRECTIONS)
+        return mu_fill(rows, -1, MUMACRO_NO_CONTACT, out);
+    if (contact == MU_BALL && direction == MU_NORMAL) return mu_fill(rows, -1, MUMACRO_NO_NORMAL_BALL, out);
+    if (contact == MU_SPRING && direction == MU_ACROSS)
+        mu_cases(MU_TABLE, 1, columns, strides, MU_ROWS, rows, 1, &source);
+    else mu_cases_as(MU_TABLE, contact, direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
+    bad = mu_first_bad(direction, &in);
+    return mu_fill(rows, source, bad == 4 && direction == MU_NORMAL ? MUMACRO_LIFT_OFF : bad, out);
 }
 
 /* Where nothing oscillates there is no border and no power: 0.  Rigid contact has its border at 0. */
 static void mu_cycle_of(const mu_inputs *in, mumacro_cycle *out) {
     double v, y, length, unit;
-    mu_groups(in, &v, &y);
+    mu_groups(MU_ACROSS, in, &v, &y);
     out->stick_fraction = mu_held_value(MU_STICK, v, y, &out->stick_fraction_bound);
     if (in->y0 == 0.0 || in->omega == 0.0) {
         out->v0_crit = out->power = out->power_bound = 0.0;
@@ -60,7 +81,7 @@ MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y
                                        mumacro_cycle *out) {
     const mumacro_cycle nothing = {NAN, NAN, NAN, NAN, NAN};
     const mu_inputs in = {mu0, Fz, k, y0, omega, v0};
-    const int error = mu_first_bad(&in);
+    const int error = mu_first_bad(MU_ACROSS, &in);
     if (out == NULL) return MUMACRO_NO_OUTPUT;
     *out = nothing;
     if (!error) mu_cycle_of(&in, out);
@@ -127,6 +148,31 @@ MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde) {
 
 MUMACRO_API double mumacro_v_tilde_crit(double y_tilde) { return mu_border_at(MU_TABLE, y_tilde); }
 
+MUMACRO_API double mumacro_force(double v0, double v_rest, double mu0, double Fz, double k, double y0, double omega) {
+    const double speed = fabs(v0), share = v0 / v_rest;
+    double slope;
+    mumacro_answer at;
+    if (!(speed < HUGE_VAL && v_rest > 0.0 && v_rest < HUGE_VAL)) return NAN;
+    if (speed >= v_rest) return (v0 < 0.0 ? -Fz : Fz) * mumacro_mu_macro(mu0, Fz, k, y0, omega, speed);
+    if (mumacro_evaluate(mu0, Fz, k, y0, omega, v_rest, &at)) return NAN;
+    /* d ln mu / d ln v0 lies between 0 and 1; nothing else where double range ends */
+    slope = mu_min(mu_max(0.0, v_rest * at.gradient[5] / at.mu_macro), 1.0);
+    return Fz * at.mu_macro * share * (1.0 + 0.5 * (1.0 - slope) * (1.0 - share * share));
+}
+
+MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double k, double dx, double dy, double *state,
+                                     double force[2]) {
+    double limit;
+    if (state == NULL || force == NULL) return MUMACRO_NO_OUTPUT;
+    if (springs < 1 || !(fabs(dx) < HUGE_VAL && fabs(dy) < HUGE_VAL)) return MUMACRO_NO_STEP;
+    if (!(mu0 > 0.0 && mu0 < HUGE_VAL)) return 1;
+    limit = mu0 * Fz;
+    if (!(Fz >= 0.0 && limit < HUGE_VAL)) return 2;
+    if (!(k > 0.0 && k < HUGE_VAL)) return 3;
+    mu_element_steps(1, springs, &limit, &k, &dx, &dy, state, force);
+    return 0;
+}
+
 MUMACRO_API const char *mumacro_source_name(int source) {
     return source < 0 || source >= MU_SOURCES ? "illegal" : MU_SOURCE_NAME[source];
 }
@@ -136,12 +182,16 @@ MUMACRO_API const char *mumacro_regime_name(int regime) {
 }
 
 MUMACRO_API const char *mumacro_error_text(int error) {
-    static const char *const texts[9] = {
+    static const char *const texts[13] = {
+        "dx and dy must be finite, and there must be a spring",
+        "the normal force of a ball cannot oscillate: its contact radius would change, which is not modelled",
+        "there is no such contact or direction",
         "there is no such quantity",     "there is no place for the answer", "",
         "mu0 must be finite and > 0",    "Fz must be finite and > 0",        "k must be finite and > 0, or infinite",
         "y0 must be finite and >= 0",    "omega must be finite and >= 0",    "v0 must be finite and >= 0",
+        "the amplitude of the normal force must be >= 0 and below Fz: at Fz the contact lifts off",
     };
-    return error < MUMACRO_NO_QUANTITY || error > 6 ? "there is no such error" : texts[error - MUMACRO_NO_QUANTITY];
+    return error < MUMACRO_NO_STEP || error > MUMACRO_LIFT_OFF ? "there is no such error" : texts[error - MUMACRO_NO_STEP];
 }
 
 MUMACRO_API double mumacro_tolerance(void) { return mumacro_table.tolerance; }

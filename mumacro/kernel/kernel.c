@@ -24,4 +24,7 @@
 #include "records.c"
 #include "points.c"
 #include "passes.c"
+#include "directions.c"
+#include "contact.c"
 #include "dimensional.c"
+#include "element.c"

@@ -3,8 +3,26 @@
 #include "derivatives.c"
 #include "library.h"
 
-static void mu_borders(const mumacro_data *data, int64_t n, const double *y, double *crit) {
-    for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_at(data, y[i]);
+static void mu_values_as(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
+                         const double *y, double *value, double *bound, int8_t *source) {
+    for (int64_t i = 0; i < n; ++i) {
+        const mu_answer found = mu_answer_as(data, contact, direction, quantity, v[i], y[i]);
+        value[i] = found.value;
+        bound[i] = found.bound;
+        source[i] = (int8_t)found.source;
+    }
+}
+
+/* v~ from which nothing sticks; NaN for what is no amplitude. */
+static double mu_border_as(const mumacro_data *data, int contact, int direction, double y) {
+    if (direction == MU_NORMAL) return y >= 0.0 && y < 1.0 ? y : NAN;
+    if (direction == MU_ALONG) return y >= 0.0 ? y : NAN;
+    return contact == MU_BALL ? mu_ball_border(data, y) : mu_border_at(data, y);
+}
+
+static void mu_borders_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *y,
+                          double *crit) {
+    for (int64_t i = 0; i < n; ++i) crit[i] = mu_border_as(data, contact, direction, y[i]);
 }
 
 static void mu_places_of(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block,
@@ -71,6 +89,6 @@ static const mumacro_atlas MU_ATLAS = {
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
     MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio_alone, mu_one,
-    mu_partials, mu_bends,
-    mu_borders, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares, mu_roots, mu_outers,
+    mu_partials, mu_bends, mu_cases_as, mu_values_as, mu_borders_as, mu_places_of, mu_forms, mu_border_scales,
+    mu_cell_shares, mu_roots, mu_outers, mu_element_steps,
 };

@@ -44,8 +44,14 @@ typedef struct {
                      double *along_v, double *along_y);
     void (*bends)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *vv,
                   double *vy, double *yy);
-    /* v~crit(y~): 0 at 0, infinite at infinity, NaN for what is no amplitude */
-    void (*border)(const mumacro_data *data, int64_t n, const double *y, double *crit);
+    /* as cases and values, for contact 1 (ball) and direction 1 (along) or 2 (normal: Fz_amplitude in y0's column, and
+     * Fz_amplitude / Fz for y~); a ball needs rules */
+    void (*cases_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
+                     const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source);
+    void (*values_as)(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
+                      const double *y, double *value, double *bound, int8_t *source);
+    /* v~crit(y~) of a contact and direction: 0 at 0, infinite at infinity, NaN for what is no amplitude */
+    void (*border_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *y, double *crit);
     /* blocks of points with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them, which tail_fast
      * has not */
     void (*places)(const mumacro_data *data, int64_t n, const double *v, const double *y, int8_t *block, double *a,
@@ -61,6 +67,10 @@ typedef struct {
     void (*normal_form_root)(int64_t n, const double *v, const double *eta, double *root);
     /* the two terms of large speed and their slopes, 5 rows of out */
     void (*outer_expansion)(int64_t n, const double *r, double *out);
+    /* one step of n contacts in the time domain: limits mu0 Fz, stiffnesses, motions; forces (n, springs, 2) are the
+     * state, sums (n, 2) the result */
+    void (*element_steps)(int64_t n, int springs, const double *limit, const double *k, const double *dx,
+                          const double *dy, double *forces, double *sums);
 } mumacro_kernel;
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */

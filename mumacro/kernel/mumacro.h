@@ -44,14 +44,43 @@ enum {
     MUMACRO_SOURCE_NO_OSCILLATION,
     MUMACRO_SOURCE_STATIC_LIMIT,
     MUMACRO_SOURCE_RIGID,
+    /* of mumacro_evaluate_as alone: springs of the table in a ball, closed forms */
+    MUMACRO_SOURCE_BALL_CONTINUOUS,
+    MUMACRO_SOURCE_BALL_PARTIAL_SLIP,
+    MUMACRO_SOURCE_ALONG_CONTINUOUS,
+    MUMACRO_SOURCE_ALONG_STICK_SLIP,
+    MUMACRO_SOURCE_ALONG_REVERSE_SLIP,
+    MUMACRO_SOURCE_NORMAL_CONTINUOUS,
+    MUMACRO_SOURCE_NORMAL_STICK_SLIP,
     MUMACRO_SOURCES
 };
 
-/* The regime of an answer: slips all the time, sticks during a part of each period, at rest (v0 -> 0). */
-enum { MUMACRO_REGIME_CONTINUOUS, MUMACRO_REGIME_STICK_SLIP, MUMACRO_REGIME_STATIC };
+/* The regime of an answer: slips all the time, sticks during a part of each period, at rest (v0 -> 0); some springs of a
+ * ball slip all the time and others do not; slips backwards, too. */
+enum {
+    MUMACRO_REGIME_CONTINUOUS,
+    MUMACRO_REGIME_STICK_SLIP,
+    MUMACRO_REGIME_STATIC,
+    MUMACRO_REGIME_PARTIAL_SLIP,
+    MUMACRO_REGIME_REVERSE_SLIP
+};
 
-/* Returned where there is nothing to write to, or no such quantity; 0 is success, 1 and more are bad inputs. */
-enum { MUMACRO_NO_OUTPUT = -1, MUMACRO_NO_QUANTITY = -2 };
+/* The contact: one spring, or a ball on a flat (Hertz, k = 8 a G*); the direction of the oscillation: across the sliding
+ * direction, along it, or of the normal force. */
+enum { MUMACRO_SPRING, MUMACRO_BALL };
+enum { MUMACRO_ACROSS, MUMACRO_ALONG, MUMACRO_NORMAL };
+
+/* Returned where there is nothing to write to, no such quantity, no such contact or direction, a ball whose normal force
+ * oscillates (its contact radius changes, which is not modelled), no such step; 0 is success, 1 to 6 are bad inputs, 7 is an amplitude
+ * of the normal force that is not below it. */
+enum {
+    MUMACRO_NO_STEP = -5,
+    MUMACRO_NO_NORMAL_BALL,
+    MUMACRO_NO_CONTACT,
+    MUMACRO_NO_QUANTITY,
+    MUMACRO_NO_OUTPUT,
+    MUMACRO_LIFT_OFF = 7
+};
 
 /* An answer to a dimensional case: mu_macro and mu_ratio = mu_macro / mu0 [-]; the bound of mu_macro's absolute error;
  * v_tilde and y_tilde [-], infinite for rigid contact; where the answer comes from (mumacro_source_name) and the
@@ -83,6 +112,11 @@ typedef struct {
 MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
                                  mumacro_answer *out);
 
+/* As mumacro_evaluate, for a contact and a direction of those above.  Where the normal force oscillates, y0 is its
+ * amplitude [N], below Fz, in the gradient too, and y_tilde is Fz_amplitude / Fz. */
+MUMACRO_API int mumacro_evaluate_as(int contact, int direction, double mu0, double Fz, double k, double y0,
+                                    double omega, double v0, mumacro_answer *out);
+
 /* As mumacro_evaluate. */
 MUMACRO_API int mumacro_evaluate_cycle(double mu0, double Fz, double k, double y0, double omega, double v0,
                                        mumacro_cycle *out);
@@ -111,6 +145,22 @@ MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde);
 
 /* Smallest v~ without stick [-]; 0 at y~ = 0, infinite for infinite y~, NaN for what is no amplitude. */
 MUMACRO_API double mumacro_v_tilde_crit(double y_tilde);
+
+/* The friction force [N] for time integration, at a velocity v0 [m/s] of either sign: mu_macro(|v0|) Fz along v0, so that
+ * it is odd in v0.  Below v_rest [m/s] > 0 it is regularised: a cubic in v0 through 0 that meets the law at v_rest with
+ * the same slope, and rises all the way.  So there is no jump, no NaN where v0 crosses zero, and a contact at rest creeps
+ * at less than v_rest; take v_rest well below the speeds that matter, and a step that resolves mu_macro Fz / v_rest, a
+ * damper.  NaN where v0 or v_rest is not finite or another input is illegal. */
+MUMACRO_API double mumacro_force(double v0, double v_rest, double mu0, double Fz, double k, double y0, double omega);
+
+/* The contact in the time domain, for any motion: moves its upper point by (dx, dy) [m] and writes the force that must
+ * be applied there after the step [N], x > 0 for motion along x.  1 spring is the model's contact; more are a ball,
+ * whose k is that of full stick and whose Fz must stay the same; 32 give its mean to 1.1e-3 mu0.  Of one spring Fz >= 0 may
+ * change between steps, k must be finite.  state: 2 * springs numbers, the springs' forces [N], zeros at first.  The
+ * error is proportional to the step: a period takes 1000 steps for 1e-3.
+ * Returns 0, 1 to 3 for a bad mu0, Fz or k, MUMACRO_NO_STEP, or MUMACRO_NO_OUTPUT; then nothing is moved. */
+MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double k, double dx, double dy, double *state,
+                                     double force[2]);
 
 /* Names of a source and of a regime, static texts; "illegal" for -1 and for what is none. */
 MUMACRO_API const char *mumacro_source_name(int source);

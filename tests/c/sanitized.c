@@ -11,7 +11,7 @@ extern const mumacro_export mumacro_table;
 static const double nasty[] = {
     -1.0, -0.0, 0.0, 5e-324, 1e-310, 1e-160, 1.0, 1e160, 1.7976931348623157e308, HUGE_VAL, -HUGE_VAL, NAN,
 };
-enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000 };
+enum { NASTY = sizeof nasty / sizeof *nasty, LONGEST = 1000, FEW = 16 }; /* a ball costs as much as 100 springs */
 
 static uint64_t state = 88172645463325252u;
 
@@ -74,7 +74,12 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         const double alone = kernel->ratio(data, v[i], y[i]);
         if (differ(alone, value[i])) wrong("a point alone");
     }
-    kernel->border(data, n, y, bound);
+    for (int kind = 0; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind) {
+        const int contact = kind / MU_DIRECTIONS, direction = kind % MU_DIRECTIONS;
+        kernel->border_as(data, contact, direction, n, y, bound);
+        for (int quantity = 0; quantity < 3; ++quantity)
+            kernel->values_as(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value, bound, source);
+    }
     free(value), free(bound), free(again), free(rows), free(source);
 }
 
@@ -88,6 +93,10 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     for (int i = 0; i < 6; ++i) strides[i] = i == single ? 0 : 1;
     kernel->cases(data, n, (const double *const *)columns, strides, 3, rows[0], n, source);
     kernel->cases(data, n, (const double *const *)columns, strides, 5, rows[1], n, source);
+    kernel->cases(data, n, (const double *const *)columns, strides, 17, rows[2], n, source);
+    for (int kind = 1; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
+        kernel->cases_as(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW,
+                         (const double *const *)columns, strides, 17, rows[2], n, source);
     kernel->cases(data, n, (const double *const *)columns, strides, 17, rows[2], n, source);
     for (int64_t i = 0; i < n; ++i) {
         double x[6], *found = numbers(i % 2 ? 19 : 7);
@@ -142,7 +151,7 @@ static double any(int input) { return (void)input, anything(); }
 
 static void ask_nonsense(const mumacro_kernel *kernel) {
     mumacro_data data;
-    double *held[13];
+    double *held[18];
     int n = 0;
     memset(&data, 0, sizeof data);
     data.border_cells = 1 + (int)(drawn() * 30);
@@ -157,6 +166,10 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
         cells->polynomials = held[n++] = nonsense(64 * (size_t)cells->cells);
         cells->errors = held[n++] = nonsense((MU_SOURCES + 1) * 2);
         cells->slope_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
+    }
+    for (int i = 0; i < MU_RULES; ++i) {
+        data.rules[i].nodes = (int)(drawn() * 200.0);
+        data.rules[i].points = held[n++] = nonsense(2 * (size_t)data.rules[i].nodes + 1);
     }
     ask_all(kernel, &data, 61, ordinary, -1);
     ask_all(kernel, &data, 19, any, -1);

@@ -1,0 +1,107 @@
+"""A stiffness that is known as an interval only: the extremes of mu_macro over it.
+
+mu~ along a ray of k (v~ and y~ are both proportional to it) is not monotone: it falls from 1, may rise again, by up to
+0.0087 per unit of ln k, and falls to its limit of rigid contact.  So the extremes may lie inside; where the slope
+changes its sign between two samples, bisection finds them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro.errors import InputError
+from mumacro.inputs import real
+
+__all__ = ["BOUND", "ENDS", "as_ends", "extremes", "middle"]
+
+Array = NDArray[np.float64]
+ENDS = ("k_low", "k_high")  # columns that hold an interval
+BOUND = "two stiffnesses [N/m] with 0 < low <= high, both finite"
+SPACING = 0.1  # of samples, in ln k: slopes keep their sign over more than a unit of it
+HALVINGS = 20  # of a spacing, until mu_macro next to an extreme is flat to 1e-14
+
+
+def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Inputs with :data:`ENDS` for ``k_range``, and nothing else that says k.
+
+    Raises
+    ------
+    InputError
+        k beside an interval, half an interval, or what is no pair.
+    """
+    given = dict(inputs)
+    if "k_range" in given:
+        if told := [name for name in ("k", *ENDS) if name in given]:
+            raise InputError(told[0], given[told[0]], "left out beside k_range")
+        pair = given.pop("k_range")
+        try:
+            given["k_low"], given["k_high"] = pair
+        except (TypeError, ValueError) as error:
+            raise InputError("k_range", pair, BOUND) from error
+    if missing := [name for name in ENDS if name not in given]:
+        raise InputError(missing[0], None, "given [N/m] beside the other end of the interval")
+    if "k" in given:
+        raise InputError("k", given["k"], "left out beside an interval of it")
+    return given
+
+
+def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array]:
+    """Both ends and their geometric middle; NaN where they are no interval.
+
+    Raises
+    ------
+    InputError
+        What is no interval, as a single value or where ``illegal`` is "raise".
+    """
+    low, high = (real(name, inputs[name]) for name in ENDS)
+    try:
+        low, high = np.broadcast_arrays(low, high)
+    except ValueError as error:
+        raise InputError("k_range", (low.shape, high.shape), "of shapes that broadcast together") from error
+    legal = (low > 0.0) & (low <= high) & (high < math.inf)
+    if not legal.all() and (illegal == "raise" or not legal.ndim):
+        i = int(np.flatnonzero(~legal.ravel())[0])
+        raise InputError("k_range", (float(low.flat[i]), float(high.flat[i])), BOUND, i if legal.ndim else None)
+    low, high = (np.where(legal, end, np.nan) for end in (low, high))
+    return low, high, np.asarray(np.clip(np.sqrt(low) * np.sqrt(high), low, high))
+
+
+def extremes(
+    evaluate: Callable[[Array, NDArray[np.intp]], tuple[Array, Array, Array]], low: Array, high: Array
+) -> tuple[Array, Array, Array]:
+    """Smallest and largest mu_macro over [low, high], shapes (n,), and the largest bound of its error met there.
+
+    ``evaluate(k, places)`` gives (mu_macro, its bound, d mu_macro / d ln k) of cases ``places`` with stiffnesses ``k``.
+    """
+    places = np.arange(low.size)
+    ratio = np.log(high / low)
+    largest = float(np.nanmax(ratio, initial=0.0))
+    count = 1 + max(1, math.ceil(largest / SPACING)) if largest > 0.0 else 1
+    least, most, bound = np.full(low.size, np.inf), np.full(low.size, -np.inf), np.zeros(low.size)
+
+    def take(k: Array, where: NDArray[np.intp]) -> Array:
+        mu, error, slope = evaluate(k, where)
+        least[where] = np.fmin(least[where], mu)
+        most[where] = np.fmax(most[where], mu)
+        bound[where] = np.fmax(bound[where], error)
+        return slope
+
+    before, slope_before = low, take(low, places)
+    for i in range(1, count):
+        here = high if i == count - 1 else low * np.exp(ratio * (i / (count - 1)))
+        slope = take(here, places)
+        turns = np.flatnonzero(slope_before * slope < 0.0)
+        left, right, sign = before[turns], here[turns], slope_before[turns]
+        for _ in range(HALVINGS if turns.size else 0):
+            half = np.sqrt(left) * np.sqrt(right)
+            same = take(half, turns) * sign > 0.0
+            left, right = np.where(same, half, left), np.where(same, right, half)
+        before, slope_before = here, slope
+    illegal = np.isnan(ratio) | (least > most)
+    least[illegal] = most[illegal] = np.nan
+    return least, most, bound

@@ -1,0 +1,334 @@
+/* A ball on a flat under a constant load, Hertz, as independent springs (method of dimensionality reduction): the spring
+ * at the share xi of the contact radius carries 3/2 s d xi of the load, s = 1 - xi^2, and d xi of the stiffness.  So
+ *
+ *     mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(v~ / (1.5 s), y~ / (1.5 s)) d xi:
+ *
+ * from the middle outwards the springs are the points of a ray, from (v~, y~)/1.5 to infinity.  A ray with
+ * y~ > 2.98 v~ enters stick-slip at an amplitude below 1.29 and leaves it at one above; at y~ = 1 it passes the corner.
+ * There the integral is split, into pieces with a rule each.  Logarithmic slopes are averaged as mu~ is. */
+
+enum { MU_SPRING, MU_BALL, MU_CONTACTS };
+/* The pieces: before stick-slip; in it below y~ = 1, just above that, further above; after it. */
+enum { MU_BEFORE, MU_BELOW, MU_CLOSE, MU_ABOVE, MU_BEYOND, MU_RULES };
+/* Errors of a rule: first those of the quantities. */
+enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y, MU_ERROR_ALONG, MU_ERROR_ALONG_SLOPE, MU_ERROR_ALONG_STICK };
+
+#define MU_MIDDLE 1.5 /* load of the middle spring over the mean: gross slip begins at y0 = 1.5 l0 */
+#define MU_STEEPEST 0.33516779066085 /* the largest v~crit / y~, and its amplitude */
+#define MU_STEEPEST_Y 1.29079076185
+#define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
+
+/* The springs that the rules take: v~, y~ and s of each, its share of the load; pieces from first[k] to first[k + 1]. */
+typedef struct {
+    int n, first[MU_RULES + 1];
+    double v[MU_CHUNK], y[MU_CHUNK], s[MU_CHUNK], share[MU_CHUNK];
+} mu_springs;
+
+/* Amplitudes at which the ray y~ = r v~ enters stick-slip and leaves it: v~crit/y~ is concave below its largest value,
+ * its inverse squared is convex above, so Newton's method comes from one side. */
+static void mu_crossings(const mumacro_data *data, double r, double *entry, double *leave) {
+    *entry = 2.0 / r;
+    *leave = HUGE_VAL;
+    if (!(r < 1e140)) return;
+    *leave = mu_max(r * r / 4.402914, MU_STEEPEST_Y);
+    for (int i = 0; i < 30; ++i) {
+        double tilt;
+        const double share = r * mu_border(data, *entry, &tilt, NULL) / *entry, step = (1.0 - 1.0 / share) / (tilt - 1.0);
+        *entry = mu_min(*entry * (1.0 - step), MU_STEEPEST_Y);
+        if (!(fabs(step) > 1e-9)) break;
+    }
+    for (int i = 0; i < 30; ++i) {
+        double tilt;
+        const double share = r * mu_border(data, *leave, &tilt, NULL) / *leave;
+        const double step = 0.5 * (1.0 - share * share) / (1.0 - tilt);
+        *leave = mu_max(*leave * (1.0 - step), MU_STEEPEST_Y);
+        if (!(fabs(step) > 1e-9)) break;
+    }
+}
+
+/* 1 - xi of the spring with the load s. */
+MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s)) : 1.0; }
+
+/* The springs of one piece, between two values of 1 - xi. */
+static void mu_take_piece(const mumacro_rule *rule, double from, double to, double v, double y, mu_springs *out) {
+    const double length = from - to, least = mu_max(v, y) / 1e300;
+    for (int64_t i = 0; length > 0.0 && i < rule->nodes && out->n < MU_CHUNK; ++i) {
+        const double rest = to + length * rule->points[2 * i], s = mu_max(rest * (2.0 - rest), least);
+        const int n = out->n++;
+        out->s[n] = s;
+        out->v[n] = v / (MU_MIDDLE * s);
+        out->y[n] = y / (MU_MIDDLE * s);
+        out->share[n] = MU_MIDDLE * s * length * rule->points[2 * i + 1];
+    }
+}
+
+static void mu_springs_of(const mumacro_data *data, double v, double y, mu_springs *out) {
+    const double corner = mu_outside(y / MU_MIDDLE);
+    double edge[MU_RULES + 1] = {1.0, corner, corner, corner, corner, 0.0};
+    out->n = 0;
+    if (v < MU_STEEPEST * y) {
+        double entry, leave;
+        mu_crossings(data, y / v, &entry, &leave);
+        edge[1] = mu_outside(y / (MU_MIDDLE * entry));
+        edge[2] = mu_min(corner, edge[1]);
+        edge[4] = mu_min(edge[2], mu_outside(y / (MU_MIDDLE * leave)));
+        /* mu~ changes within (v~/y~)^(2/3) of y~ = 1: half way to that, in logarithms, the rules share the work */
+        edge[3] = mu_outside(y / (MU_MIDDLE * (1.0 + (v > 0.0 ? mu_cube_root_near(v / y) : 0.0))));
+        edge[3] = edge[3] > edge[4] ? mu_min(edge[3], edge[2]) : edge[2];
+    }
+    for (int k = 0; k < MU_RULES; ++k) {
+        out->first[k] = out->n;
+        mu_take_piece(&data->rules[k], edge[k], edge[k + 1], v, y, out);
+    }
+    out->first[MU_RULES] = out->n;
+}
+
+/* What quadrature may leave out of a piece whose springs carry `load`: of the integral of a share of the load, or of
+ * another quantity (share 0) whose absolute value has the integral `sum`. */
+static double mu_left_out(const mumacro_rule *rule, int error, double sum, double load, int share) {
+    const double least = share ? mu_min(sum, fabs(load - sum) + 1e-13) : sum;
+    return mu_min(rule->errors[0][error], rule->errors[1][error] * least);
+}
+
+/* The static limit, y~ < 1.5: sqrt(1 + e) (E - e K) with e = y~/1.5 and elliptic integrals of the parameter
+ * (1 - e)/(1 + e); its slope along ln y~ is -3/2 e^2 K / sqrt(1 + e). */
+static double mu_ball_at_rest(double y, double *slope) {
+    const double e = y / MU_MIDDLE, root = sqrt(1.0 + e);
+    const mu_outer outer = mu_outer_expansion(sqrt(0.5 * (1.0 - e) / e));
+    const double k = 0.5 * MU_PI * outer.first * outer.h;
+    *slope = 0.0;
+    if (!(e < 1.0)) return 0.0;
+    if (e < 1e-300) return 1.0;
+    *slope = -1.5 * e * (e * k) / root;
+    return mu_min(mu_max(root * (0.5 * MU_PI * outer.i3 - e * k), 0.0), 1.0);
+}
+
+/* --- one ball ----------------------------------------------------------------------------------------- */
+
+static int mu_ball_source(double v, double crit) {
+    return v == 0.0 ? MU_STATIC_LIMIT : v < crit ? MU_BALL_PARTLY : MU_BALL_SLIDES;
+}
+
+/* v~ from which all springs slide: the slowest for its amplitude is the middle one, or the one of the steepest ray. */
+static double mu_ball_border(const mumacro_data *data, double y) {
+    if (!(y > MU_MIDDLE * MU_STEEPEST_Y)) return y >= 0.0 ? MU_STEEPEST * y : NAN;
+    return MU_MIDDLE * mu_border_at(data, y / MU_MIDDLE);
+}
+
+/* Whether a point is one for quadrature: not illegal, zero or beyond MU_HUGE. */
+static int mu_is_spread(double v, double y) { return v >= 0.0 && y > 0.0 && v < MU_HUGE && y < MU_HUGE; }
+
+static mu_answer mu_ball_answer(const mumacro_data *data, int quantity, double v, double y) {
+    mu_answer out;
+    mu_springs c;
+    double value[MU_CHUNK], bound[MU_CHUNK];
+    if (!mu_is_spread(v, y)) {
+        out = mu_answer_at(data, quantity, v, y);
+        if (out.source == MU_NO_OSCILLATION || out.source < 0) return out;
+        out.source = mu_ball_source(v, mu_ball_border(data, y));
+        if (quantity == MU_MU_RATIO && v < 1e150) out.bound += out.value;
+        return out;
+    }
+    out = mu_limit(0.0, MU_DENORMAL, mu_ball_source(v, mu_ball_border(data, y)));
+    if (v == 0.0 && quantity == MU_MU_RATIO) {
+        double slope;
+        out.value = mu_ball_at_rest(y, &slope);
+        out.bound = MU_ROUNDING;
+        return out;
+    }
+    mu_springs_of(data, v, y, &c);
+    mu_values(data, quantity, c.n, c.v, c.y, value, bound, NULL);
+    for (int k = 0; k < MU_RULES; ++k) {
+        double sum = 0.0, load = 0.0, errors = 0.0;
+        for (int i = c.first[k]; i < c.first[k + 1]; ++i) {
+            const double share = quantity == MU_POWER ? c.share[i] * MU_MIDDLE * c.s[i] : c.share[i];
+            sum += share * value[i];
+            load += share;
+            errors += share * bound[i];
+        }
+        out.value += sum;
+        out.bound += errors + mu_left_out(&data->rules[k], quantity, sum, load, quantity != MU_POWER);
+    }
+    out.bound += MU_ROUNDING * out.value;
+    if (quantity == MU_STICK && fabs(v - MU_STEEPEST * y) < 0.01 * v) /* whether a spring sticks at all is not known */
+        out.bound += 4.0 * mu_border_error(data);
+    out.value = mu_min(out.value, MU_QUANTITY[quantity].most);
+    return out;
+}
+
+/* d mu~ / d v~ at v~ = 0: the mean of the springs' own; infinite from rest on for y~ <= 1.5, like a logarithm. */
+static double mu_ball_speed_slope(const mumacro_data *data, double y, double *bound) {
+    double found[2] = {0.0, 0.0};
+    *bound = HUGE_VAL;
+    if (!(y > MU_MIDDLE)) return HUGE_VAL;
+    *bound = 0.0;
+    for (int k = 0; k < 2; ++k) {
+        mu_springs c;
+        c.n = 0;
+        mu_take_piece(&data->rules[k ? MU_BELOW : MU_CLOSE], 1.0, 0.0, 0.0, y, &c);
+        for (int i = 0; i < c.n; ++i) {
+            double error;
+            found[k] += c.share[i] / (MU_MIDDLE * c.s[i]) * mu_speed_slope_at_zero(data, c.y[i], &error);
+            *bound += k ? 0.0 : c.share[i] / (MU_MIDDLE * c.s[i]) * error;
+        }
+    }
+    *bound += 2.0 * fabs(found[0] - found[1]); /* two rules whose nodes stand close at opposite ends */
+    return found[0];
+}
+
+static mu_slopes mu_ball_slopes(const mumacro_data *data, double v, double y) {
+    mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_springs c;
+    double rows[5 * MU_CHUNK];
+    if (!mu_is_spread(v, y)) {
+        out = mu_slopes_at(data, MU_MU_RATIO, v, y);
+        if (v < 1e150) {
+            out.bound_v += fabs(out.along_v);
+            out.bound_y += fabs(out.along_y);
+        }
+        return out;
+    }
+    if (v == 0.0) {
+        out.value = mu_ball_at_rest(y, &out.along_y);
+        /* which jumps at y~ = 1.5 */
+        out.bound_y = 8.0 * MU_ROUNDING * fabs(out.along_y) + (fabs(y - MU_MIDDLE) < 2.0 * MU_ROUNDING ? 1.7 : 0.0);
+        return out;
+    }
+    mu_springs_of(data, v, y, &c);
+    mu_slopes_of_points(data, MU_MU_RATIO, c.n, c.v, c.y, rows, MU_CHUNK);
+    out.bound = MU_ROUNDING;
+    for (int k = 0; k < MU_RULES; ++k) {
+        double load = 0.0, along_v = 0.0, along_y = 0.0;
+        for (int i = c.first[k]; i < c.first[k + 1]; ++i) {
+            const double share = c.share[i];
+            load += share;
+            out.value += share * rows[i];
+            out.along_v += share * rows[MU_CHUNK + i];
+            out.along_y += share * rows[2 * MU_CHUNK + i];
+            out.bound_v += share * rows[3 * MU_CHUNK + i];
+            out.bound_y += share * rows[4 * MU_CHUNK + i];
+            along_v += share * fabs(rows[MU_CHUNK + i]);
+            along_y += share * fabs(rows[2 * MU_CHUNK + i]);
+        }
+        out.bound_v += mu_left_out(&data->rules[k], MU_ERROR_V, along_v, load, 0);
+        out.bound_y += mu_left_out(&data->rules[k], MU_ERROR_Y, along_y, load, 0);
+    }
+    return out;
+}
+
+/* --- along and normal ----------------------------------------------------------------------------------- */
+
+/* What a spring or a ball does under oscillation along or normal, with bounds. */
+typedef struct {
+    mu_line line;
+    double bound, bound_v, bound_y, power_bound, stick_bound;
+} mu_driven;
+
+/* Bounds of one spring: rounding and the last digits of v~ and y~.  They count where a - v~ has few digits; and at
+ * D = 2, where reverse slip begins, the slopes jump, and the duration of stick has a square root on one side. */
+static mu_driven mu_drive_spring(int direction, double v, double y) {
+    mu_driven out = {mu_line_at(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0};
+    const mu_line *line = &out.line;
+    const double near = 2.0 * MU_ROUNDING, size = 1.0 + fabs(line->along_v) + fabs(line->along_y);
+    double gap, off, root, jump;
+    mu_turning at;
+    if (line->source < 0 || line->source == MU_NO_OSCILLATION || v > y * (1.0 + near)) return out;
+    gap = mu_max((y - v) / y, near);
+    at = mu_turning_of(mu_min(v, y * (1.0 - near)), y);
+    /* nearer than that the deficit is at most y~ c^4 / 9 pi times 81/16, or 2 c / pi */
+    out.bound = gap > near ? MU_ROUNDING * size : mu_min(4.0 * y * near * near, sqrt(near));
+    off = MU_ROUNDING * (2.0 + 2.0 * y * at.sine + 2.0 * v * at.c);
+    root = direction == MU_ALONG && y * at.travel > 2.0 - off ? off / sqrt(mu_max(y * at.travel - 2.0, off)) : 0.0;
+    jump = direction == MU_ALONG && fabs(y * at.travel - 2.0) < off ? v + y : 0.0;
+    out.bound_v = 4.0 * MU_ROUNDING * size / gap + jump * at.c + v * root;
+    out.bound_y = 4.0 * MU_ROUNDING * size / gap + jump * at.sine + (v + 1.0) * root;
+    out.power_bound = v * out.bound + 4.0 * MU_ROUNDING * (line->power + v + 1.0);
+    out.stick_bound = 4.0 * MU_ROUNDING / gap + root;
+    return out;
+}
+
+/* A ball whose springs all turn at the same phase; those further out than 1 - xi = `reversed` slip backwards, too. */
+static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
+    mu_driven out = mu_drive_spring(MU_ALONG, v, y);
+    mu_turning at;
+    mu_springs c;
+    double reversed, still, load, slopes = 0.0, h, deficit;
+    if (out.line.source < 0 || out.line.source == MU_NO_OSCILLATION || !(v < y) || !(y < MU_HUGE)) return out;
+    at = mu_turning_of(v, y);
+    reversed = mu_outside(0.5 * at.travel * y / MU_MIDDLE);
+    still = 1.0 - reversed; /* xi of the last spring without reverse slip, load of these springs */
+    load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
+    h = mu_half_stick(&at);
+    deficit = y * mu_master_deficit(h) * still;
+    out.line.mu = load - deficit;
+    out.line.along_v = v * h * h / MU_PI * still;
+    out.line.along_y = -(deficit + out.line.along_v);
+    out.line.stick = load * h / MU_PI;
+    out.line.power = 0.0;
+    c.n = 0;
+    mu_take_piece(&data->rules[MU_ABOVE], reversed, 0.0, v, y, &c);
+    for (int i = 0; i < c.n; ++i) {
+        const mu_reverse found = mu_reverse_of(&at, c.y[i]);
+        const mu_line line = mu_line_of_reverse(&at, c.v[i], c.y[i], &found);
+        out.line.mu += c.share[i] * line.mu;
+        out.line.along_v += c.share[i] * line.along_v;
+        out.line.along_y += c.share[i] * line.along_y;
+        out.line.stick += c.share[i] * line.stick;
+        out.line.power += c.share[i] * mu_max(y * at.travel - 2.0 * MU_MIDDLE * c.s[i], 0.0) / MU_PI;
+        slopes += c.share[i] * (fabs(line.along_v) + fabs(line.along_y));
+    }
+    out.line.mu = mu_min(mu_max(out.line.mu, 0.0), 1.0);
+    out.line.power += v * (1.0 - out.line.mu);
+    out.line.source = v == 0.0 ? MU_STATIC_LIMIT : MU_ALONG_REVERSES;
+    out.bound += mu_left_out(&data->rules[MU_ABOVE], MU_ERROR_ALONG, out.line.mu, 1.0 - load, 0);
+    slopes = mu_left_out(&data->rules[MU_ABOVE], MU_ERROR_ALONG_SLOPE, slopes, 1.0 - load, 0);
+    out.bound_v += slopes;
+    out.bound_y += slopes;
+    out.power_bound += v * out.bound + MU_ROUNDING * y;
+    out.stick_bound += data->rules[MU_ABOVE].errors[0][MU_ERROR_ALONG_STICK];
+    return out;
+}
+
+static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
+    return contact == MU_BALL ? mu_drive_ball(data, v, y) : mu_drive_spring(direction, v, y);
+}
+
+/* --- any contact and direction ---------------------------------------------------------------------------- */
+
+/* A quantity of a contact; the normal direction has z for y~ and no power: how far the load moves is not modelled. */
+static mu_answer mu_answer_as(const mumacro_data *data, int contact, int direction, int quantity, double v, double y) {
+    if (direction != MU_ACROSS) {
+        const mu_driven found = mu_drive(data, contact, direction, v, y);
+        const mu_line *line = &found.line;
+        if (quantity == MU_POWER)
+            return direction == MU_NORMAL ? mu_limit(NAN, NAN, -1)
+                                          : mu_limit(line->power, found.power_bound, line->source);
+        if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
+        return mu_limit(line->mu, found.bound, line->source);
+    }
+    if (contact == MU_BALL) return mu_ball_answer(data, quantity, v, y);
+    return mu_answer_at(data, quantity, v, y);
+}
+
+static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v, double y) {
+    if (direction != MU_ACROSS) {
+        const mu_driven found = mu_drive(data, contact, direction, v, y);
+        const mu_slopes out = {found.line.mu,  found.line.along_v, found.line.along_y,
+                               found.bound_v, found.bound_y,      found.bound};
+        return out;
+    }
+    return contact == MU_BALL ? mu_ball_slopes(data, v, y) : mu_slopes_at(data, MU_MU_RATIO, v, y);
+}
+
+/* d mu~ / d v~ at v~ = 0; along and normal it is h^2 / pi = pi for springs that have not begun to slip backwards. */
+static double mu_speed_slope_as(const mumacro_data *data, int contact, int direction, double y, double *bound) {
+    *bound = 0.0;
+    if (direction == MU_ACROSS)
+        return contact == MU_BALL ? mu_ball_speed_slope(data, y, bound) : mu_speed_slope_at_zero(data, y, bound);
+    {
+        const double v = MU_CREEP * mu_min(y, 1.0);
+        const mu_driven found = mu_drive(data, contact, direction, v, y);
+        *bound = found.bound_v / v;
+        return found.line.along_v / v;
+    }
+}

@@ -1,0 +1,213 @@
+/* Oscillation along the sliding direction and of the normal force: one spring, in closed form but for one root.
+ *
+ * along   the upper point moves with v~ + y~ cos tau, -1 <= u <= 1.  While it moves backwards, over 2 c with
+ *         cos c = x = v~/y~, it travels D = 2 y~ (sin c - c cos c).  For D <= 2 the spring sticks over 2 h until it is
+ *         where it turned, so mu~ = 1 - y~ (1 - N0(x)); for D > 2 it slips backwards, too.
+ * normal  the upper point moves with v~ under the limit 1 + z cos tau, z = Fz_amplitude / Fz < 1: the same
+ *         function, mu~ = 1 - z (1 - N0(v~/z)).
+ *
+ * N0 is master_curve_limit in mumacro/closed_forms.py; with half the duration of stick, h,
+ *     cos c = sin^2 h / R,   1 - N0 = (sin h - h cos h)^2 / (pi R),   R^2 = (h - sin h cos h)^2 + sin^4 h. */
+
+enum { MU_ACROSS, MU_ALONG, MU_NORMAL, MU_DIRECTIONS };
+
+/* What one spring does; slopes are along ln v~ and ln y~ (normal: ln z); stick is a share of the period. */
+typedef struct {
+    double mu, along_v, along_y, stick, power;
+    int source;
+} mu_line;
+
+/* sin m, cos m, 1 - cos m, m - sin m, sin m - m cos m and m - sin m cos m for 0 <= m <= pi; no digits cancel. */
+typedef struct {
+    double sine, cosine, versed, lag, bent, rest;
+} mu_arc;
+
+static mu_arc mu_arc_of(double m) {
+    /* (1 - sin m / m) / m^2; its terms times 2, 4, 6, ... are those of (sin m - m cos m) / m^3 */
+    static const double series[11] = {
+        3.868170170630684e-23, -1.9572941063391263e-20, 8.22063524662433e-18, -2.8114572543455206e-15,
+        7.647163731819816e-13, -1.6059043836821613e-10, 2.505210838544172e-08, -2.7557319223985893e-06,
+        0.0001984126984126984, -0.008333333333333333, 0.16666666666666666,
+    };
+    const int far = m > 0.5 * MU_PI;
+    const double d = far ? (MU_PI - m) + 1.2246467991473532e-16 : m, q = d * d;
+    double u = series[0], t = 22.0 * series[0];
+    mu_arc out;
+    for (int i = 1; i < 11; ++i) {
+        u = mu_fma1(u, q, series[i]);
+        t = mu_fma1(t, q, (22.0 - 2.0 * i) * series[i]);
+    }
+    out.sine = d * (1.0 - q * u);
+    out.versed = q * (u + t);
+    out.cosine = 1.0 - out.versed;
+    out.lag = d * q * u;
+    out.bent = d * q * t;
+    out.rest = d * q * (u * (2.0 - q * u) + (1.0 - q * u) * t);
+    if (far) {
+        out.cosine = -out.cosine;
+        out.versed = 1.0 - out.cosine;
+        out.lag = m - out.sine;
+        out.bent = out.sine - m * out.cosine;
+        out.rest = m - out.sine * out.cosine;
+    }
+    return out;
+}
+
+/* arcsin x for 0 <= x <= 1, relative. */
+static double mu_arcsine(double x) {
+    /* arcsin(x)/x in x^2 up to 1/4: interpolated at 16 Chebyshev points, highest power first */
+    static const double series[16] = {
+        0.03485960124195166, -0.03164232760578032, 0.028856087526518862, -0.002711145590491113,
+        0.009796130641150287, 0.007910687786082768, 0.009828794225546476, 0.011544945401300811,
+        0.013965349878854743, 0.01735273787150877, 0.022372160049880758, 0.03038194442177626,
+        0.04464285714318035, 0.07499999999999758, 0.16666666666666669, 1.0,
+    };
+    const int far = x > 0.5;
+    const double q = far ? 0.5 * (1.0 - x) : x * x, root = far ? sqrt(q) : x;
+    double sum = series[0];
+    for (int i = 1; i < 16; ++i) sum = mu_fma1(sum, q, series[i]);
+    return far ? 0.5 * MU_PI - 2.0 * root * sum : root * sum;
+}
+
+/* x = v~/a below 1, sin c, c = arccos x, b = arcsin x and D / a = 2 (sin c - c cos c), with the digits of a - v~. */
+typedef struct {
+    double x, sine, c, b, travel;
+} mu_turning;
+
+static mu_turning mu_turning_of(double v, double a) {
+    const double gap = (a - v) / a;
+    mu_turning out;
+    out.x = v / a;
+    out.sine = sqrt(gap * (1.0 + out.x));
+    out.b = gap < 0.5 ? 0.5 * MU_PI - 2.0 * mu_arcsine(sqrt(0.5 * gap)) : mu_arcsine(out.x);
+    out.c = gap < 0.5 ? 2.0 * mu_arcsine(sqrt(0.5 * gap)) : 0.5 * MU_PI - out.b;
+    out.travel = 2.0 * mu_arc_of(out.c).bent;
+    return out;
+}
+
+/* h of N0.  Newton's method for the angle c(h) with tan c = (h - sin h cos h) / sin^2 h; 7 steps at most. */
+static double mu_half_stick(const mu_turning *at) {
+    const double start = 0.5 * at->b + sqrt(0.25 * at->b * at->b + MU_PI * at->b);
+    double h = at->c < 0.3 ? 1.5 * at->c : MU_PI - mu_min(start, MU_PI);
+    if (at->x < 1e-18) return MU_PI - sqrt(MU_PI * at->x);
+    for (int i = 0; i < 20; ++i) {
+        const mu_arc arc = mu_arc_of(h);
+        const double square = arc.sine * arc.sine, norm = arc.rest * arc.rest + square * square;
+        const double off = (arc.rest * at->x - square * at->sine) / sqrt(norm); /* sin(c(h) - c) */
+        const double slope = 2.0 * arc.sine * (square * arc.sine - arc.cosine * arc.rest) / norm;
+        const double step = off * (1.0 + off * off / 6.0) / slope, next = h - step;
+        h = next > MU_PI ? 0.5 * (h + MU_PI) : next < 0.5 * h ? 0.5 * h : next;
+        if (fabs(step) < 1e-9 * h) break;
+    }
+    return h;
+}
+
+/* 1 - N0(x) for half the duration of stick h. */
+static double mu_master_deficit(double h) {
+    const mu_arc arc = mu_arc_of(h);
+    const double square = arc.sine * arc.sine;
+    return h > 0.0 ? arc.bent * arc.bent / (MU_PI * sqrt(arc.rest * arc.rest + square * square)) : 0.0;
+}
+
+/* Both kinds of stick-slip without reverse slip; envelope theorem: d mu~/d v~ = h^2/pi. */
+static mu_line mu_line_of_stick(double v, double a, double h, int source) {
+    const double deficit = a * mu_master_deficit(h);
+    mu_line out;
+    out.mu = 1.0 - deficit;
+    out.along_v = v * h * h / MU_PI;
+    out.along_y = -(deficit + out.along_v);
+    out.stick = h / MU_PI;
+    out.power = v * deficit; /* heat is what slip takes, v~ in all, less the work of the drive, v~ mu~ */
+    out.source = source;
+    return out;
+}
+
+/* Reverse slip: the spring sticks over m + p after the first turn and over m - p after the second, on which both
+ * follow from x = cos c: cos(c - p) = x m / sin m, and F(m) = sin c - cos m sin(c - p) - p cos c = 2/y~. */
+typedef struct {
+    double m, p, bent, left, slope; /* bent = 1 - m cot m; left = F(m) and its slope, infinite and 0 beyond the end */
+} mu_reverse;
+
+static mu_reverse mu_reverse_at(const mu_turning *at, double m) {
+    const mu_arc arc = mu_arc_of(m);
+    const double more = arc.lag / arc.sine, cosine = at->x * (1.0 + more);
+    mu_reverse out = {0.0, 0.0, 0.0, HUGE_VAL, 0.0};
+    double root, apart, turn;
+    out.m = m;
+    if (!(arc.sine > 0.0 && cosine <= 1.0)) return out;
+    root = sqrt((1.0 - cosine) * (1.0 + cosine));
+    apart = at->x * more * (at->x + cosine) / (at->sine + root); /* sin c - sin(c - p) */
+    turn = at->x - arc.cosine * cosine;
+    out.p = mu_arcsine(mu_min(at->x * (more * at->sine + apart), 1.0));
+    out.bent = arc.bent / arc.sine;
+    out.left = apart + arc.versed * root - out.p * at->x;
+    if (m + out.p < 2.0 * at->c) out.slope = arc.sine * root - turn * turn / (arc.sine * root);
+    return out;
+}
+
+/* m by Newton's method between bounds; where D is near 2 the root is double, but mu~ is stationary in m. */
+static mu_reverse mu_reverse_of(const mu_turning *at, double a) {
+    double low = 0.0, high = MU_PI, m = 2.0 * mu_arcsine(mu_min(1.0 / sqrt(a), 1.0));
+    for (int i = 0; i < 100; ++i) {
+        const mu_reverse found = mu_reverse_at(at, m);
+        const double off = found.left - 2.0 / a;
+        double next = m - off / found.slope;
+        if (off > 0.0 || !(found.slope > 0.0)) high = m;
+        else low = m;
+        if (!(next > low && next < high)) next = 0.5 * (low + high);
+        if (fabs(next - m) <= 1e-10 * m) break;
+        m = next;
+    }
+    return mu_reverse_at(at, m);
+}
+
+/* a times the integral of the way back (way 1) or forth (-1) since the turn, over the stick s after it. */
+static double mu_way_in_stick(const mu_turning *at, double a, double s, double way) {
+    /* of (s^2/2 - 1 + cos s) / s^4 */
+    static const double series[9] = {
+        4.110317623312165e-19, -1.5619206968586225e-16, 4.779477332387385e-14, -1.1470745597729725e-11,
+        2.08767569878681e-09, -2.7557319223985894e-07, 2.48015873015873e-05, -0.001388888888888889, 0.041666666666666664,
+    };
+    const mu_arc arc = mu_arc_of(s);
+    const double q = s * s;
+    double dip = series[0];
+    for (int i = 1; i < 9; ++i) dip = mu_fma1(dip, q, series[i]);
+    if (s > 1.0) dip = (0.5 * q - arc.versed) / (q * q);
+    return a * (at->sine * arc.lag - way * at->x * dip * q * q);
+}
+
+static mu_line mu_line_of_reverse(const mu_turning *at, double v, double a, const mu_reverse *found) {
+    const double m = found->m, p = found->p, both = m * m + p * p;
+    const double sweep = 2.0 / MU_PI * (at->b + p); /* mu~ of rigid contact where p = 0 */
+    double layers; /* what stick adds */
+    mu_line out;
+    if (at->x < 0.5) layers = a * (at->x * (both - 2.0 * found->bent) - 2.0 * p * at->sine);
+    else layers = mu_way_in_stick(at, a, m - p, -1.0) - mu_way_in_stick(at, a, m + p, 1.0);
+    out.mu = mu_min(mu_max(sweep + layers / (2.0 * MU_PI), 0.0), 1.0);
+    out.along_v = v * both / (2.0 * MU_PI);
+    out.along_y = layers / (2.0 * MU_PI) - out.along_v;
+    out.stick = m / MU_PI;
+    out.power = v * (1.0 - out.mu) + (a * at->travel - 2.0) / MU_PI;
+    out.source = MU_ALONG_REVERSES;
+    return out;
+}
+
+/* One spring at any v~, y~ (normal: z); NaN and -1 where illegal. */
+static mu_line mu_line_at(int direction, double v, double y) {
+    mu_line out = {1.0, 0.0, 0.0, 0.0, 0.0, direction == MU_NORMAL ? MU_NORMAL_SLIDES : MU_ALONG_SLIDES};
+    mu_turning at;
+    if (!(v >= 0.0 && y >= 0.0 && y < (direction == MU_NORMAL ? 1.0 : HUGE_VAL))) {
+        out.mu = out.along_v = out.along_y = out.stick = out.power = NAN;
+        out.source = -1;
+    } else if (y == 0.0) out.source = MU_NO_OSCILLATION;
+    if (out.source < 0 || y == 0.0 || !(v < y)) return out;
+    at = mu_turning_of(v, y);
+    if (direction == MU_ALONG && y * at.travel > 2.0) {
+        const mu_reverse found = mu_reverse_of(&at, y);
+        out = mu_line_of_reverse(&at, v, y, &found);
+    } else {
+        out = mu_line_of_stick(v, y, mu_half_stick(&at), direction == MU_NORMAL ? MU_NORMAL_STICKS : MU_ALONG_STICKS);
+    }
+    if (v == 0.0) out.source = MU_STATIC_LIMIT;
+    return out;
+}

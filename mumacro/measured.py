@@ -1,0 +1,165 @@
+"""Measured points of friction: their columns, checked, and the model at them; for :mod:`mumacro.fitting`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mumacro.errors import InputError
+from mumacro.inputs import NAMES, as_columns, check_inputs, real, unknown_name
+from mumacro.surrogate import Surrogate
+
+__all__ = ["HARDLY", "STD", "UNKNOWNS", "Measured", "chosen"]
+
+Array = NDArray[np.float64]
+UNKNOWNS = ("k", "mu0")
+HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
+STD = "std"  # the column of standard deviations
+#: how far a point may lie outside of what is possible: standard deviations; where they are not given, of mu0
+_SCATTER, _SHARE = 5.0, 0.05
+
+
+class Measured:
+    """Points (n,) with their friction, and the model at them.
+
+    Parameters
+    ----------
+    data, unknowns, contact, direction, surrogate, fixed
+        As in :func:`mumacro.fit`.
+
+    Attributes
+    ----------
+    columns : dict of ndarray
+        The known inputs [SI], (n,), those of the names that ``evaluate`` takes.
+    mu, weight : ndarray
+        Measured mu_macro [-]; one over its standard deviation, 1 where that is not known.
+    std : ndarray or None
+        The standard deviations.
+    amplitude : str
+        The input that says how far the contact is moved or unloaded: y0, or Fz_amplitude.
+
+    Raises
+    ------
+    InputError
+        See :func:`mumacro.fit`.
+    """
+
+    def __init__(
+        self, data: Any, unknowns: tuple[str, ...], contact: str, direction: str, surrogate: Surrogate,
+        fixed: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
+            raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
+        self.unknowns, self.contact, self.direction, self.surrogate = unknowns, contact, direction, surrogate
+        self.said = chosen(contact, direction)
+        self.amplitude = "Fz_amplitude" if direction == "normal" else "y0"
+        self._read(self._given(data, fixed))
+        self._check()
+
+    def _given(self, data: Any, fixed: Mapping[str, Any]) -> dict[str, Any]:
+        known = [name for name in NAMES if name not in self.unknowns and (name != "y0" or name == self.amplitude)]
+        known += [self.amplitude] if self.amplitude not in known else []
+        for name in fixed:
+            if name in self.unknowns:
+                raise InputError(name, fixed[name], f"left out, or taken from unknowns={self.unknowns}: it is fitted")
+            if name not in (*known, "mu_macro", STD):
+                raise InputError(name, fixed[name], f"one of {', '.join(known)}; {unknown_name(name, known)}")
+        names = [*known, "mu_macro", STD]
+        try:
+            there = data if hasattr(data, "keys") else getattr(data, "column_names", None) or data.columns
+            columns = {name: data[name] for name in names if name in there}
+        except (AttributeError, TypeError, KeyError) as error:
+            raise InputError("data", type(data).__qualname__, "a mapping or table with columns by name") from error
+        if twice := sorted(columns.keys() & fixed.keys()):
+            raise InputError(twice[0], fixed[twice[0]], "given once: as a column or as a keyword")
+        given = {**columns, **fixed}
+        for name in ("mu_macro", "v0"):
+            if name not in given:
+                raise InputError(name, sorted(map(str, there)), f"a column of the data: {name} of each point")
+        return given
+
+    def _read(self, given: dict[str, Any]) -> None:
+        """Columns of one length, (n,), in SI."""
+        measured = {name: real(name, np.asarray(given.pop(name))) for name in ("mu_macro", STD) if name in given}
+        six = {"y0": 0.0, **given, **dict.fromkeys(self.unknowns, 1.0)}
+        frequency, six = six.get("f"), {n: x if x is None else np.asarray(x) for n, x in six.items() if n in NAMES}
+        if self.amplitude == "y0" and "y0" not in given:
+            raise InputError("y0", None, "given [m]")
+        columns = as_columns(six)
+        check_inputs(columns, frequency)
+        if self.amplitude != "y0":
+            if self.amplitude not in given:
+                raise InputError(self.amplitude, None, "given [N]")
+            columns[self.amplitude] = real(self.amplitude, np.asarray(given[self.amplitude]))
+            del columns["y0"]
+        whole = {**columns, **measured}
+        lengths = {name: x.shape for name, x in whole.items() if x.ndim}
+        if len({*lengths.values()}) > 1 or any(x.ndim > 1 for x in whole.values()):
+            raise InputError("data", lengths, "columns of one length, or single values")
+        n = max((x.size for x in whole.values() if x.ndim), default=1)
+        whole = {name: np.ascontiguousarray(np.broadcast_to(x, n)) for name, x in whole.items()}
+        self.mu, self.std = whole.pop("mu_macro"), whole.pop(STD, None)
+        self.columns = {name: x for name, x in whole.items() if name not in self.unknowns}
+        self.n = n
+
+    def _check(self) -> None:
+        if self.std is not None:
+            _refuse("std", self.std, (self.std > 0.0) & np.isfinite(self.std), "finite and > 0")
+        self.weight = np.ones(self.n) if self.std is None else 1.0 / self.std
+        top = self.columns.get("mu0", np.full(self.n, np.fmax.reduce(np.abs(self.mu), initial=0.0)))
+        scatter, told = _SHARE * top, f"within {100.0 * _SHARE:g} %; give std where the points scatter more"
+        if self.std is not None:
+            scatter, told = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"
+        _refuse("mu_macro", self.mu, np.isfinite(self.mu) & (self.mu >= -scatter), f"finite and >= 0, {told}")
+        settings = len(np.unique(np.column_stack([*self.columns.values()]), axis=0))
+        if settings < len(self.unknowns):
+            raise InputError(
+                "data", f"{self.n} points with {settings} different inputs",
+                f"points with at least {len(self.unknowns)} different inputs, one for each unknown "
+                f"({', '.join(self.unknowns)}); measure more, or fix one of the two",
+            )  # fmt: skip
+        if not self.mu.any():
+            raise InputError("mu_macro", 0.0, "> 0 in at least one point: friction of zero tells nothing")
+        oscillates = (self.columns[self.amplitude] > 0.0) & (self.columns["omega"] > 0.0)
+        if "k" in self.unknowns and not oscillates.any():
+            raise InputError("data", f"{self.n} points without oscillation",
+                             f"points with {self.amplitude} > 0 and omega > 0: without oscillation mu_macro = mu0 for "
+                             "every k")  # fmt: skip
+        if "mu0" not in self.unknowns:
+            bound = f"<= mu0, {told}: oscillation only lowers friction; or fit mu0, or look at the units"
+            _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
+
+    # --- the model ------------------------------------------------------------------------------------
+
+    def model(self, values: Mapping[str, float], columns: Mapping[str, Array]) -> tuple[Array, dict[str, Array]]:
+        """mu_macro, and its slopes along the unknowns."""
+        inputs: dict[str, Any] = {**columns, **values, **self.said}
+        found = self.surrogate.evaluate(**inputs, gradient=True)
+        slopes = {name: np.nan_to_num(found.gradient[name], posinf=0.0, neginf=0.0) for name in self.unknowns}
+        return found.mu_macro, slopes
+
+    def chi2(self, model: Array) -> Array:
+        """Sum of the squared residuals of rows of mu_macro (..., n), each over its variance."""
+        return np.asarray(((self.weight * (self.mu - model)) ** 2).sum(axis=-1))
+
+    def at(self, k: Array, mu0: Array) -> Array:
+        """mu_macro at rows of k and mu0, those that are unknown: (rows, points)."""
+        rows = {"k": k[:, None], "mu0": mu0[:, None]}
+        inputs: dict[str, Any] = {**self.columns, **self.said, **{name: rows[name] for name in self.unknowns}}
+        return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
+
+
+def chosen(contact: str, direction: str) -> dict[str, Any]:
+    """What evaluate takes beside the inputs; nothing where its defaults do."""
+    said = {"contact": (contact, "spring"), "direction": (direction, "across")}
+    return {name: value for name, (value, usual) in said.items() if value != usual}
+
+
+def _refuse(name: str, column: Array, legal: NDArray[np.bool_], bound: str) -> None:
+    """An error for the first value that is not legal."""
+    if not legal.all():
+        at = int(np.argmin(legal))
+        raise InputError(name, float(column[at]), bound, at)

@@ -1,0 +1,255 @@
+"""mumacro.fit: inputs recovered within their covariance, what points do not tell, bad input."""
+
+import doctest
+import inspect
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from comparing import close
+from mumacro import InputError, Surrogate, fit, fitting
+
+RIG = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
+V0 = np.geomspace(1e-3, 1.0, 20)
+KNOWS_BALL = "contact" in inspect.signature(Surrogate.evaluate).parameters
+CONTACTS = ["spring", pytest.param("ball", marks=pytest.mark.skipif(not KNOWS_BALL, reason="evaluate has no ball"))]
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    """Warnings are looked at in the result."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
+
+
+def friction(surrogate, contact="spring", **inputs):
+    """mu_macro of a contact that is known."""
+    said = {} if contact == "spring" else {"contact": contact}
+    return np.asarray(surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, **said).mu_macro)
+
+
+def noisy(surrogate, spread, seed=0, **inputs):
+    """Points with noise, and their standard deviations."""
+    mu = friction(surrogate, **inputs)
+    return mu + np.random.default_rng(seed).normal(scale=spread, size=mu.shape)
+
+
+def test_the_example_runs() -> None:
+    assert doctest.testmod(fitting).failed == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
+@pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_inputs_are_recovered_within_their_covariance(surrogate, contact, unknowns, given) -> None:
+    """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for itself."""
+    from scipy.stats import binom, chi2
+    from scipy.stats import f as fisher
+
+    truth = {"k": 1e6, "mu0": 0.3}
+    v0, y0, spread = np.tile(V0, 2), np.repeat([1e-6, 2.5e-6], 20), 2e-3
+    known = {name: value for name, value in truth.items() if name not in unknowns}
+    n, inside, intervals = len(unknowns), 0, np.zeros(len(unknowns), dtype=int)
+    clean = friction(surrogate, contact, v0=v0, y0=y0)
+    for seed in range(200):
+        mu = clean + np.random.default_rng(seed).normal(scale=spread, size=40)
+        data = {"v0": v0, "y0": y0, "mu_macro": mu} | ({"std": spread} if given else {})
+        found = fit(data, unknowns, contact=contact, Fz=10.0, f=20e3, **known)
+        off = np.array([found.values[name] - truth[name] for name in unknowns])
+        limit = chi2.ppf(0.95, n) if given else n * fisher.ppf(0.95, n, 40 - n)
+        inside += off @ np.linalg.solve(found.covariance, off) <= limit
+        intervals += [found.interval[name][0] <= truth[name] <= found.interval[name][1] for name in unknowns]
+        assert len(found.solutions) == 1
+        assert found.reduced_chi2 * (1.0 if given else spread**-2) == close(1.0, abs=1.0)
+    low, high = binom.ppf([0.0005, 0.9995], 200, 0.95)
+    assert low <= inside <= high
+    assert np.all((low <= intervals) & (intervals <= high))
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("k", [2e5, 1e6, 1e7])
+def test_points_without_noise_give_the_inputs(surrogate, contact, k) -> None:
+    mu = friction(surrogate, contact, v0=V0, k=k)
+    found = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
+    assert found.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
+    assert np.abs(found.residuals).max() < 1e-9
+    assert fit({"v0": V0, "mu_macro": mu}, "k", contact=contact, mu0=0.3, **RIG).values["k"] == close(k, rel=1e-8)
+    assert fit({"v0": V0, "mu_macro": mu}, "mu0", contact=contact, k=k, **RIG).values["mu0"] == close(0.3, rel=1e-9)
+
+
+def test_every_input_may_vary(surrogate) -> None:
+    rng = np.random.default_rng(1)
+    columns = {
+        "v0": rng.uniform(1e-3, 1.0, 30), "Fz": rng.uniform(5.0, 20.0, 30), "y0": rng.uniform(0.0, 5e-6, 30),
+        "omega": rng.uniform(1e4, 2e5, 30),
+    }  # fmt: skip
+    mu = np.asarray(surrogate.evaluate(mu0=0.3, k=1e6, **columns).mu_macro)
+    found = fit({**columns, "mu_macro": mu})
+    assert found.values == {"k": close(1e6, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({**columns, "mu_macro": mu, "std": 1e-3, "remark": "x"})
+    assert fit(frame).values == {"k": close(1e6, rel=1e-6), "mu0": close(0.3, rel=1e-7)}
+
+
+def test_weights_are_the_standard_deviations(surrogate) -> None:
+    mu, std = noisy(surrogate, 1e-4, v0=V0), np.full(20, 1e-4)
+    mu[3], std[3] = 0.9, 1e6
+    found = fit({"v0": V0, "mu_macro": mu, "std": std}, **RIG)
+    assert found.values["k"] == close(1e6, rel=2e-3)
+    assert found.warnings == ()
+    assert any(
+        "scatter by more than their std" in text
+        for text in fit({"v0": V0, "mu_macro": mu, "std": 1e-5}, **RIG).warnings
+    )
+
+
+def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate) -> None:
+    found = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
+    mu, off = found.predict(v0=0.05)
+    both = np.linalg.cholesky(found.covariance)
+    drawn = both @ np.random.default_rng(2).normal(size=(2, 4000)) + np.array([[x] for x in found.values.values()])
+    each = surrogate.evaluate(k=drawn[0], mu0=drawn[1], v0=0.05, **RIG).mu_macro
+    assert float(mu[0]) == close(each.mean(), abs=3.0 * off[0] / 60.0)
+    assert float(off[0]) == close(each.std(), rel=0.05)
+
+
+# --- what points do not tell --------------------------------------------------------------------------------
+
+
+def test_stiff_contacts_have_a_lower_bound_only(surrogate) -> None:
+    found = fit({"v0": V0, "mu_macro": noisy(surrogate, 3e-3, v0=V0, k=1e9), "std": 3e-3}, **RIG)
+    low, high = found.interval["k"]
+    assert (math.isinf(high), 1e7 < low < 1e9) == (True, True)
+    assert any("only a lower bound" in text for text in found.warnings)
+    assert found.interval["mu0"][0] < 0.3 < found.interval["mu0"][1]
+    rigid = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0, k=None)}, **RIG)
+    assert rigid.values == {"k": math.inf, "mu0": close(0.3, rel=1e-9)}
+    assert math.isinf(rigid.std["k"])
+    assert math.isinf(rigid.interval["k"][1])
+    with pytest.warns(UserWarning, match="lower bound"):
+        fit({"v0": V0, "mu_macro": noisy(surrogate, 3e-3, v0=V0, k=1e9), "std": 3e-3}, **RIG)
+
+
+def test_soft_contacts_have_an_upper_bound_only(surrogate) -> None:
+    found = fit({"v0": V0, "mu_macro": noisy(surrogate, 3e-3, v0=V0, k=1e3), "std": 3e-3}, **RIG)
+    assert found.interval["k"][0] == 0.0
+    assert 1e3 < found.interval["k"][1] < 2e6
+    assert any("only an upper bound" in text for text in found.warnings)
+
+
+def test_large_amplitudes_are_named(surrogate) -> None:
+    found = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-4, v0=V0, k=5e7), "std": 1e-4}, **RIG)
+    assert any("above 20" in text for text in found.warnings)
+    assert found.interval["k"][0] < 5e7 < found.interval["k"][1]
+
+
+def test_all_solutions_are_found(surrogate) -> None:
+    """mu_macro is not monotone in k: three stiffnesses give this friction."""
+    v0 = 2e-6 * 0.57 / 10.9 * 2.0 * math.pi * 20e3
+    k = np.geomspace(1e4, 1e10, 100_000)
+    mu = friction(surrogate, v0=v0, k=k)
+    rising = np.flatnonzero(np.diff(mu) > 0.0)
+    target = float(mu[rising].mean())
+    expected = k[:-1][np.diff(np.sign(mu - target)) != 0.0]
+    assert expected.size == 3
+    for std in ({}, {"std": 1e-4}):
+        found = fit({"v0": [v0], "mu_macro": [target], **std}, "k", mu0=0.3, **RIG)
+        assert sorted(one["k"] for one in found.solutions) == [close(one, rel=1e-3) for one in expected]
+        assert any("3 solutions" in text for text in found.warnings)
+    # with the scatter of a usual measurement the three are one
+    assert len(fit({"v0": [v0], "mu_macro": [target], "std": 0.02}, "k", mu0=0.3, **RIG).solutions) == 1
+
+
+def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate) -> None:
+    v0 = np.array([0.002, 0.1])
+    found = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0)}, **RIG)
+    assert found.values["k"] == close(1e6, rel=1e-6)
+    assert math.isinf(found.std["k"])
+    assert math.isnan(found.reduced_chi2)
+    assert any("no measure of the error" in text for text in found.warnings)
+    known = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0), "std": 1e-3}, **RIG)
+    assert 0.0 < known.std["k"] < 1e5
+
+
+@pytest.mark.parametrize(
+    ("k", "mu0", "scale"), [(1e-3, 0.3, 1e-9), (1e15, 0.3, 1e9), (1e6, 1e-3, 1.0), (1e6, 30.0, 1.0)]
+)
+def test_units_and_sizes_do_not_matter(surrogate, k, mu0, scale) -> None:
+    """Stiffness over force, and amplitude over l0, are what counts."""
+    rig = {"Fz": 10.0 * scale, "y0": 2.0 * mu0 * 10.0 * scale / k, "f": 20e3}
+    v0 = rig["y0"] * 1.3e5 * np.geomspace(0.01, 3.0, 20)
+    mu = surrogate.evaluate(mu0=mu0, k=k, v0=v0, **rig).mu_macro
+    assert fit({"v0": v0, "mu_macro": mu}, **rig).values == {"k": close(k, rel=1e-7), "mu0": close(mu0, rel=1e-8)}
+
+
+@pytest.mark.parametrize("along", ["v0", "y0"])
+def test_the_picture_has_points_fit_and_band(surrogate, along) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    x = {"v0": np.append(0.0, V0), "y0": np.geomspace(1e-7, 1e-5, 21)}[along]
+    given = {**RIG, "v0": 0.05, along: x}
+    found = fit({along: x, "mu_macro": friction(surrogate, **given), "std": 1e-3}, **{
+        name: value for name, value in given.items() if name != along})  # fmt: skip
+    axes = found.plot()
+    assert axes.get_xlabel() == {"v0": "v0 [m/s]", "y0": "y0 [m]"}[along]
+    points, curve = axes.lines[0], axes.lines[-1]
+    assert np.array_equal(points.get_xdata(), x)
+    assert np.interp(x, curve.get_xdata(), curve.get_ydata()) == close(points.get_ydata(), abs=1e-3)
+    edges = axes.collections[-1].get_paths()[0].vertices[:, 1]
+    assert edges.min() < curve.get_ydata().min() < curve.get_ydata().max() < edges.max()
+    matplotlib.pyplot.close("all")
+
+
+# --- bad input ----------------------------------------------------------------------------------------------
+
+POINTS = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
+
+
+@pytest.mark.parametrize(
+    ("data", "given", "said"),
+    [
+        (POINTS, {**RIG, "unknowns": ("k", "y0")}, 'unknowns must be one or both of "k" and "mu0"'),
+        (POINTS, {**RIG, "unknowns": ()}, "unknowns must be one or both"),
+        (POINTS, {**RIG, "contact": "cube"}, "contact must be one of"),
+        (POINTS, {**RIG, "k": 1e6}, "k must be left out, or taken from unknowns"),
+        (POINTS, {**RIG, "unknowns": "k"}, "mu0 must be given"),
+        (POINTS, {**RIG, "omga": 1.0}, "omga must be .* did you mean omega"),
+        (POINTS, {**RIG, "v0": 1.0}, "v0 must be given once: as a column or as a keyword"),
+        (POINTS, {"Fz": 10.0, "f": 2e4}, r"y0 must be given \[m\]"),
+        (POINTS, {"Fz": 10.0, "y0": 2e-6}, "omega must be given or f"),
+        (POINTS, {**RIG, "y0": -1.0}, "y0 must be finite and >= 0"),
+        ({"v0": [0.1, 0.2]}, RIG, "mu_macro must be a column of the data"),
+        ([0.1, 0.2], RIG, "data must be a mapping or table"),
+        ({"v0": [0.1], "mu_macro": [0.2]}, RIG, "at least 2 different inputs"),
+        ({"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]}, RIG, "at least 2 different inputs"),
+        ({"v0": [0.1, 0.2, 0.3], "mu_macro": [0.2, 0.21]}, RIG, "data must be columns of one length"),
+        ({"v0": [[0.1, 0.2]], "mu_macro": [[0.2, 0.21]]}, RIG, "data must be columns of one length"),
+        ({"v0": [0.1, 0.2], "mu_macro": [0.2, math.nan]}, RIG, "mu_macro at index 1 must be finite and >= 0"),
+        ({"v0": [0.1, 0.2], "mu_macro": [0.2, -0.1]}, RIG, "mu_macro at index 1 must be finite and >= 0"),
+        ({"v0": [0.1, math.nan], "mu_macro": [0.2, 0.1]}, RIG, "v0 at index 1 must be finite"),
+        ({"v0": [0.1, 0.2], "mu_macro": [0.0, 0.0]}, RIG, "mu_macro must be > 0 in at least one point"),
+        ({**POINTS, "std": [1e-3, 0.0, 1e-3]}, RIG, "std at index 1 must be finite and > 0"),
+        (POINTS, {**RIG, "y0": 0.0}, "points with y0 > 0 and omega > 0"),
+        (POINTS, {**RIG, "f": 0.0}, "points with y0 > 0 and omega > 0"),
+        (POINTS, {**RIG, "unknowns": "k", "mu0": 0.28}, "mu_macro at index 2 must be <= mu0, within 5 %; give std"),
+        ({**POINTS, "std": 1e-3}, {**RIG, "unknowns": "k", "mu0": 0.28}, "mu_macro at index 2 must be <= mu0"),
+        ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "0.3"]}, RIG, "mu_macro must be a real number"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_named_with_the_remedy(data, given, said) -> None:
+    with pytest.raises(InputError, match=said):
+        fit(data, **given)
+
+
+def test_points_that_do_not_depend_on_k_are_refused() -> None:
+    data = {"v0": [0.0, 0.1], "y0": [2e-6, 0.0], "mu_macro": [0.0, 0.3]}
+    with pytest.raises(InputError, match="points in which k matters"):
+        fit({**data, "y0": [0.0, 1e-15], "v0": [0.1, 1e6], "mu_macro": [0.3, 0.3]}, Fz=10.0, f=2e4)
+    # noise may lie on the other side of what is possible, if it is said
+    within = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.301], "std": 1e-3}
+    assert fit(within, "k", mu0=0.3, **RIG).values["k"] > 0.0
+    assert fit({"v0": [1e-3, 0.1, 1.0], "mu_macro": [-1e-4, 0.1, 0.3], "std": 1e-3}, **RIG).values["k"] > 0.0

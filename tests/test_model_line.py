@@ -1,0 +1,124 @@
+"""What an answer says about the model: rows of docs/validity.md, effects, digits."""
+
+import doctest
+import inspect
+import math
+import re
+
+import numpy as np
+import pytest
+
+from comparing import close
+from mumacro import InputError, Surrogate, validity
+from mumacro.validity import ROWS, digits, k_effect, model_rows
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+KNOWS_BALL = "contact" in inspect.signature(Surrogate.evaluate).parameters
+needs_ball = pytest.mark.skipif(not KNOWS_BALL, reason="evaluate has no ball")
+
+
+def rows(surrogate, contact="spring", **changed):
+    """Text and effect by row."""
+    found = model_rows(surrogate, {**CASE, **changed}, contact)
+    assert [one["row"] for one in found] == sorted({one["row"] for one in found}, key=ROWS.index)
+    return {one["row"]: (one["text"], one["effect"]) for one in found}
+
+
+def test_the_examples_run() -> None:
+    assert doctest.testmod(validity).failed == 0
+
+
+def test_rows_are_those_of_the_document(repository) -> None:
+    text = (repository / "docs" / "validity.md").read_text("utf-8")
+    named = re.findall(r"^\| ([^|]+?) \|", text.partition("| --- |")[2], re.MULTILINE)
+    stated = {name.replace("$", "") for name in named}
+    assert {"one spring", "Coulomb friction", "constant normal force", "no wear, no heating"} <= stated & {*ROWS}
+
+
+def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate) -> None:
+    mu = surrogate.evaluate(**CASE).mu_macro
+    off = [abs(surrogate.evaluate(**{**CASE, "k": 1e6 * x}).mu_macro / mu - 1.0) for x in (1.1, 1.0 / 1.1)]
+    text, effect = rows(surrogate)["k is known"]
+    assert effect == close(max(off), rel=1e-9)
+    assert f"{100.0 * effect:.2g} %" in text
+    assert k_effect(surrogate, CASE, known=1e-4) == close(
+        1e-4 * abs(surrogate.evaluate(**CASE, gradient=True).gradient["k"]) * 1e6 / mu, rel=1e-3
+    )
+    # at a maximum over k the slope is zero, and the effect is not
+    v0 = 2e-6 * 0.57 / 10.9 * 2.0 * math.pi * 20e3
+    k = np.geomspace(5e6, 3e8, 20_001)
+    top = float(k[surrogate.evaluate(**{**CASE, "v0": v0, "k": k}).mu_macro[5000:].argmax() + 5000])
+    assert k_effect(surrogate, {**CASE, "v0": v0, "k": top}) > 1e-5
+    assert k_effect(surrogate, {**CASE, "k": None}) == 0.0
+    assert k_effect(surrogate, {**CASE, "y0": 20e-6, "v0": 0.0}) == 0.0  # mu_macro = 0 for every such k
+    assert k_effect(surrogate, {**CASE, "y0": 3.1e-6, "v0": 0.0}) == math.inf  # 0, and not 0 for a softer contact
+
+
+def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate) -> None:
+    found = rows(surrogate, y0=2.0)
+    assert list(found) == ["units"]
+    assert "is y0 = 2 in metres?" in found["units"][0]
+    assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
+
+
+def test_large_amplitudes_hardly_depend_on_k(surrogate) -> None:
+    text, effect = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.5)["k is known"]
+    assert effect < 1e-3
+    assert "hardly" in text
+
+
+def test_creeping_and_rest_are_told(surrogate) -> None:
+    text, _ = rows(surrogate, v0=1e-6)["steady cycle"]
+    periods, seconds = (float(x) for x in re.findall(r"([\d.e+]+) (?:periods|s$)", text))
+    assert periods == close(20e3 * seconds, rel=0.01)
+    # l0 over the way of a period, times ln 100
+    assert periods == close(math.log(100.0) * 3e-6 / (1e-6 / 20e3), rel=0.6)
+    assert "largest force" in rows(surrogate, v0=0.0)["steady cycle"][0]
+    assert "steady cycle" not in rows(surrogate, v0=0.1)
+
+
+def test_slip_path_tilt_and_heat_have_their_sizes(surrogate) -> None:
+    found = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
+    way = float(re.search(r"slip path ([\d.e-]+) m a period", found["Coulomb friction"][0])[1])
+    assert way == close(4.0 * 5e-6, rel=0.1)  # the foot follows the motion but for l0 = 0.23 um at each turn
+    assert found["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)
+    assert found["constant normal force"][1] == close(1.21 * 0.3 * 0.01 * 5e-6 / (3.0 / 1.3e7), rel=1e-12)
+    watts = float(re.search(r"turns ([\d.]+) W", found["no wear, no heating"][0])[1])
+    assert watts == close(3.0 * way * 20e3, rel=0.1)
+    assert "constant normal force" not in rows(surrogate)
+
+
+@pytest.mark.parametrize("case", [{"y0": 0.0}, {"f": 0.0}, {"k": None}, {"k": math.inf}, {"k": "rigid"}])
+def test_nothing_is_said_where_nothing_oscillates_or_gives_way(surrogate, case) -> None:
+    assert model_rows(surrogate, {**CASE, **case}) == []
+
+
+@needs_ball
+def test_the_other_contact_is_told_with_the_difference(surrogate) -> None:
+    case = {"k": 1.307e7, "y0": 0.2e-6, "v0": 0.005}
+    text, effect = rows(surrogate, **case)["one spring"]
+    assert effect == close(0.2551 / 0.2477 - 1.0, abs=5e-4)
+    assert "ball" in text
+    assert rows(surrogate, "ball", **case)["one spring"][1] == close(0.2477 / 0.2551 - 1.0, abs=5e-4)
+
+
+def test_digits_are_those_that_the_uncertainty_leaves() -> None:
+    assert [digits(x) for x in (math.inf, 0.5, 0.06, 1e-3, 3e-4, 3e-5, 1e-9, 0.0)] == [4, 4, 4, 4, 5, 6, 6, 6]
+    assert digits(1e-9, most=12) == 10
+    assert all(digits(x) >= digits(2.0 * x) for x in np.geomspace(1e-9, 1.0, 50))
+    with pytest.raises(InputError, match="uncertainty must be >= 0"):
+        digits(math.nan)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [({"v0": -1.0}, "v0 must be"), ({"k": [1e6, 2e6]}, "case must be one case"), ({"contact": 1}, "contact")],
+)
+def test_bad_cases_are_named(surrogate, changed, said) -> None:
+    with pytest.raises((InputError, TypeError), match=said):
+        model_rows(surrogate, {**CASE, **changed})
+
+
+def test_the_uncertainty_of_k_is_positive(surrogate) -> None:
+    with pytest.raises(InputError, match="known must be finite and > 0"):
+        k_effect(surrogate, CASE, known=0.0)
