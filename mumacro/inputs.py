@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 
 __all__ = [
+    "BODIES",
     "BOUNDS",
     "FIELDS",
     "GAP",
@@ -41,6 +42,7 @@ __all__ = [
     "length_scale",
     "number_hint",
     "read_number",
+    "read_range",
     "real",
     "refusal",
     "scale_of",
@@ -117,6 +119,13 @@ UNITS_OF: dict[str, dict[str, Scale]] = {
     },
 }  # fmt: skip
 
+_PRESSURE = {"Pa": Scale(), "kPa": Scale(1e3), "MPa": Scale(1e6), "GPa": Scale(1e9), "N/mm2": Scale(1e6)}
+#: what else a person types, of two bodies in contact: SI unit, its words, known units
+BODIES: dict[str, tuple[str, str, dict[str, Scale]]] = {
+    "radius": ("m", "metres", _LENGTH), "length": ("m", "metres", _LENGTH),
+    "E": ("Pa", "pascals", _PRESSURE), "nu": ("-", "a plain number", UNITS_OF["mu0"]),
+}  # fmt: skip
+
 # Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a file that has one of
 # them while the input itself is missing is refused.
 _OTHER_NAMES = {
@@ -175,7 +184,7 @@ def scale_of(name: str, unit: str) -> Scale | None:
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
     """
-    return UNITS_OF[name].get(unit.replace(" ", "").replace("·", ""))
+    return (UNITS_OF[name] if name in SI else BODIES[name][2]).get(unit.replace(" ", "").replace("·", ""))
 
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
@@ -255,7 +264,7 @@ def read_number(name: str, text: str) -> float:
     ...
     ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
     """
-    words = SI[name][1]
+    words, known = (SI[name][1], UNITS_OF[name]) if name in SI else BODIES[name][1:]
     text = text.strip()
     if name == "k" and is_rigid(text):
         return math.inf
@@ -267,9 +276,24 @@ def read_number(name: str, text: str) -> float:
         return scale.si(float(with_unit[1]))
     if _PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
-    units = ", ".join([unit for unit in UNITS_OF[name] if unit][:4])
+    units = ", ".join([unit for unit in known if unit][:4])
     hint = ", or rigid" if name == "k" else ""
     raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {units}, ...{hint}")
+
+
+def read_range(name: str, text: str) -> tuple[float, float]:
+    """Both ends of ``low..high`` in SI; a unit behind the second end holds for both.  ValueError as in read_number.
+
+    >>> read_range("k", "0.8..1.2 N/um")
+    (800000.0, 1200000.0)
+    """
+    low, _, high = text.partition("..")
+    if _PLAIN.fullmatch(low.strip()) and (found := _WITH_UNIT.fullmatch(high.strip())):
+        low = f"{low} {found[2]}"
+    ends = read_number(name, low), read_number(name, high)
+    if not 0.0 < ends[0] < ends[1] < math.inf:
+        raise ValueError(f"{name}={text}: the ends of a range must be > 0, finite and ascending")
+    return ends
 
 
 # --- columns --------------------------------------------------------------------------------------------

@@ -56,7 +56,7 @@ class Output:
         cells = [self._cells(name, column) for name, column in zip(batch.schema.names, batch.columns, strict=True)]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
         if self.kind == "csv":
-            rows = rows if texts is None else (first + [*row] for first, row in zip(texts, rows, strict=True))
+            rows = rows if texts is None else ([*first, *row] for first, row in zip(texts, rows, strict=True))
             return self.pack(csv_lines(rows, self.sep))
         line = ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names) + "}\n"
         if texts is None:
@@ -81,7 +81,7 @@ class Output:
             text = pc.if_else(pc.is_finite(column), text, infinite)
         if not is_json:
             is_real = pa.types.is_floating(kind) or pa.types.is_decimal(kind)
-            return (pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist()
+            return list((pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist())
         if pa.types.is_primitive(kind) and not pa.types.is_temporal(kind):
             return [cell if cell != "rigid" else '"rigid"' for cell in pc.fill_null(text, "null").to_pylist()]
         return [json.dumps(cell) for cell in text.to_pylist()]
