@@ -22,34 +22,10 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 
 __all__ = [
-    "BODIES",
-    "BOUNDS",
-    "FIELDS",
-    "GAP",
-    "MOST_HZ",
-    "NAMES",
-    "PER_UNIT",
-    "POSITIVE",
-    "RAD_PER_CYCLE",
-    "RIGID",
-    "SI",
-    "UNITS",
-    "UNITS_OF",
-    "Scale",
-    "as_columns",
-    "check_inputs",
-    "is_rigid",
-    "length_scale",
-    "number_hint",
-    "read_number",
-    "read_range",
-    "real",
-    "refusal",
-    "scale_of",
-    "split_unit",
-    "suggestion",
-    "unknown_name",
-]
+    "BODIES", "BOUNDS", "FIELDS", "GAP", "MOST_HZ", "NAMES", "PER_UNIT", "POSITIVE", "RAD_PER_CYCLE", "RIGID", "SI",
+    "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "is_rigid", "length_scale", "number_hint",
+    "read_number", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion", "unknown_name",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
