@@ -22,8 +22,8 @@ from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, check_inputs, read_
 from mumacro.surrogate import Surrogate
 
 __all__ = [
-    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_table", "as_json", "in_columns",
-    "open_table", "read_case", "read_values", "run", "write_result",
+    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_form", "add_table", "as_json",
+    "in_columns", "open_table", "read_case", "read_values", "run", "write_result",
 ]  # fmt: skip
 
 INPUTS = """\
@@ -58,9 +58,14 @@ class OneLineParser(argparse.ArgumentParser):
 def add_table(parser: OneLineParser, words: str | None = None) -> None:
     """The options of all commands that answer, after the inputs, if there are any, explained by ``words``."""
     if words is not None:
-        parser.add_argument("words", nargs="*" if words.startswith("a case") else "+", metavar="name=value", help=words)
+        parser.add_argument("words", nargs="*" if words.endswith("if any") else "+", metavar="name=value", help=words)
     text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
+    add_form(parser)
+
+
+def add_form(parser: OneLineParser) -> None:
+    """The options for the form of a result."""
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
     parser.add_argument("--digits", type=int, choices=range(1, 18), default=6, metavar="N", help="default: 6; 15: all")
 

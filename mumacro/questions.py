@@ -157,7 +157,11 @@ def map_(words: Sequence[str]) -> str:
     point = None if case is None else (case.v_tilde, case.y_tilde)
     v, y = (x.ravel() for x in np.meshgrid(np.geomspace(*plotting.V_RANGE, 141), np.geomspace(*plotting.Y_RANGE, 101)))
     columns = {"v_tilde": v, "y_tilde": y, "mu_ratio": surrogate.mu_ratio(v, y)}
-    return command.write_result(chosen.out, columns, lambda axes: plotting.plot_map(surrogate, axes, point=point))
+    text = command.write_result(chosen.out, columns, lambda axes: plotting.plot_map(surrogate, axes, point=point))
+    ranges = (plotting.V_RANGE, plotting.Y_RANGE)
+    if point and not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
+        text += f"\nthe case lies outside the map: v~ = {point[0]:.6g}, y~ = {point[1]:.6g}"
+    return text
 
 
 def stiffness_of(words: Sequence[str]) -> str:
@@ -176,8 +180,7 @@ def stiffness_of(words: Sequence[str]) -> str:
     parser.add_argument("--E2", help="of the flat body, where it is another material; inf: rigid")
     parser.add_argument("--nu2", help="of the flat body")
     parser.add_argument("--along", action="store_true", help="k along the axis of the cylinder, not across it")
-    parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
-    parser.add_argument("--digits", type=int, choices=range(1, 18), default=6, metavar="N", help="default: 6; 15: all")
+    command.add_form(parser)
     chosen = parser.parse_args(words)
     texts = {name: getattr(chosen, name) for name in ("radius", "length", "Fz", "E", "nu", "E2", "nu2")}
     texts |= {"E2": texts["E2"] or texts["E"], "nu2": texts["nu2"] or texts["nu"]}

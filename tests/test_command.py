@@ -251,6 +251,14 @@ def test_without_matplotlib_a_picture_names_the_extra(capsys, tmp_path, monkeypa
     assert "pip install 'mumacro[plot]'" in said(capsys, 1, "map", "-o", str(tmp_path / "map.png"))
 
 
+def test_a_case_beyond_the_map_is_said_to_be_so(capsys, tmp_path):
+    pytest.importorskip("matplotlib")
+    out = str(tmp_path / "map.png")
+    assert "outside" not in said(capsys, 0, "map", CASE, "-o", out)
+    for case in (CASE.replace("1e6", "rigid"), CASE.replace("0.01", "0"), CASE.replace("1e6", "1e30")):
+        assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)
+
+
 def test_objects_plot_themselves(tightest):
     figure = pytest.importorskip("matplotlib.figure").Figure()
     from mumacro.law import friction_law
