@@ -58,7 +58,7 @@ class OneLineParser(argparse.ArgumentParser):
 def add_table(parser: OneLineParser, words: str | None = None) -> None:
     """The options of all commands that answer, after the inputs, if there are any, explained by ``words``."""
     if words is not None:
-        parser.add_argument("words", nargs="*" if words.endswith("if any") else "+", metavar="name=value", help=words)
+        parser.add_argument("words", nargs="*" if words.startswith("a case") else "+", metavar="name=value", help=words)
     text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
