@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,24 +25,17 @@ __all__ = ["SEAMS", "BlockErrors", "block_errors", "fast_from", "log_uniform", "
 Array = NDArray[np.float64]
 
 
-@dataclasses.dataclass
-class BlockErrors:
+class BlockErrors(NamedTuple):
     """Largest errors of a block.
 
-    Attributes
-    ----------
-    values : dict of str to float
-        Of what is tabulated, over the block, by quantity.
-    cells : dict of str to ndarray
-        As :attr:`mumacro.table.Block.cell_errors`.
-    absolute, relative : float
-        Of mu~.
+    By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in :class:`mumacro.table.Block`.
+    ``absolute``, ``relative``: of mu~.
     """
 
     values: dict[str, float]
-    cells: dict[str, Array]
     absolute: float
     relative: float
+    cells: dict[str, Array]
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
@@ -92,17 +86,16 @@ def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[
     for index, block in enumerate(surrogate.table.blocks):
         errors = _value_errors(surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n)
         _, _, exact = solve_nodes(index, finer((block.a.size, block.b.size)), surrogate.border, sweep)
-        errors.cells = cell_errors(index, block, exact)
-        found.append(errors)
+        found.append(BlockErrors(*errors, cell_errors(index, block, exact)))
     return found
 
 
 def _value_errors(
     surrogate: Surrogate, stating: tuple[Surrogate, ...], sweep: Sweep, index: int, rng: np.random.Generator, n: int
-) -> BlockErrors:
+) -> tuple[dict[str, float], float, float]:
+    """Of what is tabulated by quantity; absolute and relative of mu~."""
     chart = CHARTS[index]
-    radial = chart.a.name == "radius"
-    v, y, _ = chart.point(_crowded(rng, chart.a, n, radial), _crowded(rng, chart.b, n), surrogate.border)
+    v, y, _ = chart.point(_crowded(rng, chart.a, n), _crowded(rng, chart.b, n), surrogate.border)
     v_seam, y_seam = near_seams(rng, 2 * n, surrogate)
     v, y = np.concatenate([v, v_seam]), np.concatenate([y, y_seam])
     mu, _, source = surrogate.ratio_with_bound(v, y)
@@ -116,13 +109,13 @@ def _value_errors(
         # what the bound allows anyway: half of rounding, and what the border's error does, of which it states twice
         noise = solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
         errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
-    return BlockErrors(errors, {}, float(error.max()), float((error / solved["mu_ratio"]).max()))
+    return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 
 
-def _crowded(rng: np.random.Generator, axis: Axis, n: int, radial: bool = False) -> Array:
+def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
     """File coordinates that crowd towards both ends."""
     low, high = axis.low, axis.high
-    if radial:
+    if axis.name == "radius":
         half = n // 2
         return np.concatenate([10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)])
     t = rng.beta(0.5, 0.5, n)

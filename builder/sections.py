@@ -60,7 +60,7 @@ def _angle_section(
 
     ``w`` and ``out`` as in :func:`.model.slip`; ``orbit`` (6,) receives the stick phase.
     """
-    cth, sth, deficit = _direction(x0, chart)
+    cth, sth, _ = _direction(x0, chart)
     s0 = math.asin(min(v * cth / (y * sth), 1.0))
     d, s1 = stick_end(v, y, eta, x0, chart, s0)
     if d < 0.0:

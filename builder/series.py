@@ -61,7 +61,8 @@ def increment(p: np.ndarray, t: float) -> float:
 @solver_kernel
 def value(p: np.ndarray, t: float) -> float:
     """p(t), as :func:`increment`."""
-    return increment(p, t) + p[0]
+    r: float = increment(p, t) + p[0]
+    return r
 
 
 @solver_kernel
