@@ -52,7 +52,7 @@ class Panel(NamedTuple):
     settings: dict[str, Any] = {}  # noqa: RUF012
 
 
-def _solved(y: Array) -> Array:
+def _solved(y: NDArray[Any]) -> Array:
     """v~crit and mu~ there at each amplitude (2, n), each a solve of the full model."""
     return np.array([border(float(value)) for value in y]).T
 
@@ -127,7 +127,8 @@ def _cuts(s: Surrogate) -> list[Panel]:
     looks = ["k-" if i == 10 else "C0-" for i in range(21)]
     curves = [Curve(v, s.mu_ratio(v, y), look) for y, look in zip(amplitudes, looks, strict=True)]
     curves[10] = curves[10]._replace(label=r"$\tilde y = 1$")
-    curves.append(Curve(*_solved(amplitudes[1:]), "C3o", r"border: $\tilde\mu(\tilde v_\mathrm{crit})$, solved"))
+    crit, top = _solved(amplitudes[1:])
+    curves.append(Curve(crit, top, "C3o", r"border: $\tilde\mu(\tilde v_\mathrm{crit})$, solved"))
     curves.append(Curve(np.zeros(11), closed_forms.static_limit(amplitudes[:11]), "C2s", "static value (16)"))
     notes = {(1.95, float(s.mu_ratio(2.0, y))): f"{y:g}" for y in (0.5, 1.0, 1.5, 2.0)}
     return [Panel((V, 0.0, 2.0), (MU, 0.0, 1.03), curves, notes)]
@@ -202,6 +203,7 @@ def _draw(panel: Panel, axes: Any) -> None:
         axes.text(x, y, text, ha="center", va="bottom")
     (x_name, *x_ends), (y_name, *y_ends) = panel.x, panel.y
     axes.set(xlabel=x_name, ylabel=y_name, xlim=x_ends, ylim=y_ends, **panel.settings)
+    axes.title.set_fontsize("small")
     axes.legend(fontsize="small")
 
 
