@@ -19,7 +19,7 @@ from mumacro import Surrogate
 
 pytestmark = pytest.mark.slow
 AMPLITUDES = {  # of the figures whose lines are mu~ at these y~, over v~ times the scale
-    "fig08_cuts": (np.arange(21) * 0.1, lambda y: 1.0),
+    "fig08_cuts": (np.arange(21) * 0.1, lambda _: 1.0),
     "fig10_large_amplitude": (np.arange(1, 101) * 0.8, lambda y: y),
 }
 
