@@ -9,6 +9,7 @@ from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from mumacro import InputError, Surrogate
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
@@ -149,14 +150,16 @@ def _parser(prog: str) -> OneLineParser:
         made.set_defaults(run=run, title=made.prog)
         return made
 
-    def add_workers(made: OneLineParser) -> None:
-        made.add_argument("--workers", type=_whole(1, 1024), default=processors(), help="threads; default: %(default)s")
-
+    workers: dict[str, Any] = {
+        "default": processors(),
+        "type": _whole(1, 1024),
+        "help": "threads; default: %(default)s",
+    }
     one = command(_build, "Build a table; a killed build resumes from OUT.checkpoint and gives the same data.")
     one.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
     text = "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: %(default)s"
     one.add_argument("--tolerance", type=float, default=1e-8, help=text)
-    add_workers(one)
+    one.add_argument("--workers", **workers)
     one = command(_solve, "Solve the full model once and print the steady cycle as JSON.")
     one.add_argument("--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10")
     one.add_argument("--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14")
@@ -165,7 +168,7 @@ def _parser(prog: str) -> OneLineParser:
     text = "fresh solves to compare with; default: %(default)s"
     one.add_argument("--points", type=_whole(100, 10_000_000), default=20_000, help=text)
     one.add_argument("--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s")
-    add_workers(one)
+    one.add_argument("--workers", **workers)
     one = command(_export, "Write a table for other tools; print what was written as JSON.")
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
     text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"

@@ -109,7 +109,7 @@ def build_table(
             targets[i] /= 3.0
             blocks[i] = build(i)
     progress("errors of the blocks", True)
-    return finish_table(table, out, targets, sweep, progress)
+    return _finish(table, out, targets, sweep, progress)
 
 
 def _state_errors(table: Table, out: Path, sweep: Sweep, seed: int) -> list[int]:
@@ -134,7 +134,7 @@ def _verified(quantity: Quantity, found: dict[str, Any]) -> tuple[str, float]:
     return f"verified_max_{quantity.variable}_error", found["max_abs_error"]
 
 
-def finish_table(
+def _finish(
     table: Table, out: Path, targets: list[float], sweep: Sweep, progress: Callable[[str, bool], None]
 ) -> Surrogate:
     """Verify the table on fresh solves, write it to ``out`` with its provenance, and open it."""

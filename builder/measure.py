@@ -44,9 +44,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Ar
 
 def fast_from(s: Surrogate, y: Array) -> Array:
     """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
-    crit = s.v_tilde_crit(y)
-    out: Array = np.where(y <= charts.Y_TAIL, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y))
-    return out
+    below = charts.RHO_MAX * s.v_tilde_crit(y)
+    return np.asarray(np.where(y <= charts.Y_TAIL, below, charts.FAST_KAPPA * np.sqrt(y)))
 
 
 SEAMS = (charts.Y_STICK_LO, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL)
@@ -58,10 +57,9 @@ def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, A
     off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
     which = rng.integers(0, 4, n)
     y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
-    cut = which == 2
+    cut, fast = which == 2, which == 3
     y[cut] = rng.uniform(charts.Y_STICK_LO, charts.Y_STICK_HI, int(cut.sum()))
     v[cut] = s.v_tilde_crit(y[cut]) * charts.SIGMA_CUT**2 * off[cut]
-    fast = which == 3
     y[fast] = log_uniform(rng, charts.Y_CONT, 1e6, int(fast.sum()))
     v[fast] = fast_from(s, y[fast]) * off[fast]
     return v, y
@@ -72,11 +70,11 @@ def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
 
     With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the table's error.
     """
-    table = surrogate.table
-    border = [dataclasses.replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border]
+    table, replace = surrogate.table, dataclasses.replace
+    border = [replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border]
     stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
-    blocks = [dataclasses.replace(block, errors=stated) for block in table.blocks]
-    return Surrogate(dataclasses.replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads)
+    blocks = [replace(block, errors=stated) for block in table.blocks]
+    return Surrogate(replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads)
 
 
 def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:

@@ -167,39 +167,25 @@ def solve_raw(
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady cycle at one (v~, y~); every quantity dimensionless.
+    """Steady cycle at one (v~, y~); every quantity dimensionless."""
 
-    Attributes
-    ----------
-    mu_ratio, deficit : float
-        mu~ = mu_macro/mu0 = <u_x>, eq. (15), and 1 - mu~ with its own full precision.
-    regime : str
-        ``"continuous"`` or ``"stick_slip"``.
-    stick_fraction : float
-        Share of the period during which the foot sticks.
-    power : float
-        <y~ cos tau u_y>: mean power of the shaker in units of mu0 Fz l0 omega.
-    slip_speed : float
-        <lam>: mean slip path per radian in units of l0; equals v~ mu~ + power.
-    min_slip_speed : float
-        Smallest lam of the continuous orbit; NaN far below the border, where it is not followed.  Where v~ is so far
-        above the border that stiff steps pass it by, it is right to 0.1 %.
-    error_estimate : float
-        Largest absolute error of mu_ratio to be expected, see ``error_estimate``.
-    status : int
-        0 when solved.
-    advice : str
-        What the status means and what to do.
-    """
-
+    #: mu~ = mu_macro/mu0 = <u_x>, eq. (15), and 1 - mu~ with its own full precision
     mu_ratio: float
     deficit: float
+    #: "continuous" or "stick_slip"
     regime: str
+    #: share of the period during which the foot sticks
     stick_fraction: float
+    #: <y~ cos tau u_y>: mean power of the shaker in units of mu0 Fz l0 omega
     power: float
+    #: <lam>: mean slip path per radian in units of l0; equals v~ mu~ + power
     slip_speed: float
+    #: smallest lam of the continuous orbit; NaN far below the border, where it is not followed; right to 0.1 % where v~
+    #: is so far above the border that stiff steps pass it by
     min_slip_speed: float
+    #: largest absolute error of mu_ratio to be expected, see error_estimate()
     error_estimate: float
+    #: 0 when solved; what it means and what to do
     status: int
     advice: str
 
@@ -246,10 +232,9 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     w, out, orbit, res = workspace()
     status = int(solve_raw(v, y, eta, w, out, orbit, res))
     found = dict(zip(RESULTS, res.tolist(), strict=True))
-    found["regime"] = "unknown" if math.isnan(res[REGIME]) else REGIMES[int(res[REGIME])]
-    return Steady(
-        **found, error_estimate=error_estimate(res[MU_RATIO], res[DEFICIT]), status=status, advice=ADVICE[status]
-    )
+    found["regime"] = REGIMES[int(res[REGIME])] if status == OK else "unknown"
+    found["error_estimate"] = error_estimate(res[MU_RATIO], res[DEFICIT])
+    return Steady(**found, status=status, advice=ADVICE[status])
 
 
 def border(y: float) -> tuple[float, float]:

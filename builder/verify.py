@@ -69,46 +69,39 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
 def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of the closed form."""
     rng = np.random.default_rng(seed)
+    low, high = 1 - 1e-13, 1 + 1e-13
     for seam in SEAMS:
         v = _log(rng, 1e-9, 1e5, n)
-        yield v, v, np.full(n, seam * (1 - 1e-13)), np.full(n, seam * (1 + 1e-13))
+        yield v, v, np.full(n, seam * low), np.full(n, seam * high)
     y = _log(rng, 1e-3, 1e7, n)
-    edges = [(surrogate.v_tilde_crit(y), y)]
+    yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
     y = rng.uniform(charts.Y_STICK_LO, charts.Y_STICK_HI, n)
-    edges.append((surrogate.v_tilde_crit(y) * charts.SIGMA_CUT**2, y))
+    yield (v := surrogate.v_tilde_crit(y) * charts.SIGMA_CUT**2) * low, v * high, y, y
     y = _log(rng, charts.Y_CONT, 1e8, n)
-    edges.append((fast_from(surrogate, y), y))
-    for v, y in edges:
-        yield v * (1 - 1e-13), v * (1 + 1e-13), y, y
+    yield (v := fast_from(surrogate, y)) * low, v * high, y, y
 
 
 def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
     """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13 apart."""
-    worst = 0.0
-    for v1, v2, y1, y2 in _both_sides(surrogate, n, seed):
-        one, two = surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)
-        worst = max(worst, float((np.abs(one - two) / np.maximum(one, two)).max()))
-    return worst
+    pairs = _both_sides(surrogate, n, seed)
+    sides = ((surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)) for v1, v2, y1, y2 in pairs)
+    return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
 
 
 def seam_slope_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
     """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are continuous, too."""
-    worst = 0.0
-    for v1, v2, y1, y2 in _both_sides(surrogate, n, seed):
-        for one, two in zip(surrogate.slopes(v1, y1)[1:], surrogate.slopes(v2, y2)[1:], strict=True):
-            worst = max(worst, float(np.abs(one - two).max()))
-    return worst
+    pairs = _both_sides(surrogate, n, seed)
+    sides = ((surrogate.slopes(v1, y1), surrogate.slopes(v2, y2)) for v1, v2, y1, y2 in pairs)
+    return max(float(np.abs(np.subtract(one[1:], two[1:])).max()) for one, two in sides)
 
 
 def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11) -> float:
     """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across all seams [-]."""
-    rng = np.random.default_rng(seed)
-    worst = 0.0
-    rise = np.geomspace(1e-9, 1e7, n)
-    for fixed in _log(rng, 1e-4, 1e6, lines):
-        worst = max(worst, float(-np.diff(surrogate.mu_ratio(rise, fixed)).min()))
-        worst = max(worst, float(np.diff(surrogate.mu_ratio(fixed, rise)).max()))
-    return max(worst, 0.0)
+    rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
+    for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
+        steps = -np.diff(surrogate.mu_ratio(rise, fixed)), np.diff(surrogate.mu_ratio(fixed, rise))
+        worst = max(worst, float(np.max(steps)))
+    return worst
 
 
 class _Compared(NamedTuple):
