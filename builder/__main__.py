@@ -28,13 +28,12 @@ class _Bar:
 
     def __call__(self, text: str, done: bool) -> None:
         self.done += done
-        terminal = sys.stderr.isatty()
         bar = ("#" * round(30 * self.done / self.stages)).ljust(30, ".")
         line = f"{bar} {self.done:2d}/{self.stages} {time.monotonic() - self.start:6.0f} s  {text:<32}"
-        if terminal or done:
-            print(f"\r{line}" if terminal else line, end="" if terminal else "\n", file=sys.stderr, flush=True)
-        if terminal and self.done == self.stages:
-            print(file=sys.stderr)
+        if sys.stderr.isatty():
+            print(f"\r{line}", end="\n" if self.done == self.stages else "", file=sys.stderr, flush=True)
+        elif done:
+            print(line.rstrip(), file=sys.stderr)
 
 
 def _place(out: Path, folder: bool = False) -> None:

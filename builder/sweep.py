@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
 #: the steady state; the continuous orbit whether or not lam stays positive, analytic across the border; the border,
 #: where the column deficit holds v~crit
-KINDS = ("full", "continuous", "border")
+KINDS = {"full": 0, "continuous": 1, "border": 2}
 _RESULTS = steady.REGIME
 COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
 _MU, _DEFICIT, _ERROR, _STATUS = map(COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status"))
@@ -45,7 +45,7 @@ class CheckpointError(MumacroError):
 
 @solver_kernel
 def _solve_rows(kind: int, points: Array, out: Array) -> None:
-    """Solve ``points`` (n, 3) into rows of COLUMNS; ``kind`` is a place in KINDS."""
+    """Solve ``points`` (n, 3) into rows of COLUMNS; ``kind`` as in KINDS."""
     w, end, orbit, res = steady.workspace()
     for i in range(points.shape[0]):
         v, y, eta = points[i]
@@ -65,7 +65,7 @@ def _solve_rows(kind: int, points: Array, out: Array) -> None:
 def solve_chunk(kind: str, points: Array) -> Array:
     """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; rows of :data:`COLUMNS`."""
     out = np.empty((points.shape[0], len(COLUMNS)))
-    _solve_rows(KINDS.index(kind), np.ascontiguousarray(points), out)
+    _solve_rows(KINDS[kind], np.ascontiguousarray(points), out)
     return out
 
 
