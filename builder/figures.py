@@ -84,7 +84,7 @@ def _regions(s: Surrogate) -> list[Panel]:
     """Fig. 4: the two regimes and the line between small and large angles."""
     y, v = np.linspace(0.0, 5.0, 401), np.linspace(0.0, 2.5, 201)
     equality = r"(20) as an equality, $\tilde y = \sqrt{1+\tilde v^2}$"
-    curves = [Curve(y, s.v_tilde_crit(y), "k-", "border, exact"), Curve(np.hypot(1.0, v), v, "0.6", equality)]
+    curves = [Curve(y, s.v_tilde_crit(y), "k-", "border, exact"), Curve(np.hypot(1.0, v), v, "C7--", equality)]
     notes = {(1.0, 2.1): "continuous sliding", (4.1, 0.6): "stick and slip", (0.45, 0.75): "small angles",
              (3.6, 1.6): "large angles"}  # fmt: skip
     return [Panel((Y, 0.0, 5.0), (V, 0.0, 2.5), curves, notes)]
