@@ -79,7 +79,10 @@ const askMap = channel(status, "map", () => get("static/page/map.json"), (data) 
 });
 const askHover = new Channel({
   ask: ([v0, y0]) => post("v1/mu-macro", { mu0: 1, Fz: 1, k: 1, omega: 1, y0, v0 }),
-  answer: ({ mu_ratio, regime }, place) => hovered && tellPlace(place, `= ${show(mu_ratio, 6)}, ${REGIMES[regime]}`),
+  answer: ({ mu_ratio, regime }, place) => {
+    const [v, y, ratio] = [...place, mu_ratio].map((value) => show(value, 4));
+    $("map-read").textContent = `ṽ = ${v}, ỹ = ${y}: µ/µ₀ = ${ratio}, ${REGIMES[regime]}`;
+  },
 });
 
 // --- state ------------------------------------------------------------------------------------------------
@@ -169,23 +172,19 @@ function movePoint() {
   $("map").setAttribute("aria-label", `Map of the friction ratio. The point: ${here}.`);
 }
 
-let hovered = false;
-function tellPlace([v, y], text) {
-  $("map-read").textContent = `ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ${text}`;
-}
-const map = new FrictionMap($("map"), moveTo, (v, y, ratio) => {
-  hovered = v !== null;
-  $("map-read").textContent = "\u00a0";
-  if (!hovered) return;
-  tellPlace([v, y], `≈ ${ratio.toFixed(2)}`);
-  askHover.push([v, y].map((value) => Number(value.toPrecision(6))));
+const map = new FrictionMap($("map"), moveTo, (v, y) => {
+  if (v !== null) askHover.push([v, y].map((value) => Number(value.toPrecision(4))));
+  else {
+    askHover.cancel();
+    $("map-read").textContent = "\u00a0";
+  }
 });
 
 /** Moves the point of the map: v~ by the speed, y~ by the amplitude. */
 function moveTo(v, y) {
   const omega = valueOf(state, "omega");
   if (state.rigid || omega === 0 || !isMapped(state)) {
-    hovered = false; // what the place itself would read is of no use now
+    askHover.cancel();
     const why = state.rigid ? "A rigid contact has no point inside the map: switch it off to move the point."
       : "Without a frequency, or for another contact, there is no point inside the map.";
     $("map-read").textContent = why;

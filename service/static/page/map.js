@@ -33,7 +33,7 @@ function placed(x, y, v, a, slope) {
 }
 
 export class FrictionMap {
-  /** `pick(vTilde, yTilde)` when the user moves the point, `hover(vTilde, yTilde, ratio)` or `hover(null)`. */
+  /** `pick(vTilde, yTilde)` when the user moves the point, `hover(vTilde, yTilde)` or `hover(null)`. */
   constructor(svg, pick, hover) {
     Object.assign(this, { data: null, point: null, formulas: false });
     this.plot = new Plot(svg, (...size) => this.paint(...size));
@@ -41,9 +41,7 @@ export class FrictionMap {
       move: (x, y) => {
         if (!this.x) return;
         const within = x >= this.x.from && x <= this.x.to && y >= this.y.to && y <= this.y.from;
-        const [v, a] = [this.x.value(x), this.y.value(y)];
-        if (within) hover(v, a, this.ratio(this.x.share(v) * this.columns, this.y.share(a) * this.rows));
-        else hover(null);
+        hover(within ? this.x.value(x) : null, this.y.value(y));
       },
       pick: (x, y) => this.x && pick(this.x.value(x), this.y.value(y)),
       leave: () => hover(null),
@@ -149,6 +147,7 @@ export class FrictionMap {
   lines(x, y) {
     const px = (i) => x.from + (i / this.columns) * (x.to - x.from);
     const py = (j) => y.from + (j / this.rows) * (y.to - y.from);
+    const labels = []; // that are drawn: [x, y]
     return this.isolines.flatMap(([level, segments]) => {
       const place = (i, j) => `${px(i).toFixed(1)} ${py(j).toFixed(1)}`;
       const pieces = segments.map(([x1, y1, x2, y2]) => `M${place(x1, y1)}L${place(x2, y2)}`);
@@ -157,6 +156,8 @@ export class FrictionMap {
       const target = LABELS.get(level) * this.columns;
       const away = ([at]) => Math.abs(at - target);
       const [at, up] = segments.reduce((best, segment) => (away(segment) < away(best) ? segment : best));
+      if (labels.some(([left, top]) => Math.hypot(left - px(at), top - py(up)) < 24)) return drawn;
+      labels.push([px(at), py(up)]);
       return [...drawn, label(String(level), px(at), py(up) + 4, "tag")];
     });
   }

@@ -151,7 +151,9 @@ export class Plot {
       const y = height + 10 + 20 * i;
       const [stroke] = style ? [style.replace(/var\(--(\w+)\)/, (_, name) => colour(name))] : [];
       const sample = { d: `M16 ${y}h28`, stroke, "stroke-width": 2.2, "stroke-dasharray": dash };
-      const words = { x: style ? 52 : 16, y: y + 4, fill: colour("text"), "font-family": "sans-serif", "font-size": 13 };
+      const narrow = 7 * text.length > width - 60 ? { textLength: width - 60, lengthAdjust: "spacingAndGlyphs" } : {};
+      const font = { "font-family": "sans-serif", "font-size": 13, ...narrow };
+      const words = { x: style ? 52 : 16, y: y + 4, fill: colour("text"), ...font };
       return [...(style ? [draw("path", sample)] : []), draw("text", words, text)];
     }));
     const image = new Image();
