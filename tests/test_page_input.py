@@ -279,7 +279,7 @@ def test_a_service_that_does_not_know_them_is_not_asked(open_page):
 
 
 def test_a_link_reproduces_the_state(open_page, surrogate):
-    page = open_page("#Fz=12.5&along=y0&v0=0.01m/s&Fz.std=0.5&start=1e-7&family=v0&curves=0.01;0.02&digits=all")
+    page = open_page("#Fz=12.5&along=y0&v0=0.01m/s&Fz.std=0.5&range=1e-7..1e-5&family=v0&curves=0.01;0.02&digits=all")
     page.run("await new Promise((next) => setTimeout(next, 250));")  # the address follows the sliders with a delay
     link = page.find("#link").get_attribute("href")
     assert page.browser.current_url == link
@@ -289,8 +289,8 @@ def test_a_link_reproduces_the_state(open_page, surrogate):
     expected = surrogate.evaluate(**{**START, "Fz": 12.5})
     assert float(before[0]) == close(expected.mu_macro, abs=2 * expected.error_bound)
     assert (again.value("#field-Fz"), again.value("#std-Fz"), again.value("#along")) == ("12.5 N", "0.5 N", "y0")
-    values = (again.value("#field-v0"), again.value("#start"), again.value("#curves"))
-    assert values == ("0.01 m/s", "1e-7 m", "0.01 m/s; 0.02 m/s")
+    values = (again.value("#field-v0"), again.value("#range"), again.value("#curves"))
+    assert values == ("0.01 m/s", "1e-7..0.00001 m", "0.01 m/s; 0.02 m/s")
     assert not again.find("#notice").is_displayed()
     again.click("#reset")
     assert again.number() == again.rounded(surrogate.evaluate(**START).mu_macro)

@@ -84,7 +84,7 @@ test("numbers are short, and as exact as they are known", () => {
 test("an address in the words of the command line gives the same state back", () => {
   assert.equal(toAddress(startState()), "#mu0=0.3&Fz=10N&k=1N/um&y0=2um&f=20kHz&v0=10mm/s");
   for (const address of [
-    "#mu0=0.3&Fz=10N&k=0.8..1.2N/um&y0=1e-7m&omega=130000rad/s&v0=1e-310m/s&mu0.std=5%25&Fz.std=0.5N&contact=ball&digits=all&along=y0&scale=linear&approximations=true&start=1nm&stop=2um&family=v0&curves=1mm/s;2mm/s",
+    "#mu0=0.3&Fz=10N&k=0.8..1.2N/um&y0=1e-7m&omega=130000rad/s&v0=1e-310m/s&mu0.std=5%25&Fz.std=0.5N&contact=ball&digits=all&along=y0&scale=linear&approximations=true&range=1..2000nm&family=v0&curves=1mm/s;2mm/s",
     "#mu0=0.3&Fz=10N&k=rigid&Fz_amplitude=5N&f=20kHz&v0=10mm/s&direction=normal",
   ]) {
     const { state, faults } = fromAddress(address);
@@ -99,8 +99,8 @@ for (const [address, said] of [
   ["mu0=-1", "mu0 = -1 (must be finite and > 0)"], ["k=", "k = nothing (give a number)"],
   ["v0=5 mm", "v0 = 5 mm (“mm” is not a unit of v₀"], ["along=constructor", "along = constructor (must be one of"],
   ["scale=<script>", "scale = <script> (must be one of log, linear)"], ["omega=1&f=1", "f = 1 (omega is given, too)"],
-  ["family=y0&curves=1;x", "curves = 1;x"], ["std_mu0=1&start=z", "start = z (“z” is not a number); std_mu0 = 1 (unknown)"],
-  ["along=k&start=rigid", "start = rigid (must be a number)"], ["direction=normal&y0=1um", "y0 = 1um (unknown)"],
+  ["family=y0&curves=1;x", "curves = 1;x"], ["std_mu0=1&range=z", "range = z (“z” is not an interval: write low..high); std_mu0 = 1 (unknown)"],
+  ["along=k&range=1..rigid", "range = 1..rigid (must be an interval of two numbers)"], ["direction=normal&y0=1um", "y0 = 1um (unknown)"],
   ["contact=box", "contact = box (must be one of spring, ball)"],
 ]) {
   test(`a link with ${address} is reported`, () => {

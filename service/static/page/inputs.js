@@ -144,7 +144,10 @@ function readUnit(name, text) {
 /** A typed value, in `unit` where none is typed: { value, unit }, { low, high, unit }, { rigid } or { fault }. */
 export function readValue(name, text, unit, positive = INPUTS[name].positive) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return { rigid: true };
-  if (name === "k" && text.includes("..")) return readInterval(text, unit);
+  if (name === "k" && text.includes("..")) {
+    if (about.knows.has("k_range")) return readInterval(name, text, unit);
+    return { fault: "must be one number: this service knows no interval" };
+  }
   const number = readNumber(text);
   if (number.fault) return number;
   const named = number.unit === "" ? { unit } : readUnit(name, number.unit);
@@ -156,15 +159,16 @@ export function readValue(name, text, unit, positive = INPUTS[name].positive) {
   return found === 0 && value !== 0 ? { fault: "is too small" } : { value, unit: named.unit };
 }
 
-function readInterval(text, unit) {
-  if (!about.knows.has("k_range")) return { fault: "must be one number: this service knows no interval" };
-  const [from, to, ...more] = text.split("..");
-  const high = readValue("k", to, unit);
-  const low = readValue("k", from, high.unit ?? unit);
-  const fault = more.length ? `“${text.trim()}” is not an interval: write low..high` : low.fault ?? high.fault;
+/** A typed interval "low..high": { low, high, unit }, or { fault }. */
+export function readInterval(name, text, unit) {
+  const ends = text.split("..");
+  if (ends.length !== 2) return { fault: `“${text.trim()}” is not an interval: write low..high` };
+  const high = readValue(name, ends[1], unit);
+  const low = readValue(name, ends[0], high.unit ?? unit);
+  const fault = low.fault ?? high.fault;
   if (fault) return { fault };
   if (low.rigid || high.rigid) return { fault: "must be an interval of two numbers" };
-  const first = low.unit === high.unit ? low.value : fromSI("k", si("k", low), high.unit);
+  const first = low.unit === high.unit ? low.value : fromSI(name, si(name, low), high.unit);
   if (!(first < high.value)) return { fault: "must go up: write low..high" };
   return { low: first, high: high.value, unit: high.unit };
 }
@@ -196,7 +200,7 @@ export function readCurves(name, text, unit) {
 export const startState = () => ({
   given: Object.fromEntries(Object.entries(INPUTS).map(([name, { start: [value, unit] }]) => [name, { value, unit }])),
   std: {}, rigid: false, contact: "spring", direction: "across", digits: "few",
-  along: "v0", scale: "log", approximations: false, start: null, stop: null, family: null, curves: [],
+  along: "v0", scale: "log", approximations: false, range: null, family: null, curves: [],
 });
 
 /** An input of the state [SI]; Infinity for the stiffness of a rigid contact. */
@@ -240,7 +244,7 @@ export function toAddress(state) {
   for (const key of ["contact", "direction", "digits", "along", "scale", "approximations"]) {
     if (state[key] !== usual[key]) parts.push([key, state[key]]);
   }
-  for (const end of ["start", "stop"]) if (state[end]) parts.push([end, text(state[end])]);
+  if (state.range) parts.push(["range", text(state.range)]);
   if (state.family) parts.push(["family", state.family], ["curves", state.curves.map(text).join(";")]);
   const quoted = (value) => encodeURIComponent(value).replace(/%(2F|3B)/g, decodeURIComponent);
   return `#${parts.map(([key, value]) => `${key}=${quoted(value)}`).join("&")}`;
@@ -263,10 +267,6 @@ export function fromAddress(hash) {
   };
   const choice = (key, words, use) =>
     take(key, (word) => (words.includes(word) ? word : { fault: `must be one of ${words.join(", ")}` }), use);
-  const readEnd = (text) => {
-    const found = readValue(state.along, text, INPUTS[state.along].si);
-    return found.fault || found.value !== undefined ? found : { fault: "must be a number" };
-  };
 
   for (const [name, words] of Object.entries(CHOICES)) {
     choice(name, about.knows.has(name) ? words : words.slice(0, 1), (word) => { state[name] = word; });
@@ -283,8 +283,9 @@ export function fromAddress(hash) {
   choice("along", names, (name) => { state.along = name; });
   choice("scale", ["log", "linear"], (scale) => { state.scale = scale; });
   choice("approximations", ["true", "1"], () => { state.approximations = true; });
-  for (const end of ["start", "stop"]) take(end, readEnd, (found) => { state[end] = found; });
-  choice("family", names.filter((name) => name !== state.along), (family) => {
+  const { along } = state;
+  take("range", (text) => readInterval(along, text, INPUTS[along].si), (range) => { state.range = range; });
+  choice("family", names.filter((name) => name !== along), (family) => {
     const use = (curves) => Object.assign(state, { family, curves });
     take("curves", (text) => readCurves(family, text, INPUTS[family].si), use);
   });

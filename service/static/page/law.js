@@ -1,7 +1,7 @@
 // The friction law: what is asked for it, its controls, its plot with legend and table, its downloads.
 import { Field, make } from "./form.js";
 import {
-  INPUTS, REGIMES, about, caseOf, endsOf, fromSI, inUnit, namesOf, readCurves, readValue, show, si, symbolOf, textOf,
+  INPUTS, REGIMES, about, caseOf, endsOf, fromSI, inUnit, namesOf, readCurves, readInterval, show, si, symbolOf, textOf,
   toSI, valueOf,
 } from "./inputs.js";
 import { Axis, Plot, axes, curve, draw, inside, label, line, point } from "./plots.js";
@@ -11,7 +11,6 @@ const $ = (id) => document.getElementById(id);
 const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 const DASHES = ["7 4", "2 3", "12 4", "7 3 2 3"];
-const ENDS = ["start", "stop"];
 
 /** The paper's equation numbers of an approximation or a border: "(24), (39)". */
 export const equations = ({ equations: numbers }) => numbers.map((number) => `(${number})`).join(", ");
@@ -24,9 +23,10 @@ function heading(state) {
   return `${symbolOf(state.along, unit)}${unit === "-" ? "" : ` [${unit}]`}`;
 }
 
-/** [start, stop] as quantities: what was chosen, else whole decades around the point and its border. */
-export function lawRange(state, border) {
+/** { low, high, unit } of the swept input: what was chosen, else whole decades around the point and its border. */
+function lawRange(state, border) {
   const { along, scale, given } = state;
+  if (state.range) return state.range;
   const unit = unitOf(state);
   const near = [si(along, given[along]), along === "v0" ? border : null];
   const sizes = near.filter((value) => value > 0 && Number.isFinite(value));
@@ -34,10 +34,10 @@ export function lawRange(state, border) {
   if (!sizes.length) sizes.push(toSI(along, ...usual));
   const within = sizes.map((value) => fromSI(along, Math.min(Math.max(value, LEAST), MOST), unit));
   const [low, high] = [Math.min(...within), Math.max(...within)];
-  const auto = scale === "linear"
-    ? [positive ? Number((high / 100).toPrecision(1)) : 0, Number((4 * high).toPrecision(1))]
-    : [Number(`1e${Math.floor(Math.log10(low)) - 2}`), Number(`1e${Math.ceil(Math.log10(high)) + 2}`)];
-  return ENDS.map((end, i) => state[end] ?? { value: auto[i], unit });
+  const round = (value) => Number(value.toPrecision(1));
+  if (scale === "linear") return { low: positive ? round(high / 100) : 0, high: round(4 * high), unit };
+  const decade = (exponent) => Number(`1e${exponent}`);
+  return { low: decade(Math.floor(Math.log10(low)) - 2), high: decade(Math.ceil(Math.log10(high)) + 2), unit };
 }
 
 /** [input, quantities] of the curves beside the law: those chosen, else both ends of an interval of k; or null. */
@@ -47,10 +47,10 @@ function familyOf(state) {
 }
 
 /** The question for the law itself, and that for the curves beside it; null for none. */
-export function lawQuestions(state, border) {
+function lawQuestions(state, border) {
   const { along, scale, approximations } = state;
-  const [start, stop] = lawRange(state, border).map((end) => si(along, end));
-  const range = { along, start, stop, points: POINTS, scale };
+  const { low, high, unit } = lawRange(state, border);
+  const range = { along, start: toSI(along, low, unit), stop: toSI(along, high, unit), points: POINTS, scale };
   const [name, curves] = familyOf(state) ?? [];
   const family = name && { [name]: curves.map((one) => si(name, one)) };
   return {
@@ -145,15 +145,12 @@ export class LawPanel {
       const faults = Object.entries(this.fields).filter(([, { fault }]) => fault);
       blame(faults.map(([name, { fault }]) => `${name}: ${fault}.`).join(" "));
     };
-    const end = (name) => new Field($(name), {
-      read: (text) => {
-        const found = text.trim() === "" ? null : readValue(this.state.along, text, unitOf(this.state));
-        return found && found.value === undefined ? { fault: found.fault ?? "give a number" } : found;
-      },
-      use: (found) => this.change({ [name]: found }), blame: told,
+    const range = new Field($("range"), {
+      read: (text) => (text.trim() === "" ? null : readInterval(this.state.along, text, unitOf(this.state))),
+      use: (found) => this.change({ range: found }), blame: told,
     });
     const choose = (id, read) => $(id).addEventListener("change", () => this.change(read($(id))));
-    choose("along", ({ value: along }) => ({ along, start: null, stop: null }));
+    choose("along", ({ value: along }) => ({ along, range: null }));
     choose("scale", ({ value: scale }) => ({ scale }));
     choose("approximations", ({ checked: approximations }) => ({ approximations }));
     choose("family", ({ value: family }) => ({ family: family || null, curves: this.usualCurves(family) }));
@@ -161,7 +158,7 @@ export class LawPanel {
       read: (text) => readCurves(this.state.family, text, this.state.given[this.state.family].unit),
       use: (found) => this.change({ curves: found }), blame: told,
     });
-    return { start: end("start"), stop: end("stop"), curves };
+    return { range, curves };
   }
 
   /** Half, once and twice the value of an input. */
@@ -179,8 +176,8 @@ export class LawPanel {
       $("along").replaceChildren(...options.map((one) => new Option(...one)));
       $("family").replaceChildren(new Option("none", ""), ...options.map((one) => new Option(...one)));
     }
-    const { start, stop, curves } = this.fields;
-    if (this.state?.along !== state.along) for (const field of [start, stop]) field.clear();
+    const { range, curves } = this.fields;
+    if (this.state?.along !== state.along) range.clear();
     if (this.state?.family !== state.family) curves.clear();
     this.state = state;
     for (const name of ["along", "scale"]) $(name).value = state[name];
@@ -189,10 +186,8 @@ export class LawPanel {
     $("approximations").checked = state.approximations;
     $("curves-label").hidden = $("curves-hint").hidden = !state.family;
     curves.show(state.curves.map((one) => textOf(one)).join("; "));
-    lawRange(state, border).forEach((quantity, i) => {
-      $(ENDS[i]).placeholder = textOf(quantity, 6);
-      this.fields[ENDS[i]].show(state[ENDS[i]] ? textOf(state[ENDS[i]]) : "");
-    });
+    range.input.placeholder = textOf(lawRange(state, border), 6);
+    range.show(state.range ? textOf(state.range) : "");
   }
 
   /** Asks for what the state needs; `again` even if it was asked for. */

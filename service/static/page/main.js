@@ -91,7 +91,7 @@ let addressTimer = null;
 function change(changed) {
   Object.assign(state, changed);
   const names = namesOf(state);
-  if (!names.includes(state.along)) Object.assign(state, { along: "v0", start: null, stop: null });
+  if (!names.includes(state.along)) Object.assign(state, { along: "v0", range: null });
   if (!names.includes(state.family) || state.family === state.along) Object.assign(state, { family: null, curves: [] });
   form.sync(state);
   solver.sync(state);
