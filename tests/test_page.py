@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from browser import START
+from browser import KNOWING, START
 from comparing import close
 from mumacro import closed_forms
 from mumacro.inputs import UNITS_OF
@@ -187,6 +187,9 @@ def test_the_page_is_accessible(open_page, repository, width):
     page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
     assert inaccessible(page, repository) == {}
     assert page.complaints() == []
+    with open_page.faked(KNOWING, "#contact=ball&direction=normal", width=width) as page:
+        page.settle()
+        assert inaccessible(page, repository) == {}
 
 
 def test_the_description_is_accessible_and_leads_back(open_page, repository, surrogate):

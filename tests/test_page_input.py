@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from browser import START
+from browser import KNOWING, START
 from comparing import close
 
 pytestmark = pytest.mark.slow
@@ -169,105 +169,73 @@ def test_every_trouble_of_the_service_has_its_own_message(open_page, answered_by
     assert page.text("#status") == ""
 
 
-@pytest.fixture
-def faked(open_page):
-    """Opens the page with a function in the place of ``fetch`` from its first question on; ``real`` is the true one."""
-    added = []
-
-    def opened(function, address="", **size):
-        script = f"const real = window.fetch; window.fetch = {function};"
-        call = open_page.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": script})
-        added.append(call["identifier"])
-        return open_page(address, new=True, wait=False, **size)
-
-    yield opened
-    for identifier in added:
-        open_page.browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": identifier})
-    open_page.shown = None
-
-
-def test_the_start_is_calm_while_the_service_is_not_ready(faked, surrogate):
-    page = faked(
+def test_the_start_is_calm_while_the_service_is_not_ready(open_page, surrogate):
+    unready = (
         "async (path, options) => (window.ready || path.includes('names.json') ? real(path, options) : new Response("
         "'{\"detail\": \"the tables are not loaded yet\"}', { status: 503, headers: { 'Retry-After': '1' } }))"
     )
-    said = "^The service cannot answer now: the tables are not loaded yet. Asking again by itself.$"
-    page.wait_for("#status", said)  # no word of earlier values: there are none
-    assert not page.is_red("#status")
-    assert page.text("#law-status") == page.text("#solve-status") == ""
-    assert page.run("return document.querySelectorAll('[aria-invalid=true]').length;") == 0
-    assert (page.text("#mu"), page.is_old()) == ("…", True)
-    page.run("window.ready = true;")
-    page.settle()
-    assert page.text("#status") == ""
-    assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
-
-
-#: a service that knows contacts, directions and intervals of k, and answers as for one spring across
-KNOWING = """async (path, options = {}) => {
-  window.asked ??= [];
-  const say = (body) => new Response(JSON.stringify(body));
-  if (path.includes('names.json')) {
-    const told = await (await real(path)).json();
-    return say({ ...told, knows: [...told.knows, 'contact', 'direction', 'k_range'] });
-  }
-  if (options.method !== 'POST') return real(path, options);
-  const { contact, direction, k_range, Fz_amplitude, ...body } = JSON.parse(options.body);
-  window.asked.push([path, JSON.parse(options.body)]);
-  if (direction === 'normal' && body.along !== 'y0') body.y0 = 1e-6;
-  const ask = async (k) => (await real(path, { ...options, body: JSON.stringify({ ...body, k }) })).json();
-  if (!k_range) return say(await ask(body.k));
-  const [low, high] = await Promise.all(k_range.map(ask));
-  const [mu_macro_high, mu_macro_low] = [low.mu_macro, high.mu_macro];
-  return say({ ...low, mu_macro: (mu_macro_low + mu_macro_high) / 2, mu_macro_low, mu_macro_high });
-}"""
+    with open_page.faked(unready) as page:
+        said = "^The service cannot answer now: the tables are not loaded yet. Asking again by itself.$"
+        page.wait_for("#status", said)  # no word of earlier values: there are none
+        assert not page.is_red("#status")
+        assert page.text("#law-status") == page.text("#solve-status") == ""
+        assert page.run("return document.querySelectorAll('[aria-invalid=true]').length;") == 0
+        assert (page.text("#mu"), page.is_old()) == ("…", True)
+        page.run("window.ready = true;")
+        page.settle()
+        assert page.text("#status") == ""
+        assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
 
 
 def last_asked(page, path):
     return page.run(f"return window.asked.filter(([path]) => path === '{path}').at(-1)[1];")
 
 
-def test_contact_and_direction_are_offered_where_the_service_knows_them(faked):
-    page = faked(KNOWING).settle()
-    assert "contact" not in last_asked(page, "v1/mu-macro")
-    for choice in ("contact", "direction"):
-        assert page.find(f"fieldset[data-needs={choice}]").is_displayed()
-    page.click("[name=contact][value=ball]")
-    page.click("[name=direction][value=normal]")
-    for path in ("v1/mu-macro", "v1/law"):
-        asked = last_asked(page, path)
-        assert (asked["contact"], asked["direction"], asked["Fz_amplitude"]) == ("ball", "normal", 5)
-        assert "y0" not in asked
-    assert page.text("#model").startswith("Model: a ball (Hertz) with the initial stiffness k, an oscillating normal")
-    assert page.find("#field-Fz_amplitude").is_displayed()
-    assert not page.find("#field-y0").is_displayed()
-    assert "does not hold" in page.text("#map-out")
-    link = page.find("#link").get_attribute("href")
-    assert "contact=ball&direction=normal" in link
-    assert "Fz_amplitude=5N" in link
-    page.click("[name=direction][value=along]")
-    page.find("#solve-form button").click()
-    page.wait_for("#roots", "y₀ = ")
-    assert last_asked(page, "v1/solve-for")["direction"] == "along"
-    page.click("#reset")
-    assert (page.text("#map-out"), page.find("#field-y0").is_displayed()) == ("", True)
-    assert page.complaints() == []
+def test_contact_and_direction_are_offered_where_the_service_knows_them(open_page):
+    with open_page.faked(KNOWING) as page:
+        page.settle()
+        assert "contact" not in last_asked(page, "v1/mu-macro")
+        for choice in ("contact", "direction"):
+            assert page.find(f"fieldset[data-needs={choice}]").is_displayed()
+        page.click("[name=contact][value=ball]")
+        page.click("[name=direction][value=normal]")
+        for path in ("v1/mu-macro", "v1/law"):
+            asked = last_asked(page, path)
+            assert (asked["contact"], asked["direction"], asked["Fz_amplitude"]) == ("ball", "normal", 5)
+            assert "y0" not in asked
+        assert page.text("#model").startswith(
+            "Model: a ball (Hertz) with the initial stiffness k, an oscillating normal"
+        )
+        assert page.find("#field-Fz_amplitude").is_displayed()
+        assert not page.find("#field-y0").is_displayed()
+        assert "does not hold" in page.text("#map-out")
+        link = page.find("#link").get_attribute("href")
+        assert "contact=ball&direction=normal" in link
+        assert "Fz_amplitude=5N" in link
+        page.click("[name=direction][value=along]")
+        page.find("#solve-form button").click()
+        page.wait_for("#roots", "y₀ = ")
+        assert last_asked(page, "v1/solve-for")["direction"] == "along"
+        page.click("#reset")
+        assert (page.text("#map-out"), page.find("#field-y0").is_displayed()) == ("", True)
+        assert page.complaints() == []
 
 
-def test_an_interval_of_the_stiffness_gives_an_interval_of_friction(faked, surrogate):
-    page = faked(KNOWING).settle()
-    page.type("#field-k", "0.8..1.2 N/um")
-    assert page.value("#field-k") == "0.8..1.2 N/µm"
-    assert last_asked(page, "v1/mu-macro")["k_range"] == close([8e5, 1.2e6], rel=1e-15)
-    ends = sorted(float(surrogate.evaluate(**{**START, "k": k}).mu_macro) for k in (8e5, 1.2e6))
-    page.wait_for("#uncertainty", rf"^{ends[0]:.3f} to {ends[1]:.3f} for k = 0.8..1.2 N/µm$")
-    assert page.text("#mu") == f"{sum(ends) / 2:.3f}"
-    legend = page.run("return [...document.querySelectorAll('#legend li')].map((item) => item.textContent);")
-    assert legend == ["k = 0.8 N/µm", "k = 1.2 N/µm"]
-    assert "k=0.8..1.2N/um" in page.find("#link").get_attribute("href")
-    page.type("#field-k", "1.2..0.8")
-    assert page.text("#fault-k") == "k: must go up: write low..high."
-    assert page.complaints() == []
+def test_an_interval_of_the_stiffness_gives_an_interval_of_friction(open_page, surrogate):
+    with open_page.faked(KNOWING) as page:
+        page.settle()
+        page.type("#field-k", "0.8..1.2 N/um")
+        assert page.value("#field-k") == "0.8..1.2 N/µm"
+        assert last_asked(page, "v1/mu-macro")["k_range"] == close([8e5, 1.2e6], rel=1e-15)
+        ends = sorted(float(surrogate.evaluate(**{**START, "k": k}).mu_macro) for k in (8e5, 1.2e6))
+        page.wait_for("#uncertainty", rf"^{ends[0]:.3f} to {ends[1]:.3f} for k = 0.8..1.2 N/µm$")
+        assert page.text("#mu") == f"{sum(ends) / 2:.3f}"
+        legend = page.run("return [...document.querySelectorAll('#legend li')].map((item) => item.textContent);")
+        assert legend == ["k = 0.8 N/µm", "k = 1.2 N/µm"]
+        assert "k=0.8..1.2N/um" in page.find("#link").get_attribute("href")
+        page.type("#field-k", "1.2..0.8")
+        assert page.text("#fault-k") == "k: must go up: write low..high."
+        assert page.complaints() == []
 
 
 def test_a_service_that_does_not_know_them_is_not_asked(open_page):
