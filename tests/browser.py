@@ -120,10 +120,11 @@ class Page:
         )
 
     def settle(self):
-        """Wait until every request that follows from the state is answered."""
+        """Wait until every request that follows from the state is answered, and what follows is drawn."""
         self.run(
             "while (document.getElementById('main')?.dataset.asking !== 'false')"
             " await new Promise((next) => setTimeout(next, 10));"
+            "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
         return self
 
@@ -195,7 +196,6 @@ class Page:
     def place(self, name):
         """Where the user's point is drawn in a plot, as shares of it: left to right, top to bottom."""
         return self.run(
-            "await new Promise(requestAnimationFrame); await new Promise(requestAnimationFrame);"
             f"const [plot, point] = ['#{name}', '#{name} .point'].map((one) =>"
             " document.querySelector(one).getBoundingClientRect());"
             "return [(point.x + point.width / 2 - plot.x) / plot.width,"

@@ -100,7 +100,7 @@ def test_uncertainties_and_their_shares(open_page, surrogate):
     answer = surrogate.evaluate(**START, gradient=True)
     parts = {"mu0": 0.01 * answer.gradient["mu0"], "y0": 1e-7 * answer.gradient["y0"]}
     std = math.hypot(*parts.values())
-    page.wait_for("#uncertainty", f"^± {std:.3g} \\(one standard deviation\\)$")
+    page.wait_for("#uncertainty", f"^± {std:.2g} \\(one standard deviation\\)$")
     assert page.text("#mu") == f"{answer.mu_macro:.3f}"  # the second digit of 0.015
     for name in START:
         assert page.text(f"#share-{name}") == f"{100 * (parts.get(name, 0) / std) ** 2:.1f} %"

@@ -39,10 +39,10 @@ function uncertainty(found, state) {
   const ends = endsOf(state) && [low, high].map((value) => friction(value, high - low)).join(" to ");
   const parts = ends ? [`${ends} for k = ${textOf(state.given.k, 4)}`] : [];
   if (std === null) parts.push("± not finite: the slope is infinite here");
-  else if (found.std_first_order_enough) parts.push(`± ${show(std, 3)} (one standard deviation)`);
+  else if (found.std_first_order_enough) parts.push(`± ${show(std, 2)} (one standard deviation)`);
   else if (std !== undefined) {
-    const why = `from samples; first order, ${show(std, 3)}, is not accurate enough here`;
-    parts.push(`± ${show(sampled, 3)} (one standard deviation, ${why})`);
+    const why = `from samples; first order, ${show(std, 2)}, is not accurate enough here`;
+    parts.push(`± ${show(sampled, 2)} (one standard deviation, ${why})`);
   }
   return parts.join("; ");
 }

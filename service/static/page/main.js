@@ -117,8 +117,8 @@ function ask() {
   busy();
 }
 
-function readAddress() {
-  const read = fromAddress(location.hash);
+function readAddress({ newURL }) {
+  const read = fromAddress(new URL(newURL).hash); // the address line itself may hold an earlier state by now
   state = read.state;
   form.sync(state);
   form.clear();
@@ -258,7 +258,7 @@ function build(names) {
     channel: (topic, question, use) => channel(lawStatus, topic, question, use),
   });
   solver = new Solver(setValue);
-  readAddress();
+  readAddress({ newURL: location.href });
   askMap.push(null);
   addEventListener("hashchange", readAddress);
   onKey(() => {
