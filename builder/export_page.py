@@ -13,6 +13,7 @@ import json
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 from mumacro import MumacroError, Surrogate
 from mumacro.page import POLICY, map_of, names
@@ -24,11 +25,6 @@ _FOLDER = Path(__file__).resolve().parent.parent / "service" / "static" / "page"
 _POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'").replace(
     "; frame-ancestors 'none'", ""
 )  # browsers ignore frame-ancestors in a meta element
-
-_ABOUT = (
-    "Everything here is computed in this browser, from the table {}, without a server. Not offered here: "
-    "solving for an input, uncertainties, and the approximations beside the law."
-)
 
 
 class PageError(MumacroError):
@@ -53,20 +49,30 @@ def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
     for path in _FOLDER.glob("*.*s"):  # scripts and styles
         shutil.copyfile(path, parts / path.name)
     shutil.copyfile(_FOLDER.parent / "alone" / "service.js", parts / "service.js")
-    (parts / "mumacro.wasm").write_bytes(module)
-    for name, content in (("names.json", names(guide=False)), ("map.json", map_of(surrogate))):
-        (parts / name).write_text(json.dumps(content, separators=(",", ":")), "utf-8")
-    about = html.escape(f"{surrogate.id}, tolerance {surrogate.tolerance:g}, checksum {surrogate.checksum[:12]}")
+    made = {"mumacro.wasm": module, "names.json": _json(names()), "map.json": _json(map_of(surrogate))}
+    for name, content in made.items():
+        (parts / name).write_bytes(content)
     text = (_FOLDER / "index.html").read_text("utf-8")
     for place, new in (
         ("<title>", f'<meta http-equiv="Content-Security-Policy" content="{html.escape(_POLICY)}">\n<title>'),
-        ("<body>", '<body class="alone">'),
-        ("</header>", f'<p id="alone" class="notice">{_ABOUT.format(about)}</p>\n</header>'),
+        ("</header>", f'<p id="alone" class="notice">{_about(surrogate)}</p>\n</header>'),
     ):
         before, after = text.split(place)  # occurs once
         text = before + new + after
     (out / "index.html").write_text(text, "utf-8")
     return surrogate
+
+
+def _json(content: Any) -> bytes:
+    return json.dumps(content, separators=(",", ":")).encode()
+
+
+def _about(surrogate: Surrogate) -> str:
+    name = html.escape(f"{surrogate.id}, tolerance {surrogate.tolerance:g}, checksum {surrogate.checksum[:12]}")
+    return (
+        f"Everything here is computed in this browser, from the table {name}, without a server. Not offered here: "
+        "solving for an input, uncertainties, and the approximations beside the law."
+    )
 
 
 def main(words: list[str]) -> int:
