@@ -8,7 +8,7 @@ from starlette.responses import Response
 from mumacro.page import POLICY, map_of, names
 
 from .. import __version__
-from ..case import CaseRequest
+from ..options import CaseRequest
 from ..wire.json import dump
 from . import Endpoint, file_answer, in_thread, reply
 
