@@ -8,8 +8,6 @@ is not read: other flags give other bits.  Two variables change what is made:
     MUMACRO_BUILD_PLATFORM=win_amd64  by zig for one of the platforms in pyproject.toml, [tool.mumacro.wheels]
 """
 
-from __future__ import annotations
-
 import functools
 import os
 import shlex
@@ -27,11 +25,9 @@ from packaging.tags import platform_tags
 ROOT = Path(__file__).resolve().parent
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
 TARGETS: dict[str, str] = SETTINGS["wheels"]
-ZIG = [sys.executable, "-m", "ziglang", "cc"]
-OPTIMIZED = ["-O3", "-DNDEBUG"]
 DEBUG = ["-O0", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 FLAGS = ["-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC"]
-FLAGS += DEBUG if os.environ.get("MUMACRO_BUILD_DEBUG") else OPTIMIZED
+FLAGS += DEBUG if os.environ.get("MUMACRO_BUILD_DEBUG") else ["-O3", "-DNDEBUG"]
 AVX2 = ["-mavx2", "-mfma"]
 AVX512 = [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx512bw", "-mprefer-vector-width=512"]
 NO_COMPILER = "No C compiler works here (tried cc, clang and gcc)"
@@ -51,49 +47,36 @@ def own_platform() -> str:
 @functools.cache
 def local_compiler() -> list[str]:
     """The compiler of this machine, tried on a small program: it may lack headers or AVX-512.  Empty if none works."""
-    named = os.environ.get("CC")
+    named, last = os.environ.get("CC"), list(levels(own_platform()).values())[-1]
     # gcc for Windows stores AVX registers at addresses that are not aligned (GCC bug 54412): the program would crash.
-    names = [named] if named else [] if os.name == "nt" else ["cc", "clang", "gcc"]
-    last = list(levels(own_platform()).values())[-1]
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "probe.c").write_text(PROBE, "utf-8")
-        for name in names:
-            words = shlex.split(name, posix=os.name != "nt")
+    for name in [named] if named else [] if os.name == "nt" else ["cc", "clang", "gcc"]:
+        words = shlex.split(name, posix=os.name != "nt")
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "probe.c").write_text(PROBE, "utf-8")
             command = [*words, *FLAGS, *last, "-shared", "probe.c", "-o", "probe.so"]
             try:
                 subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - the user's compiler
+                return words
             except (OSError, subprocess.CalledProcessError):
                 continue
-            return words
     if named:
-        raise SystemExit(
-            f"CC={named} makes no shared object with {shlex.join(FLAGS + last)}: name another, or unset CC"
-        )
+        sys.exit(f"CC={named} makes no shared object with {shlex.join(FLAGS + last)}: name another, or unset CC")
     return []
 
 
 def choose(platform: str | None) -> tuple[list[str], str]:
     """The command that compiles for a platform of ``TARGETS``, or without one for this machine; the platform."""
     if platform and platform not in TARGETS:
-        raise SystemExit(f"MUMACRO_BUILD_PLATFORM={platform} is not one of {', '.join(TARGETS)}")
+        sys.exit(f"MUMACRO_BUILD_PLATFORM={platform} is not one of {', '.join(TARGETS)}")
     if not platform and (local := local_compiler()):
         return local, own_platform()
     if DEBUG[0] in FLAGS:
-        raise SystemExit("MUMACRO_BUILD_DEBUG needs gcc or clang on this machine: zig has no sanitizer for addresses")
+        sys.exit("MUMACRO_BUILD_DEBUG needs gcc or clang on this machine: zig has no sanitizer for addresses")
     if not find_spec("ziglang"):
-        raise SystemExit(f"{NO_COMPILER}: install one, or the package ziglang (pip install ziglang)")
-    if not platform:
-        platform = next((tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None)
+        sys.exit(f"{NO_COMPILER}: install one, or the package ziglang (pip install ziglang)")
+    platform = platform or next((tags for tags in TARGETS if {*tags.split(".")} & {*platform_tags()}), None)
     target = ["-target", TARGETS[platform]] if platform else ["-mcpu=baseline"]
-    return [*ZIG, *target, "-s"], platform or own_platform()
-
-
-def run_together(commands: list[list[str]], folder: str) -> None:
-    """Run commands at the same time; what they print goes to the user."""
-    jobs = [subprocess.Popen(command, cwd=folder) for command in commands]  # noqa: S603 - written in this file
-    codes = [job.wait() for job in jobs]
-    if any(codes):
-        raise SystemExit("The C compiler failed: see above")
+    return [sys.executable, "-m", "ziglang", "cc", *target, "-s"], platform or own_platform()
 
 
 def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
@@ -102,16 +85,16 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     name = "_kernel.dll" if platform.startswith("win") else "_kernel.so"
     # musl has another file name on every system; it is always there, Python has loaded it.
     libraries = {"win": [], "mus": ["-nostdlib"]}.get(platform[:3], ["-lm"])
-    sources = ROOT / "mumacro" / "kernel"
-    objects = {
-        f"{level}.o": [f"{sources / 'level.c'}", f"-DMUMACRO_LEVEL={level}", *flags]
-        for level, flags in levels(platform).items()
-    }
-    objects["dispatch.o"] = [f"{sources / 'dispatch.c'}", *(f"-DMUMACRO_HAS_{x.upper()}" for x in levels(platform))]
-    objects["xla.o"] = [f"{sources / 'xla.c'}", f"-I{ROOT / 'third_party'}", "-std=c11"]
+    sources, has = ROOT / "mumacro" / "kernel", levels(platform)
+    objects = {f"{level}.o": ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in has.items()}
+    objects["dispatch.o"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in has)]
+    objects["xla.o"] = ["xla.c", f"-I{ROOT / 'third_party'}", "-std=c11"]
+    compiling = [[f"{sources / file}", *words, "-c", "-o", made] for made, (file, *words) in objects.items()]
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        run_together([[*command, *FLAGS, *words, "-c", "-o", made] for made, words in objects.items()], place)
-        run_together([[*command, *FLAGS, "-shared", *objects, "-o", name, *libraries]], place)
+        for words in (compiling, [["-shared", *objects, "-o", name, *libraries]]):  # each list at the same time
+            jobs = [subprocess.Popen([*command, *FLAGS, *one], cwd=place) for one in words]  # noqa: S603 - see above
+            if sum(job.wait() != 0 for job in jobs):  # waits for all
+                sys.exit("The C compiler failed: see above")
         # A running program keeps the old file: the new one takes its place and is not written into it.
         return (Path(place) / name).replace(folder / name), platform
 
@@ -128,7 +111,7 @@ class KernelHook(BuildHookInterface[Any]):
         return [SETTINGS["zig"]]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile, in place or into a folder of its own that ends with the wheel."""
+        """Compile, in place or into a folder of its own that ends with the process."""
         if version == "editable":
             build(ROOT / "mumacro")
             return
@@ -136,11 +119,6 @@ class KernelHook(BuildHookInterface[Any]):
         path, platform = build(Path(self.folder.name), os.environ.get("MUMACRO_BUILD_PLATFORM"))
         build_data["force_include"][str(path)] = f"mumacro/{path.name}"
         build_data |= {"tag": f"py3-none-{platform}", "pure_python": False}
-
-    def finalize(self, *_: Any) -> None:
-        """Remove that folder."""
-        if hasattr(self, "folder"):
-            self.folder.cleanup()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import argparse
 import hashlib
 import resource
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import process_time
@@ -24,14 +24,15 @@ from typing import Any
 
 import dask
 import numpy as np
+import xarray as xr
 from measuring import machine, markdown, progress, quantity, write_section
+from scipy.stats import qmc
 
 from builder.assemble import build_table
 from builder.sweep import CHUNK, COLUMNS, Sweep, solve_chunk
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from mumacro.processors import processors
-from mumacro.scale import sobol
 
 PAGE = measuring.ROOT / "docs" / "scale.md"
 PACKAGES = ("dask", "distributed", "xarray")
@@ -40,14 +41,29 @@ CORES = 64  # of the plan's cluster
 Reduced = tuple[float, float, float, int]
 
 
+def points(block_info: Any = None) -> Any:
+    """One chunk in (0, 1): a scrambled Sobol set of its own."""
+    (place, _), (n, inputs) = block_info[None]["chunk-location"], block_info[None]["chunk-shape"]
+    sequence = qmc.Sobol(inputs, bits=52, rng=np.random.default_rng([0, place]))
+    return sequence.random_base2((n - 1).bit_length())[:n] + 0.5**53
+
+
 def design(n: int) -> Any:
-    """``n`` cases of six inputs, all varying over decades."""
+    """``n`` cases of six inputs, all varying over decades, in chunks of 2^20."""
+    import dask.array as da
 
-    def over(low: float, high: float) -> Callable[[Any], Any]:
-        return lambda u: np.exp(np.log(low) + np.log(high / low) * u)
+    ranges = {"mu0": (0.1, 1.0), "Fz": (1, 100), "k": (1e5, 1e8), "y0": (1e-7, 1e-5), "omega": (1e3, 1e6),
+              "v0": (1e-4, 1.0)}  # fmt: skip
+    sizes = da.core.normalize_chunks(2**20, (n,))[0]
+    u = da.map_blocks(points, chunks=(sizes, (len(ranges),)), dtype=float, meta=np.empty((0, 0)))
 
-    return sobol(n, mu0=over(0.1, 1.0), Fz=over(1, 100), k=over(1e5, 1e8), y0=over(1e-7, 1e-5), omega=over(1e3, 1e6),
-                 v0=over(1e-4, 1.0))  # fmt: skip
+    def over(shares: Any, low: float, high: float) -> Any:
+        return np.exp(np.log(low) + np.log(high / low) * shares)
+
+    columns = {
+        name: ("case", u[:, i].map_blocks(over, *ends, dtype=float)) for i, (name, ends) in enumerate(ranges.items())
+    }
+    return xr.Dataset(columns)
 
 
 def lazy(surrogate: Surrogate, n: int) -> Reduced:

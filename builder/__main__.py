@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from argparse import ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from mumacro import InputError, Surrogate
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, open_table, run
@@ -19,19 +20,20 @@ from mumacro.writing import alone_in
 __all__ = ["main"]
 
 
-@contextmanager
-def _bar(stages: int) -> Iterator[Callable[[str, bool], None]]:
-    """A bar on stderr; nothing where rich is not installed."""
-    try:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-    except ModuleNotFoundError:
-        yield lambda _text, _done: None
-        return
-    columns = (TextColumn("{task.description:<32}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("border", total=stages)
-        yield lambda text, done: bar.update(task, description=text, advance=1 if done else 0)
+class _Bar:
+    """Progress as a line on stderr: one that is written again on a terminal, elsewhere one for each finished stage."""
+
+    def __init__(self, stages: int) -> None:
+        self.stages, self.done, self.start = stages, 0, time.monotonic()
+
+    def __call__(self, text: str, done: bool) -> None:
+        self.done += done
+        bar = ("#" * round(30 * self.done / self.stages)).ljust(30, ".")
+        line = f"{bar} {self.done:2d}/{self.stages} {time.monotonic() - self.start:6.0f} s  {text:<32}"
+        if sys.stderr.isatty():
+            print(f"\r{line}", end="\n" if self.done == self.stages else "", file=sys.stderr, flush=True)
+        elif done:
+            print(line.rstrip(), file=sys.stderr)
 
 
 def _place(out: Path, folder: bool = False) -> None:
@@ -52,8 +54,8 @@ def _build(chosen: Namespace) -> str:
     _place(out)
     checkpoint = out.with_name(out.name + ".checkpoint")
     try:
-        with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep, _bar(stages()) as progress:
-            surrogate = build_table(out, tolerance, sweep, progress)
+        with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep:
+            surrogate = build_table(out, tolerance, sweep, _Bar(stages()))
     except (BuildError, SolveError) as error:
         raise ImpossibleError(str(error)) from error
     return as_json({
@@ -76,9 +78,8 @@ def _solve(chosen: Namespace) -> int:
 
 
 def _verify(chosen: Namespace) -> int:
-    from .assemble import ABS_TO_REL
     from .sweep import SolveError, Sweep
-    from .verify import uncovered, verify
+    from .verify import holds, verify
 
     surrogate = Surrogate.open(chosen.table)
     try:
@@ -86,12 +87,7 @@ def _verify(chosen: Namespace) -> int:
             report = verify(surrogate, sweep, chosen.points, chosen.seed)
     except SolveError as error:
         raise ImpossibleError(str(error)) from error
-    report["tolerance"] = surrogate.tolerance
-    report["holds"] = (
-        report["max_abs_error"] <= surrogate.tolerance
-        and report["max_rel_error"] <= ABS_TO_REL * surrogate.tolerance
-        and not any(uncovered(report).values())
-    )
+    report |= {"tolerance": surrogate.tolerance, "holds": holds(report, surrogate.tolerance)}
     print(as_json(report))
     if not report["holds"]:
         raise ImpossibleError(f"{chosen.table} misses its tolerance of {surrogate.tolerance:g} or a bound")
@@ -153,14 +149,16 @@ def _parser(prog: str) -> OneLineParser:
         made.set_defaults(run=run, title=made.prog)
         return made
 
-    def add_workers(made: OneLineParser) -> None:
-        made.add_argument("--workers", type=_whole(1, 1024), default=processors(), help="threads; default: %(default)s")
-
+    workers: dict[str, Any] = {
+        "default": processors(),
+        "type": _whole(1, 1024),
+        "help": "threads; default: %(default)s",
+    }
     one = command(_build, "Build a table; a killed build resumes from OUT.checkpoint and gives the same data.")
     one.add_argument("--out", type=Path, required=True, help="the netCDF file to write")
     text = "largest absolute error of mu_macro/mu0; the relative one may be 10 times it; default: %(default)s"
     one.add_argument("--tolerance", type=float, default=1e-8, help=text)
-    add_workers(one)
+    one.add_argument("--workers", **workers)
     one = command(_solve, "Solve the full model once and print the steady cycle as JSON.")
     one.add_argument("--v", type=float, required=True, help="dimensionless speed v~, from 1e-60 to 1e10")
     one.add_argument("--y", type=float, required=True, help="dimensionless amplitude y~, from 1e-15 to 1e14")
@@ -169,7 +167,7 @@ def _parser(prog: str) -> OneLineParser:
     text = "fresh solves to compare with; default: %(default)s"
     one.add_argument("--points", type=_whole(100, 10_000_000), default=20_000, help=text)
     one.add_argument("--seed", type=_whole(0), default=1, help="seed of the drawn points; default: %(default)s")
-    add_workers(one)
+    one.add_argument("--workers", **workers)
     one = command(_export, "Write a table for other tools; print what was written as JSON.")
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
     text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"

@@ -12,21 +12,20 @@ import numpy as np
 
 from mumacro import Surrogate
 from mumacro.border import Border
-from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES
-from mumacro.table import Block, BorderPiece, Table, write_table
+from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
+from mumacro.table import Block, Table, write_table
 from mumacro.version import __version__
 
 from .blocks import build_block, build_border
 from .measure import block_errors
-from .quantities import SOLVED
+from .quantities import ABS_TO_REL, SOLVED
 from .rounding import bits, round_block, to_bits
 from .sweep import Sweep
-from .verify import uncovered, verify
+from .verify import holds, uncovered, verify
 
 __all__ = ["ABS_TO_REL", "MAX_TOLERANCE", "MIN_TOLERANCE", "BuildError", "build_table", "stages"]
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
-ABS_TO_REL = 10.0  # the table's largest relative error may be this many times its tolerance
 SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
 #: the same in every cell.  Less, since nothing is left to chance there: the error of a cell is known on 17 x 17 of its
 #: points, edges included; what is allowed for is the rest that the finer interpolant misses, see builder/cell_errors.py
@@ -59,22 +58,12 @@ def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
     v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)
     solved = sweep.solve("full", v[:, None], y[None, :])
     crit = sweep.solve("border", np.ones_like(y), y)["deficit"]
-    mu = to_bits(solved["mu_ratio"], bits(tolerance))
-    stick = to_bits(solved["stick_fraction"], bits(tolerance))
+    mu, stick = (to_bits(solved[name], bits(tolerance)) for name in ("mu_ratio", "stick_fraction"))
     error = to_bits(solved["error_estimate"] + np.abs(mu - solved["mu_ratio"]), ERROR_BITS, up=True)
     return {
         "v_tilde": v, "y_tilde": y, "mu_ratio": mu, "stick_fraction": stick, "error_estimate": error,
         "v_tilde_crit": crit,
     }  # fmt: skip
-
-
-def _border_errors(border: Border, pieces: list[BorderPiece], sweep: Sweep) -> None:
-    rng = np.random.default_rng(23)
-    y = 10.0 ** rng.uniform(-4.0, 6.0, 600)
-    exact = sweep.solve("border", np.ones_like(y), y)["deficit"]
-    worst = float(np.abs(border(y) / exact - 1.0).max())
-    for piece in pieces:
-        piece.max_rel_error = SAFETY * worst
 
 
 def build_table(
@@ -93,15 +82,20 @@ def build_table(
     BuildError
         When the verified error does not come below the tolerance.
     """
-    pieces = build_border(sweep, tolerance)
-    border = Border(pieces)
-    _border_errors(border, pieces, sweep)
+    border = Border(pieces := build_border(sweep, tolerance))
+    y = 10.0 ** np.random.default_rng(23).uniform(-4.0, 6.0, 600)
+    exact = sweep.solve("border", np.ones_like(y), y)["deficit"]
+    for piece in pieces:
+        piece.max_rel_error = SAFETY * float(np.abs(border(y) / exact - 1.0).max())
     progress("border", True)
     targets = [tolerance] * len(CHARTS)
+
+    def build(i: int) -> Block:
+        return round_block(build_block(i, border, sweep, targets[i], lambda text: progress(text, False)), targets[i])
+
     blocks: list[Block] = []
     for i, chart in enumerate(CHARTS):
-        block = build_block(i, border, sweep, targets[i], lambda text: progress(text, False))
-        blocks.append(round_block(block, targets[i]))
+        blocks.append(build(i))
         progress(chart.name, True)
     grid = plain_grid(sweep, tolerance)
     progress("plain grid", True)
@@ -113,10 +107,9 @@ def build_table(
             break
         for i in late:
             targets[i] /= 3.0
-            block = build_block(i, border, sweep, targets[i], lambda text: progress(text, False))
-            blocks[i] = round_block(block, targets[i])
+            blocks[i] = build(i)
     progress("errors of the blocks", True)
-    return finish_table(table, out, targets, sweep, progress)
+    return _finish(table, out, targets, sweep, progress)
 
 
 def _state_errors(table: Table, out: Path, sweep: Sweep, seed: int) -> list[int]:
@@ -134,7 +127,14 @@ def _state_errors(table: Table, out: Path, sweep: Sweep, seed: int) -> list[int]
     return late
 
 
-def finish_table(
+def _verified(quantity: Quantity, found: dict[str, Any]) -> tuple[str, float]:
+    """Name and value of the attribute that states the verified error of a quantity."""
+    if SOLVED[quantity.name].relative:
+        return f"verified_max_rel_{quantity.variable}_error", found["max_rel_error"]
+    return f"verified_max_{quantity.variable}_error", found["max_abs_error"]
+
+
+def _finish(
     table: Table, out: Path, targets: list[float], sweep: Sweep, progress: Callable[[str, bool], None]
 ) -> Surrogate:
     """Verify the table on fresh solves, write it to ``out`` with its provenance, and open it."""
@@ -142,8 +142,8 @@ def finish_table(
     surrogate = Surrogate(table, out)
     report = verify(surrogate, sweep, FINAL_POINTS)
     progress("fresh solves", True)
-    missed = {what: count for what, count in uncovered(report).items() if count}
-    if report["max_abs_error"] > tolerance or report["max_rel_error"] > ABS_TO_REL * tolerance or missed:
+    if not holds(report, tolerance):
+        missed = {what: count for what, count in uncovered(report).items() if count}
         raise BuildError(
             f"verified error {report['max_abs_error']:.2e} absolute, {report['max_rel_error']:.2e} relative against a "
             f"tolerance of {tolerance:.0e} and {ABS_TO_REL * tolerance:.0e}; outside their bound: {missed or 'none'}; "
@@ -163,14 +163,7 @@ def finish_table(
         "quantities": " ".join(table.quantities),
         "verified_max_abs_error": report["max_abs_error"],
         "verified_max_rel_error": report["max_rel_error"],
-        **{
-            f"verified_max_rel_{q.variable}_error"
-            if SOLVED[q.name].relative
-            else f"verified_max_{q.variable}_error": report[q.name][
-                "max_rel_error" if SOLVED[q.name].relative else "max_abs_error"
-            ]
-            for q in QUANTITIES[1:]
-        },
+        **dict(_verified(quantity, report[quantity.name]) for quantity in QUANTITIES[1:]),
         "verified_max_slope_error": report["slopes"]["mu_ratio"]["max_abs_error"],
         "verified_points": np.int32(report["points"]),
         "n_solves": np.int32(sweep.n_solves),

@@ -24,9 +24,7 @@ Array = NDArray[np.float64]
 MAX_NODES = 96
 MAX_CELLS = 160
 SHARE = 0.1  # of the tolerance that the nodes' truncation in one direction may take
-CELL_SHARE = (
-    0.4  # of the tolerance that the cells may take in one direction: fewer cells are faster, nodes cost nothing
-)
+CELL_SHARE = 0.4  # the same of the cells: fewer cells are faster, nodes cost nothing
 NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
 
 
@@ -65,9 +63,7 @@ def _tail(coefficients: Array, axis: int) -> float:
 
 
 _CHECK = np.linspace(-1.0, 1.0, 25)
-_FOLLOW = np.polynomial.chebyshev.chebvander(_CHECK, WIDTH - 1) @ np.linalg.inv(
-    np.polynomial.chebyshev.chebvander(LOCAL, WIDTH - 1)
-)
+_FOLLOW = interpolation_matrix(WIDTH, _CHECK) @ np.linalg.inv(interpolation_matrix(WIDTH, LOCAL))
 LINES = 33  # across an axis, along which cells are tried
 
 
@@ -81,10 +77,8 @@ def _fewest(axis: Axis, exact: Callable[[Array], Array], wanted: float, relative
     for cells in range(step, MAX_CELLS + 1, step):
         centre = 2.0 * np.arange(cells)[:, None] + 1.0
         at, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (LOCAL, _CHECK))
-        if axis.name == "s":
-            # cells below the block are never visited
-            live = axis.to_file(check[:, -1]) > axis.low
-            at, check = at[live], check[live]
+        live = axis.to_file(check[:, -1]) > axis.low  # cells below the block are never visited
+        at, check = at[live], check[live]
         local = exact(at.ravel()).reshape(*at.shape, -1)
         truth = exact(check.ravel()).reshape(*check.shape, -1)
         off = np.abs(truth - np.einsum("ij,cjl->cil", _FOLLOW, local))
@@ -103,24 +97,17 @@ def _position(axis: Axis, x: Array) -> Array:
 
 def _block_cells(chart: Chart, values: Array, axis: int, wanted: float) -> int:
     """:func:`_fewest` along one axis of a block, on lines that cover the other."""
-    c = chebyshev_coefficients(values)
-    own = (chart.a, chart.b)[axis]
-    lines = np.cos(np.linspace(0.0, np.pi, LINES))
-    across = np.moveaxis(c, axis, 0) @ interpolation_matrix(values.shape[1 - axis], lines).T
-
-    def exact(x: Array) -> Array:
-        out: Array = interpolation_matrix(values.shape[axis], _position(own, x)) @ across
-        return out
-
-    return _fewest(own, exact, wanted, False)
+    own, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
+    c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
+    across = c @ interpolation_matrix(values.shape[1 - axis], lines).T
+    return _fewest(own, lambda x: interpolation_matrix(len(c), _position(own, x)) @ across, wanted, False)
 
 
 def _border_cells(piece: int, values: Array, wanted: float) -> int:
     axis, c = BORDER_PIECES[piece][1], chebyshev_coefficients(values)
 
     def exact(x: Array) -> Array:
-        out: Array = interpolation_matrix(values.size, _position(axis, x)) @ c * cell_scale(piece, x)
-        return out[:, None]
+        return (interpolation_matrix(c.size, _position(axis, x)) @ c * cell_scale(piece, x))[:, None]
 
     return _fewest(axis, exact, wanted, True)
 
@@ -155,23 +142,22 @@ def build_block(
     wanted = max(SHARE * tolerance, NODE_FLOOR)
     tail_block = chart.a.name == "inverse_y"
     na, nb = 3 if tail_block else 8, 8
-    best = [math.inf, math.inf]
-    stuck = [0, 0]
+    best, stuck = [math.inf, math.inf], [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
         a, b, found = solve_nodes(index, (na, nb), border, sweep)
         values = found["mu_ratio"]
-        c = chebyshev_coefficients(values)
-        left = [_tail(c, 0), _tail(c, 1)]
+        left = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):
             # twice no better by a third: what is left is the solver's rounding, to which more nodes only add
             stuck[axis] = 0 if left[axis] < 0.67 * best[axis] else stuck[axis] + 1
             best[axis] = min(best[axis], left[axis])
-        grow_a = left[0] > wanted and na < MAX_NODES and stuck[0] < 3 and not tail_block
-        grow_b = left[1] > wanted and nb < MAX_NODES and stuck[1] < 3
-        if not (grow_a or grow_b):
+        grow = [left[axis] > wanted and (na, nb)[axis] < MAX_NODES and stuck[axis] < 3 for axis in (0, 1)]
+        if tail_block:
+            grow[0] = False
+        if not any(grow):
             break
-        na, nb = (_next(na) if grow_a else na), (_next(nb) if grow_b else nb)
+        na, nb = (_next(n) if more else n for n, more in zip((na, nb), grow, strict=True))
     follow = [max(CELL_SHARE * tolerance, NODE_FLOOR, min(best[axis], 1.0)) for axis in (0, 1)]
     if tail_block:
         follow[0] = wanted

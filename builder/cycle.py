@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import Surrogate
-
-__all__ = ["CASES", "draw_cycles", "steady_cycle"]
+__all__ = ["CASES", "steady_cycle"]
 
 Array = NDArray[np.float64]
-ALONG, ACROSS, STICK, INK, SOFT = "#1f6fb4", "#c1272d", "#f6e7df", "#1f2328", "#8c959f"
 
 #: (v~, y~) -> title
 CASES = {
@@ -67,35 +63,3 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
             on_circle = not sticks[i]
             path[i] = u
     return tau[1:], path.view(np.float64).reshape(steps, 2), sticks
-
-
-def draw_cycles(_: Surrogate, axes: Any) -> None:
-    """One cycle of each regime: the path of the spring's end in the friction circle, above its two components."""
-    axes.set_axis_off()
-    for i, ((v, y), title) in enumerate(CASES.items()):
-        tau, u, sticks = steady_cycle(v, y)
-        left = i / 3.0
-        disc = axes.inset_axes((left + 0.03, 0.42, 0.29, 0.52))
-        turn = np.linspace(0.0, 2.0 * math.pi, 361)
-        disc.plot(np.cos(turn), np.sin(turn), color=SOFT, lw=1.0)
-        disc.plot(*np.where(sticks[:, None], np.nan, u).T, color=INK, lw=3.0, label="slip")
-        disc.plot(*np.where(sticks[:, None], u, np.nan).T, color=ACROSS, lw=1.4, ls="--", label="stick")
-        mean = float(u[:, 0].mean())
-        disc.plot([mean], [0.0], "o", color=ALONG, ms=6, label=r"mean: $\tilde\mu$")
-        disc.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), xticks=(-1, 0, 1), yticks=(-1, 0, 1), aspect="equal")
-        disc.set_title(f"{title}\n$\\tilde v$ = {v:g}, $\\tilde y$ = {y:g}: $\\tilde\\mu$ = {mean:.3f}", fontsize=10)
-        disc.set_xlabel("$u_x$, along", labelpad=0, fontsize=9)
-        disc.tick_params(labelsize=8)
-        trace = axes.inset_axes((left + 0.03, 0.0, 0.29, 0.3))
-        trace.fill_between(tau, -1.1, 1.1, where=sticks, color=STICK, lw=0, step="pre")
-        trace.plot(tau, u[:, 0], color=ALONG, lw=1.8, label="$u_x$, along")
-        trace.plot(tau, u[:, 1], color=ACROSS, lw=1.2, label="$u_y$, across")
-        trace.axhline(mean, color=ALONG, lw=0.9, ls=":")
-        trace.set(xlim=(0.0, 2.0 * math.pi), ylim=(-1.1, 1.1), yticks=(-1, 0, 1))
-        trace.set_xticks((0.0, math.pi, 2.0 * math.pi), ("0", r"$\pi$", r"$2\pi$"))
-        trace.set_xlabel(r"$\tau = \omega t$", labelpad=-2, fontsize=9)
-        trace.tick_params(labelsize=8)
-        if i == 0:
-            disc.set_ylabel("$u_y$, across", labelpad=-4, fontsize=9)
-            disc.legend(loc="center left", fontsize=8)
-            trace.legend(loc="lower right", fontsize=7, ncols=2)

@@ -49,13 +49,12 @@ def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
     for path in _FOLDER.glob("*.*s"):  # scripts and styles
         shutil.copyfile(path, parts / path.name)
     shutil.copyfile(_FOLDER.parent / "alone" / "service.js", parts / "service.js")
-    made = {"mumacro.wasm": module, "names.json": _json(names(guide=False)), "map.json": _json(map_of(surrogate))}
+    made = {"mumacro.wasm": module, "names.json": _json(names()), "map.json": _json(map_of(surrogate))}
     for name, content in made.items():
         (parts / name).write_bytes(content)
     text = (_FOLDER / "index.html").read_text("utf-8")
     for place, new in (
         ("<title>", f'<meta http-equiv="Content-Security-Policy" content="{html.escape(_POLICY)}">\n<title>'),
-        ("<body>", '<body class="alone">'),
         ("</header>", f'<p id="alone" class="notice">{_about(surrogate)}</p>\n</header>'),
     ):
         before, after = text.split(place)  # occurs once

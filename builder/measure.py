@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,24 +25,17 @@ __all__ = ["SEAMS", "BlockErrors", "block_errors", "fast_from", "log_uniform", "
 Array = NDArray[np.float64]
 
 
-@dataclasses.dataclass
-class BlockErrors:
+class BlockErrors(NamedTuple):
     """Largest errors of a block.
 
-    Attributes
-    ----------
-    values : dict of str to float
-        Of what is tabulated, over the block, by quantity.
-    cells : dict of str to ndarray
-        As :attr:`mumacro.table.Block.cell_errors`.
-    absolute, relative : float
-        Of mu~.
+    By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in :class:`mumacro.table.Block`.
+    ``absolute``, ``relative``: of mu~.
     """
 
     values: dict[str, float]
-    cells: dict[str, Array]
     absolute: float
     relative: float
+    cells: dict[str, Array]
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
@@ -50,9 +44,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Ar
 
 def fast_from(s: Surrogate, y: Array) -> Array:
     """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
-    crit = s.v_tilde_crit(y)
-    out: Array = np.where(y <= charts.Y_TAIL, charts.RHO_MAX * crit, charts.FAST_KAPPA * np.sqrt(y))
-    return out
+    below = charts.RHO_MAX * s.v_tilde_crit(y)
+    return np.asarray(np.where(y <= charts.Y_TAIL, below, charts.FAST_KAPPA * np.sqrt(y)))
 
 
 SEAMS = (charts.Y_STICK_LO, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL)
@@ -64,10 +57,9 @@ def near_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, A
     off = 1.0 + rng.choice([-1.0, 1.0], n) * log_uniform(rng, 1e-12, 1e-3, n)
     which = rng.integers(0, 4, n)
     y = np.where(which < 2, rng.choice(SEAMS, n) * off, y)
-    cut = which == 2
+    cut, fast = which == 2, which == 3
     y[cut] = rng.uniform(charts.Y_STICK_LO, charts.Y_STICK_HI, int(cut.sum()))
     v[cut] = s.v_tilde_crit(y[cut]) * charts.SIGMA_CUT**2 * off[cut]
-    fast = which == 3
     y[fast] = log_uniform(rng, charts.Y_CONT, 1e6, int(fast.sum()))
     v[fast] = fast_from(s, y[fast]) * off[fast]
     return v, y
@@ -78,11 +70,11 @@ def _stating(surrogate: Surrogate, error: float, of_border: float) -> Surrogate:
 
     With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the table's error.
     """
-    table = surrogate.table
-    border = [dataclasses.replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border]
+    table, replace = surrogate.table, dataclasses.replace
+    border = [replace(piece, max_rel_error=of_border * piece.max_rel_error) for piece in table.border]
     stated = {name: np.array([error, 0.0, 0.0]) for name in table.quantities}
-    blocks = [dataclasses.replace(block, errors=stated) for block in table.blocks]
-    return Surrogate(dataclasses.replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads)
+    blocks = [replace(block, errors=stated) for block in table.blocks]
+    return Surrogate(replace(table, border=border, blocks=blocks), surrogate.path, surrogate.threads)
 
 
 def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[BlockErrors]:
@@ -92,17 +84,16 @@ def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[
     for index, block in enumerate(surrogate.table.blocks):
         errors = _value_errors(surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n)
         _, _, exact = solve_nodes(index, finer((block.a.size, block.b.size)), surrogate.border, sweep)
-        errors.cells = cell_errors(index, block, exact)
-        found.append(errors)
+        found.append(BlockErrors(*errors, cell_errors(index, block, exact)))
     return found
 
 
 def _value_errors(
     surrogate: Surrogate, stating: tuple[Surrogate, ...], sweep: Sweep, index: int, rng: np.random.Generator, n: int
-) -> BlockErrors:
+) -> tuple[dict[str, float], float, float]:
+    """Of what is tabulated by quantity; absolute and relative of mu~."""
     chart = CHARTS[index]
-    radial = chart.a.name == "radius"
-    v, y, _ = chart.point(_crowded(rng, chart.a, n, radial), _crowded(rng, chart.b, n), surrogate.border)
+    v, y, _ = chart.point(_crowded(rng, chart.a, n), _crowded(rng, chart.b, n), surrogate.border)
     v_seam, y_seam = near_seams(rng, 2 * n, surrogate)
     v, y = np.concatenate([v, v_seam]), np.concatenate([y, y_seam])
     mu, _, source = surrogate.ratio_with_bound(v, y)
@@ -116,13 +107,13 @@ def _value_errors(
         # what the bound allows anyway: half of rounding, and what the border's error does, of which it states twice
         noise = solver_noise(name, v, y, solved, chart.regime == CONTINUOUS) + beside - 0.5 * rounding
         errors[name] = float((np.maximum(np.abs(value - solved[name]) - noise, 0.0) / scale).max())
-    return BlockErrors(errors, {}, float(error.max()), float((error / solved["mu_ratio"]).max()))
+    return errors, float(error.max()), float((error / solved["mu_ratio"]).max())
 
 
-def _crowded(rng: np.random.Generator, axis: Axis, n: int, radial: bool = False) -> Array:
+def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
     """File coordinates that crowd towards both ends."""
     low, high = axis.low, axis.high
-    if radial:
+    if axis.name == "radius":
         half = n // 2
         return np.concatenate([10.0 ** rng.uniform(-5.0, math.log10(high), half), high * rng.beta(0.5, 0.5, n - half)])
     t = rng.beta(0.5, 0.5, n)

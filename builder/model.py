@@ -55,10 +55,8 @@ def _standstill(w: np.ndarray, h: float, out: np.ndarray) -> float:
 
     Next to the border lam is negative for a moment between two positive ends: the minimum is found first.
     """
-    lam, rate = w[series.SPEED], w[series.SPEED_RATE]
-    stop = -1.0
-    end = series.value(lam, h)
-    s0, s1 = lam[1], series.slope(lam, h)
+    lam, rate, stop = w[series.SPEED], w[series.SPEED_RATE], -1.0
+    end, s0, s1 = series.value(lam, h), lam[1], series.slope(lam, h)
     if s0 < 0.0 < s1 or (end < 0.0 and lam[0] <= 0.0):
         series.derivative(lam, rate)
     if s0 < 0.0 < s1:
@@ -118,33 +116,27 @@ def slip(
     """
     out[TURNED:MIN_SPEED] = 0.0
     out[MIN_SPEED], out[FALL], out[EXCESS] = math.inf, math.nan, 0.0
-    ratio = v / y if y > 0.0 else math.inf
-    layer = min(0.3, 10.0 / math.sqrt(y)) if y > 0.0 else 0.3
-    steps = 0
+    ratio, layer, steps = v / y, min(0.3, 10.0 / math.sqrt(y)), 0
     while steps <= MAX_STEPS:
         if abs(x) > 0.9:
-            target = (1 if x > 0.0 else -1) if chart == 0 else 0
             # a quarter turn back from chart +-1 leads to 0; further than that leaves the half plane u_x > 0
-            x = rechart(x, chart, target)
-            chart = target
+            target = (1 if x > 0.0 else -1) if chart == 0 else 0
+            x, chart = rechart(x, chart, target), target
         if turn < 0 and sigma > 0.5 * math.pi:
-            sigma -= math.pi
-            turn = 0
+            sigma, turn = sigma - math.pi, 0
         sign = -1.0 if turn == 0 else 1.0
         series.series(v, y, sign * math.sin(sigma), sign * math.cos(sigma), x, chart, w)
         lam = w[series.SPEED, 0]
         h = series.step_length(w, layer, lam)
         left = end - (sigma + turn * math.pi)
-        jump = _stiff_length(sigma, ratio, left)
-        stop = -1.0
+        jump, stop = _stiff_length(sigma, ratio, left), -1.0
         if lam * jump > STIFF and out[PATH] > FORGOTTEN:
             last, h = jump == left, jump
             x_end, least = collocate(v, y, sign, sigma, x, chart, jump, out[SUM_UX : WORK + 1])
             if math.isnan(x_end):
                 return DIVERGED
-            out[TURNED] += x_end - x
             out[MIN_SPEED] = min(out[MIN_SPEED], least)
-            x = x_end
+            turned, x = x_end - x, x_end
         else:
             last = h >= left
             h = left if last else h
@@ -156,8 +148,8 @@ def slip(
             h = stop if stop >= 0.0 else h
             _add_integrals(y, chart, h, v < SMALL_V and y < SMALL_Y, w, out)
             turned = series.increment(w[series.X], h)
-            out[TURNED] += turned
             x += turned
+        out[TURNED] += turned
         steps += 1
         if stop < 0.0 and last and to_stick:
             return NO_STICK

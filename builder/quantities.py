@@ -6,41 +6,32 @@ The solver's column (:data:`builder.sweep.COLUMNS`) has the quantity's name.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SOLVED", "SOLVER_NOISE", "Solved", "solver_noise"]
+__all__ = ["ABS_TO_REL", "SOLVED", "SOLVER_NOISE", "Solved", "solver_noise"]
 
 Array = NDArray[np.float64]
 Sliding = NDArray[np.bool_] | bool
+ABS_TO_REL = 10.0  # the largest relative error of mu~ may be this many times the tolerance of a table
 #: what a fresh solve of mu~ may be wrong by, relative: rounding, and the input's last digit next to the corner
 SOLVER_NOISE = 2e-15
 STICK_NOISE = 1e-15  # the same of the stick fraction, absolute, away from the border
 
 
-@dataclass(frozen=True)
-class Solved:
+class Solved(NamedTuple):
     """One quantity as the solver gives it.
 
-    Attributes
-    ----------
-    noise : callable
-        (v~, y~, value, whether sliding is continuous) -> what a fresh solve may be wrong by, absolute.
-    relative : bool
-        Whether reports state errors relative to the value.
-    complement : str
-        The column of 1 - value, which has the digits where the value is next to 1; empty where there is none.
+    ``noise(v, y, value, sliding)``: what a fresh solve may be wrong by, absolute; ``sliding``: whether continuously.
+    ``relative``: tables state its error relative to the value.  ``complement``: the column of 1 - value, which has the
+    digits where the value is next to 1; empty where there is none.
     """
 
     noise: Callable[[Array, Array, Array, Sliding], Array]
     relative: bool
     complement: str = ""
-
-
-def _ratio_noise(_v: Array, _y: Array, ratio: Array, _sliding: Sliding) -> Array:
-    return SOLVER_NOISE * ratio
 
 
 def _power_noise(v: Array, y: Array, power: Array, sliding: Sliding) -> Array:
@@ -54,14 +45,10 @@ def _power_noise(v: Array, y: Array, power: Array, sliding: Sliding) -> Array:
     return noise
 
 
-def _stick_noise(_v: Array, _y: Array, fraction: Array, _sliding: Sliding) -> Array:
-    return np.full(fraction.shape, STICK_NOISE)
-
-
 SOLVED = {
-    "mu_ratio": Solved(_ratio_noise, relative=False, complement="deficit"),
+    "mu_ratio": Solved(lambda _v, _y, ratio, _sliding: SOLVER_NOISE * ratio, relative=False, complement="deficit"),
     "power": Solved(_power_noise, relative=True),
-    "stick_fraction": Solved(_stick_noise, relative=False),
+    "stick_fraction": Solved(lambda _v, _y, fraction, _sliding: np.full(fraction.shape, STICK_NOISE), relative=False),
 }
 
 

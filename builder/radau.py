@@ -18,13 +18,10 @@ STAGES = 20  # 5.8**-20 = 5e-16: the decay on a step whose length is half the di
 
 def _radau(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Nodes (n,) in (0, 1], weights (n,), and d/dc of the interpolant through (0, nodes) at the nodes, (n, n + 1)."""
-    series = np.zeros(n + 1)
-    series[n], series[n - 1] = 1.0, -1.0
-    roots = np.sort(legendre.legroots(series).real)
-    slope = legendre.legder(series)
+    series = np.array([0.0] * (n - 1) + [-1.0, 1.0])
+    roots, slope = np.sort(legendre.legroots(series).real), legendre.legder(series)
     for _ in range(3):
-        step = legendre.legval(roots, series) / legendre.legval(roots, slope)
-        roots = roots - step
+        roots = roots - legendre.legval(roots, series) / legendre.legval(roots, slope)
     roots[-1] = 1.0
     nodes = 0.5 * (1.0 + roots)
     # interpolatory weights: int_0^1 of the Lagrange polynomials, by a Gauss rule that is exact for them
@@ -56,12 +53,10 @@ def _solve_in_place(a: np.ndarray, b: np.ndarray) -> None:
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(k, n):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            b[k], b[pivot] = b[pivot], b[k]
+            pivot = i if abs(a[i, k]) > abs(a[pivot, k]) else pivot
+        for j in range(k, n):
+            a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        b[k], b[pivot] = b[pivot], b[k]
         for i in range(k + 1, n):
             factor = a[i, k] / a[k, k]
             for j in range(k + 1, n):
@@ -97,8 +92,7 @@ def collocate(
     for i in range(STAGES):
         c[i] = sign * math.sin(sigma + RADAU_NODES[i] * length)
         xs[i] = math.atan2(y * c[i], v) - chart * (0.5 * math.pi)
-    jac, res = np.empty((STAGES, STAGES)), np.empty(STAGES)
-    worst = math.inf
+    jac, res, worst = np.empty((STAGES, STAGES)), np.empty(STAGES), math.inf
     for _ in range(12):
         for i in range(STAGES):
             ux, uy, _deficit = _direction(xs[i], chart)
@@ -115,12 +109,10 @@ def collocate(
             worst = max(worst, abs(res[i]))
         if worst < 1e-9 or not worst < 1e3:
             break
-    part = np.zeros(4)
-    least = math.inf
+    part, least = np.zeros(4), math.inf
     for i in range(STAGES):
         ux, uy, deficit = _direction(xs[i], chart)
-        wt = RADAU_WEIGHTS[i] * length
-        lam = v * ux + y * c[i] * uy
+        wt, lam = RADAU_WEIGHTS[i] * length, v * ux + y * c[i] * uy
         part[0] += wt * ux
         part[1] += wt * deficit
         part[2] += wt * lam

@@ -27,9 +27,7 @@ def bits(tolerance: float) -> int:
 
 def to_step(values: Array, tolerance: float) -> Array:
     """``values`` at multiples of a power of two; none moves by more than half of ``tolerance``/:data:`STEPS`."""
-    digits = bits(tolerance)
-    rounded: Array = np.ldexp(np.round(np.ldexp(values, digits)), -digits)
-    return rounded
+    return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
 
 
 def to_bits(values: Array, digits: int, up: bool = False) -> Array:
@@ -37,8 +35,7 @@ def to_bits(values: Array, digits: int, up: bool = False) -> Array:
     mantissa, exponent = np.frexp(values)
     scaled = np.ldexp(mantissa, digits)
     whole = np.copysign(np.ceil(np.abs(scaled)), scaled) if up else np.round(scaled)
-    rounded: Array = np.ldexp(whole, exponent - digits)
-    return rounded
+    return np.asarray(np.ldexp(whole, exponent - digits))
 
 
 def round_block(block: Block, tolerance: float) -> Block:
@@ -47,7 +44,4 @@ def round_block(block: Block, tolerance: float) -> Block:
     All that a block tabulates is of order one, and mu~ changes by at most about as much as what is tabulated: a step
     that is the same for all values of a block suits the relative error of mu~ too.
     """
-    return dataclasses.replace(
-        block,
-        nodes={name: to_step(values, tolerance) for name, values in block.nodes.items()},
-    )
+    return dataclasses.replace(block, nodes={name: to_step(x, tolerance) for name, x in block.nodes.items()})

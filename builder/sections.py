@@ -38,6 +38,21 @@ def border_guess(y: float) -> float:
 
 
 @solver_kernel
+def _direction(x0: float, chart: int) -> tuple[float, float, float]:
+    """cos, sin and 1 - cos [-] of the angle th0 = ``x0`` [rad] where slip stops, in chart 1 pi/2 - ``x0``."""
+    half = math.sin(0.5 * x0)
+    c, s = math.cos(x0), math.sin(x0)
+    return (c, s, 2.0 * half * half) if chart == 0 else (s, c, 1.0 - s)
+
+
+@solver_kernel
+def _keep(orbit: np.ndarray, duration: float, s0: float, s1: float, x0: float, chart: int) -> None:
+    """The stick phase into ``orbit`` (6,)."""
+    orbit[DURATION], orbit[SIGMA_0], orbit[SIGMA_1] = duration, s0, s1
+    orbit[COS_0], orbit[SIN_0], orbit[DEFICIT_0] = _direction(x0, chart)
+
+
+@solver_kernel
 def _angle_section(
     v: float, y: float, eta: float, x0: float, chart: int, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> tuple[float, int]:
@@ -45,20 +60,12 @@ def _angle_section(
 
     ``w`` and ``out`` as in :func:`.model.slip`; ``orbit`` (6,) receives the stick phase.
     """
-    if chart == 0:
-        sth, cth = math.sin(x0), math.cos(x0)
-        a = math.sin(0.5 * x0)
-        deficit = 2.0 * a * a
-    else:
-        sth, cth = math.cos(x0), math.sin(x0)
-        deficit = 1.0 - cth
-    q = v * cth / (y * sth)
-    s0 = math.asin(min(q, 1.0))
+    cth, sth, _ = _direction(x0, chart)
+    s0 = math.asin(min(v * cth / (y * sth), 1.0))
     d, s1 = stick_end(v, y, eta, x0, chart, s0)
     if d < 0.0:
         return -1.0, model.NO_SLIP
-    orbit[DURATION], orbit[COS_0], orbit[DEFICIT_0], orbit[SIN_0] = d, cth, deficit, sth
-    orbit[SIGMA_0], orbit[SIGMA_1] = s0, s1
+    _keep(orbit, d, s0, s1, x0, chart)
     # sigma1 counted from the nearer turn: after a short stick that is the one which slip came from
     turn = -1 if d < 0.5 * math.pi else 0
     near = s0 + d if turn < 0 else s1
@@ -95,39 +102,23 @@ def _time_section(
         gain = 0.5 * v * (math.pi - 2.0 * h)
         b = math.atan(gain / (y * cc))
         if chart == 0:
-            sa = y * cc / math.cos(b)
-            if sa > 1.0:
-                return -1.0, model.NO_SLIP
-            a_ang = math.asin(sa)
+            a_ang = math.asin(y * cc / math.cos(b))
             th0 = a_ang + b
             ratio = v * math.cos(th0) / (y * math.sin(th0))
         else:
             ss, sh = math.sin(s), math.sin(h)
             ca2 = y * y * (ss * ss + (1.0 - ss * ss) * sh * sh) - eta * (2.0 + eta) - gain * gain
-            if ca2 <= 0.0:
-                return -1.0, model.NO_SLIP
             a_ang = math.asin(math.sqrt(ca2))
             th0 = a_ang - b
-            if th0 <= 0.0:
-                return -1.0, model.NO_SLIP
             ratio = v * math.tan(th0) / y
-        new = math.asin(min(1.0, ratio))
-        if abs(new - s0) <= 1e-16 * abs(new):
-            s0 = new
+        if not th0 > 0.0:  # NaN where slip cannot start there
+            return -1.0, model.NO_SLIP
+        old, s0 = s0, math.asin(min(1.0, ratio))
+        if abs(s0 - old) <= 1e-16 * abs(s0):
             break
-        s0 = new
-    if chart == 0:
-        sth, cth = math.sin(th0), math.cos(th0)
-        k = math.sin(0.5 * th0)
-        deficit = 2.0 * k * k
-        start, base = a_ang - b, 0
-    else:
-        sth, cth = math.cos(th0), math.sin(th0)
-        deficit = 1.0 - cth
-        start, base = -(a_ang + b), 1
-    orbit[DURATION], orbit[COS_0], orbit[DEFICIT_0], orbit[SIN_0] = math.pi - s0 + s1, cth, deficit, sth
-    orbit[SIGMA_0], orbit[SIGMA_1] = s0, s1
-    status = slip(v, y, s1, model.HERE, start, base, 0.5 * math.pi, model.TO_STICK, w, out)
+    _keep(orbit, math.pi - s0 + s1, s0, s1, th0, chart)
+    start = a_ang - b if chart == 0 else -(a_ang + b)
+    status = slip(v, y, s1, model.HERE, start, chart, 0.5 * math.pi, model.TO_STICK, w, out)
     return 2.0 * b - out[model.TURNED], status
 
 
@@ -174,10 +165,8 @@ def _edge(v: float, y: float) -> float:
         m = 0.5 * (a + b)
         sm = math.sin(m)
         q = v * math.cos(m) / (y * sm)
-        if q < 1.0 and (v / sm) ** 2 < y * sm * math.sqrt(1.0 - q * q):
-            b = m
-        else:
-            a = m
+        starts = q < 1.0 and (v / sm) ** 2 < y * sm * math.sqrt(1.0 - q * q)
+        a, b = (a, m) if starts else (m, b)
         if b - a < 2e-16 * a:
             break
     return b
@@ -192,23 +181,15 @@ def stick_slip(v: float, y: float, eta: float, hint: float, w: np.ndarray, out: 
     kind, chart, z = _choose(v, y, eta, hint)
     near = kind == ANGLE_SECTION and not math.isnan(hint)
     lo, hi = 0.0, 0.5 * math.pi
-    if kind == ANGLE_SECTION and chart == 0:
-        lo = _edge(v, y)
-    elif kind == ANGLE_SECTION:
-        hi = 0.5 * math.pi - _edge(v, y)
-    if not (lo < z < hi):
-        z = 0.5 * (lo + hi)
-    z_old, f_old = z, math.inf
-    spread = before = math.inf
+    if kind == ANGLE_SECTION:
+        lo, hi = (_edge(v, y), hi) if chart == 0 else (lo, hi - _edge(v, y))
+    z_old, f_old, spread, before = z, math.inf, math.inf, math.inf
     for it in range(200):
         f, status = section(kind, v, y, eta, z, chart, w, out, orbit)
         if status in (model.NO_SLIP, model.NO_STICK):
             # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border slip misses lam = 0
             # when th0 is too large, since the half-period map turns the order of orbits round there
-            if kind == ANGLE_SECTION and chart == 0:
-                hi = z
-            else:
-                lo = z
+            lo, hi = (lo, z) if kind == ANGLE_SECTION and chart == 0 else (z, hi)
             z, f_old = 0.5 * (lo + hi), math.inf
             continue
         if status != OK:

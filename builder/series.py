@@ -28,12 +28,8 @@ def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np
     ``x`` [rad] is the local angle in ``chart``; c0, c1 [-] = cos tau and its derivative there.
     """
     x_, S, D, XP, C, CS, CD, L = w[X], w[SIN_X], w[DEFICIT_X], w[RATE], w[COS_TAU], w[C_SIN], w[C_COS], w[SPEED]
-    x_[0] = x
-    S[0] = math.sin(x)
     half = math.sin(0.5 * x)
-    D[0] = 2.0 * half * half
-    C[0] = c0
-    C[1] = c1
+    x_[0], S[0], D[0], C[0], C[1] = x, math.sin(x), 2.0 * half * half, c0, c1
     for k in range(ORDER - 1):
         C[k + 2] = -C[k] * _INV[k + 1] * _INV[k + 2]
     for k in range(ORDER + 1):
@@ -42,42 +38,36 @@ def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np
         for j in range(k + 1):
             cs += C[j] * S[k - j]
             cd -= C[j] * D[k - j]
-        CS[k] = cs
-        CD[k] = cd
-        one = 1.0 if k == 0 else 0.0
-        if chart == 0:
-            xp = y * cd - v * S[k]
-            L[k] = v * (one - D[k]) + y * cs
-        elif chart > 0:
-            xp = -v * (one - D[k]) - y * cs
-            L[k] = y * cd - v * S[k]
-        else:
-            xp = v * (one - D[k]) + y * cs
-            L[k] = v * S[k] - y * cd
-        XP[k] = xp
+        along, across = v * ((1.0 if k == 0 else 0.0) - D[k]) + y * cs, y * cd - v * S[k]
+        xp, speed = (across, along) if chart == 0 else (-along, across) if chart > 0 else (along, -across)
+        CS[k], CD[k], XP[k], L[k] = cs, cd, xp, speed
         if k < ORDER:
-            sn = xp
-            dn = 0.0
+            sn, dn = xp, 0.0
             for j in range(k + 1):
                 sn -= D[j] * XP[k - j]
                 dn += S[j] * XP[k - j]
-            x_[k + 1] = xp * _INV[k + 1]
-            S[k + 1] = sn * _INV[k + 1]
-            D[k + 1] = dn * _INV[k + 1]
+            x_[k + 1], S[k + 1], D[k + 1] = xp * _INV[k + 1], sn * _INV[k + 1], dn * _INV[k + 1]
+
+
+@solver_kernel
+def increment(p: np.ndarray, t: float) -> float:
+    """p(t) - p(0), not a difference, of the Taylor coefficients ``p`` (ORDER + 2,) a time ``t`` [rad] into the step."""
+    r: float = p[ORDER]
+    for k in range(ORDER - 1, 0, -1):
+        r = r * t + p[k]
+    return r * t
 
 
 @solver_kernel
 def value(p: np.ndarray, t: float) -> float:
-    """p(t) of the Taylor coefficients ``p`` (ORDER + 2,) at the time ``t`` [rad] since the start of the step."""
-    r: float = p[ORDER]
-    for k in range(ORDER - 1, -1, -1):
-        r = r * t + p[k]
+    """p(t), as :func:`increment`."""
+    r: float = increment(p, t) + p[0]
     return r
 
 
 @solver_kernel
 def slope(p: np.ndarray, t: float) -> float:
-    """p'(t), as :func:`value`."""
+    """p'(t), as :func:`increment`."""
     r: float = ORDER * p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + k * p[k]
@@ -86,7 +76,7 @@ def slope(p: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def integral(p: np.ndarray, t: float) -> float:
-    """Integral of p from 0 to ``t``, as :func:`value`."""
+    """Integral of p from 0 to ``t``, as :func:`increment`."""
     r: float = p[ORDER] * _INV[ORDER + 1]
     for k in range(ORDER - 1, -1, -1):
         r = r * t + p[k] * _INV[k + 1]
@@ -106,25 +96,13 @@ def integral_of_product(p: np.ndarray, q: np.ndarray, t: float) -> float:
 
 
 @solver_kernel
-def increment(p: np.ndarray, t: float) -> float:
-    """p(t) - p(0) without forming the difference."""
-    r: float = p[ORDER]
-    for k in range(ORDER - 1, 0, -1):
-        r = r * t + p[k]
-    return r * t
-
-
-@solver_kernel
 def root(p: np.ndarray, lo: float, hi: float) -> float:
     """Root of p in [lo, hi], where the sign changes: Newton kept inside the bracket."""
     up = value(p, hi) > 0.0
     t = 0.5 * (lo + hi)
     for _ in range(300):  # the window of slip may be as short as 1e-30: bisection alone must get there
         f = value(p, t)
-        if (f > 0.0) == up:
-            hi = t
-        else:
-            lo = t
+        lo, hi = (lo, t) if (f > 0.0) == up else (t, hi)
         g = slope(p, t)
         new = t - f / g if g != 0.0 else lo - 1.0
         if not (lo < new < hi):
@@ -149,13 +127,9 @@ def step_length(w: np.ndarray, layer: float, lam: float) -> float:
 
     Where x' passes zero the increment is judged by x'' and the time ``layer`` [rad], at most that of the layers.
     """
-    x = w[X]
+    x, h = w[X], 0.9
     scale = max(abs(x[1]), layer * abs(x[2]))
-    if scale == 0.0:
-        scale = abs(x[3])
-    h = 0.9
     for k in (ORDER - 1, ORDER):
         top = max(abs(x[k]), abs(w[DEFICIT_X, k]))
-        if top > 0.0:
-            h = min(h, (TRUNCATION * scale / top) ** (1.0 / (k - 1)))
+        h = min(h, (TRUNCATION * scale / top) ** (1.0 / (k - 1)))
     return min(h, 0.33 * ORDER / lam) if lam > 0.0 else h

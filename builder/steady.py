@@ -37,6 +37,7 @@ ADVICE = {
 RESULTS = ("mu_ratio", "deficit", "stick_fraction", "power", "regime", "slip_speed", "min_slip_speed")
 MU_RATIO, DEFICIT, STICK_FRACTION, POWER, REGIME, SLIP_SPEED, MIN_SLIP_SPEED = range(N_RESULTS := len(RESULTS))
 
+MEAN = 1.0 / math.pi  # of an integral over half a period
 RELATIVE_ERROR = 3e-15  # of the smaller of mu~ and 1 - mu~, see error_estimate
 
 
@@ -53,20 +54,14 @@ def error_estimate(mu: float, deficit: float) -> float:
 @solver_kernel
 def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
     """Continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in :func:`.model.slip`; a status."""
-    th = math.atan(v * y / (1.0 + v * v))
-    half = 0.5 * math.pi
-    done = False
+    th, half, done = math.atan(v * y / (1.0 + v * v)), 0.5 * math.pi, False
     for _ in range(60):
-        chart = 0
-        x = th
-        if th > 0.75:
-            chart = 1
-            x = th - half
+        chart = 1 if th > 0.75 else 0
+        x = th - chart * half
         status = slip(v, y, -half, model.HERE, x, chart, half, model.ALL_THE_WAY, w, out)
         if status != OK:
             return status
-        x_end = out[model.ANGLE]
-        chart_end = int(out[model.CHART])
+        x_end, chart_end = out[model.ANGLE], int(out[model.CHART])
         # residual th_end + th_start, formed in the mirrored chart so that small angles keep their digits
         res = rechart(x_end, chart_end, -chart) + x
         if done:
@@ -93,10 +88,7 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
         if status != OK:
             return math.nan, math.nan, status
         f = out[model.MIN_SPEED]
-        if f > 0.0:
-            hi = z
-        else:
-            lo = z
+        lo, hi = (lo, z) if f > 0.0 else (z, hi)
         if f == 0.0 or (f_old < math.inf and abs(z - z_old) <= 1e-9 * z):
             if f not in (0.0, f_old):  # both at rounding level: z is the root
                 z -= f * (z - z_old) / (f - f_old)
@@ -110,29 +102,24 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
 
 
 @solver_kernel
-def _small_power(v: float, out: np.ndarray, res: np.ndarray) -> float:
-    """Power as <lam> - v~ mu~, nothing subtracted: <lam u_x> = v~ is the foot's mean velocity along the drive."""
-    power: float = out[model.EXCESS] / math.pi + v * res[DEFICIT]
-    return power
-
-
-@solver_kernel
-def sliding(v: float, y: float, out: np.ndarray, res: np.ndarray) -> None:
-    """Results (7,) of continuous sliding from what :func:`continuous` left in ``out``, eq. (15)."""
-    mean = 1.0 / math.pi
-    res[MU_RATIO], res[DEFICIT] = out[model.SUM_UX] * mean, out[model.SUM_DEFICIT] * mean
-    res[REGIME], res[STICK_FRACTION] = CONTINUOUS, 0.0
-    res[POWER], res[SLIP_SPEED], res[MIN_SLIP_SPEED] = (
-        out[model.WORK] * mean,
-        out[model.PATH] * mean,
-        out[model.MIN_SPEED],
-    )
+def _finish(v: float, y: float, regime: int, out: np.ndarray, res: np.ndarray) -> None:
+    """The rest of the results (7,): of mu~ and 1 - mu~ the smaller has the digits; the slip speed; a small power."""
+    res[REGIME], res[SLIP_SPEED], res[MIN_SLIP_SPEED] = regime, out[model.PATH] * MEAN, out[model.MIN_SPEED]
     if res[DEFICIT] < 0.5:
         res[MU_RATIO] = 1.0 - res[DEFICIT]
     else:
         res[DEFICIT] = 1.0 - res[MU_RATIO]
     if v < model.SMALL_V and y < model.SMALL_Y:
-        res[POWER] = _small_power(v, out, res)
+        # <lam> - v~ mu~ with nothing subtracted: <lam u_x> = v~ is the foot's mean velocity along the drive
+        res[POWER] = out[model.EXCESS] / math.pi + v * res[DEFICIT]
+
+
+@solver_kernel
+def sliding(v: float, y: float, out: np.ndarray, res: np.ndarray) -> None:
+    """Results (7,) of continuous sliding from what :func:`continuous` left in ``out``, eq. (15)."""
+    res[MU_RATIO], res[DEFICIT] = out[model.SUM_UX] * MEAN, out[model.SUM_DEFICIT] * MEAN
+    res[STICK_FRACTION], res[POWER] = 0.0, out[model.WORK] * MEAN
+    _finish(v, y, CONTINUOUS, out, res)
 
 
 @solver_kernel
@@ -145,19 +132,11 @@ def _sticking(v: float, y: float, out: np.ndarray, orbit: np.ndarray, res: np.nd
     out[model.SUM_UX] -= surplus * cth
     out[model.SUM_DEFICIT] -= surplus * deficit
     out[model.WORK] += surplus * y * math.sin(orbit[SIGMA_0]) * orbit[SIN_0]
-    mean = 1.0 / math.pi
-    res[MU_RATIO] = (d * (cth + 0.5 * v * d) + out[model.SUM_UX]) * mean
-    res[DEFICIT] = (d * (deficit - 0.5 * v * d) + out[model.SUM_DEFICIT]) * mean
-    res[REGIME], res[STICK_FRACTION], res[SLIP_SPEED] = STICK_SLIP, d * mean, out[model.PATH] * mean
-    if res[DEFICIT] < 0.5:
-        res[MU_RATIO] = 1.0 - res[DEFICIT]
-    else:
-        res[DEFICIT] = 1.0 - res[MU_RATIO]
-    if v < model.SMALL_V and y < model.SMALL_Y:
-        res[POWER] = _small_power(v, out, res)
-    else:
-        # during stick the spring takes up and returns the same energy, so the shaker's work is minus the drive's
-        res[POWER] = (out[model.WORK] - v * d * (cth + 0.5 * v * d)) * mean
+    res[MU_RATIO] = (d * (cth + 0.5 * v * d) + out[model.SUM_UX]) * MEAN
+    res[DEFICIT] = (d * (deficit - 0.5 * v * d) + out[model.SUM_DEFICIT]) * MEAN
+    # during stick the spring takes up and returns the same energy, so the shaker's work is minus the drive's
+    res[STICK_FRACTION], res[POWER] = d * MEAN, (out[model.WORK] - v * d * (cth + 0.5 * v * d)) * MEAN
+    _finish(v, y, STICK_SLIP, out, res)
 
 
 @solver_kernel
@@ -188,39 +167,25 @@ def solve_raw(
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady cycle at one (v~, y~); every quantity dimensionless.
+    """Steady cycle at one (v~, y~); every quantity dimensionless."""
 
-    Attributes
-    ----------
-    mu_ratio, deficit : float
-        mu~ = mu_macro/mu0 = <u_x>, eq. (15), and 1 - mu~ with its own full precision.
-    regime : str
-        ``"continuous"`` or ``"stick_slip"``.
-    stick_fraction : float
-        Share of the period during which the foot sticks.
-    power : float
-        <y~ cos tau u_y>: mean power of the shaker in units of mu0 Fz l0 omega.
-    slip_speed : float
-        <lam>: mean slip path per radian in units of l0; equals v~ mu~ + power.
-    min_slip_speed : float
-        Smallest lam of the continuous orbit; NaN far below the border, where it is not followed.  Where v~ is so far
-        above the border that stiff steps pass it by, it is right to 0.1 %.
-    error_estimate : float
-        Largest absolute error of mu_ratio to be expected, see ``error_estimate``.
-    status : int
-        0 when solved.
-    advice : str
-        What the status means and what to do.
-    """
-
+    #: mu~ = mu_macro/mu0 = <u_x>, eq. (15), and 1 - mu~ with its own full precision
     mu_ratio: float
     deficit: float
+    #: "continuous" or "stick_slip"
     regime: str
+    #: share of the period during which the foot sticks
     stick_fraction: float
+    #: <y~ cos tau u_y>: mean power of the shaker in units of mu0 Fz l0 omega
     power: float
+    #: <lam>: mean slip path per radian in units of l0; equals v~ mu~ + power
     slip_speed: float
+    #: smallest lam of the continuous orbit; NaN far below the border, where it is not followed; right to 0.1 % where v~
+    #: is so far above the border that stiff steps pass it by
     min_slip_speed: float
+    #: largest absolute error of mu_ratio to be expected, see error_estimate()
     error_estimate: float
+    #: 0 when solved; what it means and what to do
     status: int
     advice: str
 
@@ -267,10 +232,9 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     w, out, orbit, res = workspace()
     status = int(solve_raw(v, y, eta, w, out, orbit, res))
     found = dict(zip(RESULTS, res.tolist(), strict=True))
-    found["regime"] = "unknown" if math.isnan(res[REGIME]) else REGIMES[int(res[REGIME])]
-    return Steady(
-        **found, error_estimate=error_estimate(res[MU_RATIO], res[DEFICIT]), status=status, advice=ADVICE[status]
-    )
+    found["regime"] = REGIMES[int(res[REGIME])] if status == OK else "unknown"
+    found["error_estimate"] = error_estimate(res[MU_RATIO], res[DEFICIT])
+    return Steady(**found, status=status, advice=ADVICE[status])
 
 
 def border(y: float) -> tuple[float, float]:

@@ -62,12 +62,9 @@ def _chandrupatla(
         x = x1 + t * (x2 - x1)
         s1, d = (x, math.pi - s0 + x) if in_sigma else (s0 + x - math.pi, x)
         f = stick_excess(v, y, eta, x0, chart, s0, s1, d)
-        if (f > 0.0) == (f1 > 0.0):
-            x3, f3 = x1, f1
-        else:
-            x3, f3 = x2, f2
-            x2, f2 = x1, f1
-        x1, f1 = x, f
+        if (f > 0.0) != (f1 > 0.0):
+            x1, f1, x2, f2 = x2, f2, x1, f1
+        x1, f1, x3, f3 = x, f, x1, f1
         best = x1 if abs(f1) < abs(f2) else x2
         tol = 2.0e-16 * abs(best)
         if f1 == 0.0 or abs(x2 - x1) <= 2.0 * tol:
@@ -86,43 +83,34 @@ def _chandrupatla(
 @solver_kernel
 def _reached(v: float, y: float, eta: float, x0: float, chart: int, s0: float) -> tuple[float, float]:
     """Two times since the onset of stick [rad], |u| < 1 at the first, > 1 at the second; (0, -1) if it stays below."""
-    lo, best, best_d = 0.0, -math.inf, 0.0
+    d = 0.0
     for i in range(1, SCAN + 1):
-        d = math.pi * i / SCAN
-        g = stick_excess(v, y, eta, x0, chart, s0, s0 + d - math.pi, d)
-        if g > 0.0:
+        lo, d = d, math.pi * i / SCAN
+        if stick_excess(v, y, eta, x0, chart, s0, s0 + d - math.pi, d) > 0.0:
             return lo, d
-        if g > best:
-            best, best_d = g, d
-        lo = d
-    # the window of |u| > 1 may be shorter than the scan: climb the largest sample by golden section
-    lo = max(best_d - math.pi / SCAN, 0.0)
-    a, b = lo, best_d + math.pi / SCAN
+    # the window of |u| > 1, next to the last sample, may be shorter than the scan: climb by golden section
+    lo = d - math.pi / SCAN
+    a, b = lo, d + math.pi / SCAN
     for _ in range(80):
         c, e = b - 0.6180339887498949 * (b - a), a + 0.6180339887498949 * (b - a)
         gc = stick_excess(v, y, eta, x0, chart, s0, s0 + c - math.pi, c)
         ge = stick_excess(v, y, eta, x0, chart, s0, s0 + e - math.pi, e)
         if gc > 0.0 or ge > 0.0:
             return lo, c if gc > 0.0 else e
-        if gc > ge:
-            b = e
-        else:
-            a = c
+        a, b = (a, e) if gc > ge else (c, b)
     return 0.0, -1.0
 
 
 @solver_kernel
 def stick_end(v: float, y: float, eta: float, x0: float, chart: int, s0: float) -> tuple[float, float]:
     """Duration of stick and sigma at its end, less pi [rad]; (-1, 0) if the limit is not reached in half a period."""
-    if stick_excess(v, y, eta, x0, chart, s0, s0 - math.pi, 0.0) >= 0.0:
-        return 0.0, s0 - math.pi
     lo, hi = _reached(v, y, eta, x0, chart, s0)
     if hi < 0.0:
         return -1.0, 0.0
     fa = stick_excess(v, y, eta, x0, chart, s0, s0 + lo - math.pi, lo)
     fb = stick_excess(v, y, eta, x0, chart, s0, s0 + hi - math.pi, hi)
-    if hi > 2.0:  # long stick: solve for sigma1, which keeps its digits when it is small
-        s1 = _chandrupatla(v, y, eta, x0, chart, s0, s0 + lo - math.pi, s0 + hi - math.pi, fa, fb, hi > 2.0)
-        return math.pi - s0 + s1, s1
-    d = _chandrupatla(v, y, eta, x0, chart, s0, lo, hi, fa, fb, hi > 2.0)
-    return d, s0 + d - math.pi
+    long = hi > 2.0  # then solve for sigma1, which keeps its digits when it is small
+    if long:
+        lo, hi = s0 + lo - math.pi, s0 + hi - math.pi
+    x = _chandrupatla(v, y, eta, x0, chart, s0, lo, hi, fa, fb, long)
+    return (math.pi - s0 + x, x) if long else (x, s0 + x - math.pi)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,9 @@ __all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep", "solve_chunk"]
 
 Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
+#: the steady state; the continuous orbit whether or not lam stays positive, analytic across the border; the border,
+#: where the column deficit holds v~crit
+KINDS = {"full": 0, "continuous": 1, "border": 2}
 _RESULTS = steady.REGIME
 COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
 _MU, _DEFICIT, _ERROR, _STATUS = map(COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status"))
@@ -41,51 +44,28 @@ class CheckpointError(MumacroError):
 
 
 @solver_kernel
-def _full(v: Array, y: Array, eta: Array, out: Array) -> None:
-    """Steady states at (n,) points into rows of COLUMNS."""
+def _solve_rows(kind: int, points: Array, out: Array) -> None:
+    """Solve ``points`` (n, 3) into rows of COLUMNS; ``kind`` as in KINDS."""
     w, end, orbit, res = steady.workspace()
-    for i in range(v.size):
-        status = steady.solve_raw(v[i], y[i], eta[i], w, end, orbit, res)
-        out[i, :_RESULTS] = res[:_RESULTS]
-        out[i, _ERROR] = steady.error_estimate(out[i, _MU], out[i, _DEFICIT])
-        out[i, _STATUS] = status
-
-
-@solver_kernel
-def _continuous(v: Array, y: Array, _eta: Array, out: Array) -> None:
-    """The continuous orbit whether or not lam stays positive: it is analytic across the border."""
-    w, end, _, res = steady.workspace()
-    for i in range(v.size):
-        status = steady.continuous(v[i], y[i], w, end)
-        steady.sliding(v[i], y[i], end, res)
-        out[i, :_RESULTS] = res[:_RESULTS]
-        out[i, _ERROR] = steady.error_estimate(out[i, _MU], out[i, _DEFICIT])
-        out[i, _STATUS] = status
-
-
-@solver_kernel
-def _border(_v: Array, y: Array, _eta: Array, out: Array) -> None:
-    """v~crit at (n,) amplitudes into column 1, mu~ there into column 0."""
-    w, end, _, _ = steady.workspace()
-    for i in range(y.size):
-        crit, mu, status = steady.border_raw(y[i], w, end)
-        out[i] = 0.0
-        out[i, _MU], out[i, _DEFICIT], out[i, _ERROR] = mu, crit, steady.RELATIVE_ERROR * mu
-        out[i, _STATUS] = status
-
-
-_KINDS: dict[str, Callable[[Array, Array, Array, Array], None]] = {
-    "full": _full,
-    "continuous": _continuous,
-    "border": _border,
-}
+    for i in range(points.shape[0]):
+        v, y, eta = points[i]
+        if kind == 2:
+            res[_DEFICIT], res[_MU], status = steady.border_raw(y, w, end)
+            error = steady.RELATIVE_ERROR * res[_MU]
+        else:
+            if kind == 0:
+                status = steady.solve_raw(v, y, eta, w, end, orbit, res)
+            else:
+                status = steady.continuous(v, y, w, end)
+                steady.sliding(v, y, end, res)
+            error = steady.error_estimate(res[_MU], res[_DEFICIT])
+        out[i, :_RESULTS], out[i, _ERROR], out[i, _STATUS] = res[:_RESULTS], error, status
 
 
 def solve_chunk(kind: str, points: Array) -> Array:
-    """Solve ``points`` (n, 3) of v~, y~, y~ - 1; rows of :data:`COLUMNS` (for kind "border" v~crit is column 1)."""
+    """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; rows of :data:`COLUMNS`."""
     out = np.empty((points.shape[0], len(COLUMNS)))
-    v, y, eta = (np.ascontiguousarray(points[:, i]) for i in range(3))
-    _KINDS[kind](v, y, eta, out)
+    _solve_rows(KINDS[kind], np.ascontiguousarray(points), out)
     return out
 
 
@@ -127,19 +107,13 @@ class Sweep:
         eta = y - 1.0 if eta is None else np.broadcast_to(np.asarray(eta, dtype=np.float64), y.shape)
         check_range(v, y, eta)
         points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
-        out = self._load(kind, points)
-        if out is None:
-            out = self._run(kind, points)
-            self._save(kind, points, out)
+        out = self._run(kind, points) if self.checkpoint is None else self._kept(self.checkpoint, kind, points)
         self.n_solves += points.shape[0]
         failed = np.flatnonzero(out[:, _STATUS] != OK)
         if failed.size:
-            i = failed[0]
-            v_bad, y_bad = points[i, :2].tolist()
-            raise SolveError(
-                f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, y~={y_bad!r}: "
-                + steady.ADVICE[int(out[i, _STATUS])]
-            )
+            (v_bad, y_bad, _), status = points[failed[0]].tolist(), int(out[failed[0], _STATUS])
+            text = f"{failed.size} of {points.shape[0]} points failed, first v~={v_bad!r}, y~={y_bad!r}: "
+            raise SolveError(text + steady.ADVICE[status])
         return {name: out[:, i].reshape(v.shape) for i, name in enumerate(COLUMNS)}
 
     def _run(self, kind: str, points: Array) -> Array:
@@ -147,36 +121,21 @@ class Sweep:
         done = self._pool.map(lambda c: solve_chunk(kind, c), chunks)
         return np.concatenate([np.empty((0, len(COLUMNS))), *done])
 
-    def _file(self, kind: str, points: Array) -> Path | None:
-        if self.checkpoint is None:
-            return None
+    def _kept(self, folder: Path, kind: str, points: Array) -> Array:
+        """What the checkpoint holds of these points; else they are solved and stored."""
         # the digest of the sources: results of another version of the solver are not reused
-        digest = hashlib.sha256(
-            (source_digest() + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
-        ).hexdigest()
-        return self.checkpoint / f"{kind}-{digest[:32]}.npy"
-
-    def _load(self, kind: str, points: Array) -> Array | None:
-        file = self._file(kind, points)
-        if file is None or not file.exists():
-            return None
-        try:
+        text = (source_digest() + kind).encode() + np.ascontiguousarray(points, dtype="<f8").tobytes()
+        file = folder / f"{kind}-{hashlib.sha256(text).hexdigest()[:32]}.npy"
+        with suppress(OSError, ValueError, EOFError):  # a damaged file is solved again
             out: Array = np.load(file, allow_pickle=False)
-        except (OSError, ValueError, EOFError):
-            return None  # a damaged checkpoint is solved again
-        return out if out.shape == (points.shape[0], len(COLUMNS)) else None
-
-    def _save(self, kind: str, points: Array, out: Array) -> None:
-        file = self._file(kind, points)
-        if file is None:
-            return
-        content = io.BytesIO()
+            if out.shape == (points.shape[0], len(COLUMNS)):
+                return out
+        out, content = self._run(kind, points), io.BytesIO()
         np.save(content, out)
         try:
-            file.parent.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
             write_whole(file, content.getvalue())
         except OSError as error:
-            raise CheckpointError(
-                f"{file.parent}: finished work cannot be stored: {error.strerror or error}; repair that and give "
-                "the same command again: it resumes"
-            ) from error
+            why = f"{folder}: finished work cannot be stored: {error.strerror or error}"
+            raise CheckpointError(f"{why}; repair that and give the same command again: it resumes") from error
+        return out

@@ -10,36 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate, charts
-from mumacro.charts import (
-    CONTINUOUS,
-    QUANTITIES,
-    QUANTITY_NAMES,
-    REGIME_OF_SOURCE,
-    SOURCES,
-    Y_CONT,
-    Y_STICK_HI,
-    Y_STICK_LO,
-)
+from mumacro.charts import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
 
-from .differences import neighbours
+from .differences import Neighbours
 from .measure import SEAMS, fast_from, near_seams
 from .measure import log_uniform as _log
-from .quantities import SOLVED, SOLVER_NOISE, solver_noise
+from .quantities import ABS_TO_REL, solver_noise
 from .sweep import Sweep
 
-__all__ = ["CASES", "draw", "monotony", "seam_jumps", "seam_slope_jumps", "uncovered", "verify"]
+__all__ = ["CASES", "draw", "holds", "monotony", "seam_jumps", "seam_slope_jumps", "uncovered", "verify"]
 
 Array = NDArray[np.float64]
 BESIDE_BORDER = 1e-3  # of v~crit: nearer, slopes of what is not smooth at the border are not compared
 SLOPE_SHARE = 20  # one point in so many is also compared with differences, which take twelve solves each
 
 
-def _random(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
-    return _log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n)
-
-
-def _wide(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
-    return _log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n)
+def _corner(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    radius, psi = _log(rng, 1e-6, 1.3, n), rng.uniform(0.0, 0.5 * math.pi, n)
+    phi, s0 = radius * np.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * np.cos(psi)
+    return phi * s0 * s0 / (2.0 * math.pi), 1.0 + 0.25 * s0 * s0 - 0.5 * phi * phi
 
 
 def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
@@ -47,18 +36,8 @@ def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Arra
     return s.v_tilde_crit(y) * (1.0 + rng.choice([-1.0, 1.0], n) * _log(rng, 1e-12, 0.1, n)), y
 
 
-def _corner(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
-    radius, psi = _log(rng, 1e-6, 1.3, n), rng.uniform(0.0, 0.5 * math.pi, n)
-    phi, s0 = radius * np.sin(psi) / math.sqrt(2.0), math.sqrt(2.0) * radius * np.cos(psi)
-    return phi * s0 * s0 / (2.0 * math.pi), 1.0 + 0.25 * s0 * s0 - 0.5 * phi * phi
-
-
-def _creep(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
-    return _log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n)
-
-
-def _tails(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array]:
-    """Both tails: large amplitude at every speed, large speed at every amplitude, small amplitude."""
+def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """Large amplitude at every speed, large speed at every amplitude, small amplitude."""
     which = rng.integers(0, 3, n)
     v, y = _log(rng, 1e-6, 1e8, n), _log(rng, 1e5, 1e12, n)
     v = np.where(which == 1, _log(rng, 1e3, 1e8, n), v)
@@ -67,14 +46,15 @@ def _tails(rng: np.random.Generator, n: int, _: Surrogate) -> tuple[Array, Array
 
 
 #: name of the kind of case, share of the points, how they are drawn
-CASES: tuple[tuple[str, float, Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]], ...] = (
-    ("random", 0.30, _random),
-    ("wide", 0.20, _wide),
+_How = Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]
+CASES: tuple[tuple[str, float, _How], ...] = (
+    ("random", 0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
+    ("wide", 0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
     ("border", 0.12, _border),
-    ("corner", 0.12, _corner),
+    ("corner", 0.12, lambda rng, n, _: _corner(rng, n)),
     ("seams", 0.10, near_seams),
-    ("creep", 0.08, _creep),
-    ("tails", 0.08, _tails),
+    ("creep", 0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
+    ("tails", 0.08, lambda rng, n, _: _tails(rng, n)),
 )
 
 
@@ -89,113 +69,104 @@ def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Arr
 def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of the closed form."""
     rng = np.random.default_rng(seed)
+    low, high = 1 - 1e-13, 1 + 1e-13
     for seam in SEAMS:
         v = _log(rng, 1e-9, 1e5, n)
-        yield v, v, np.full(n, seam * (1 - 1e-13)), np.full(n, seam * (1 + 1e-13))
+        yield v, v, np.full(n, seam * low), np.full(n, seam * high)
     y = _log(rng, 1e-3, 1e7, n)
-    edges = [(surrogate.v_tilde_crit(y), y)]
-    y = rng.uniform(Y_STICK_LO, Y_STICK_HI, n)
-    edges.append((surrogate.v_tilde_crit(y) * charts.SIGMA_CUT**2, y))
-    y = _log(rng, Y_CONT, 1e8, n)
-    edges.append((fast_from(surrogate, y), y))
-    for v, y in edges:
-        yield v * (1 - 1e-13), v * (1 + 1e-13), y, y
+    yield (v := surrogate.v_tilde_crit(y)) * low, v * high, y, y
+    y = rng.uniform(charts.Y_STICK_LO, charts.Y_STICK_HI, n)
+    yield (v := surrogate.v_tilde_crit(y) * charts.SIGMA_CUT**2) * low, v * high, y, y
+    y = _log(rng, charts.Y_CONT, 1e8, n)
+    yield (v := fast_from(surrogate, y)) * low, v * high, y, y
 
 
 def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
     """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13 apart."""
-    worst = 0.0
-    for v1, v2, y1, y2 in _both_sides(surrogate, n, seed):
-        one, two = surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)
-        worst = max(worst, float((np.abs(one - two) / np.maximum(one, two)).max()))
-    return worst
+    pairs = _both_sides(surrogate, n, seed)
+    sides = ((surrogate.mu_ratio(v1, y1), surrogate.mu_ratio(v2, y2)) for v1, v2, y1, y2 in pairs)
+    return max(float((np.abs(one - two) / np.maximum(one, two)).max()) for one, two in sides)
 
 
 def seam_slope_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7) -> float:
     """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are continuous, too."""
-    worst = 0.0
-    for v1, v2, y1, y2 in _both_sides(surrogate, n, seed):
-        for one, two in zip(surrogate.slopes(v1, y1)[1:], surrogate.slopes(v2, y2)[1:], strict=True):
-            worst = max(worst, float(np.abs(one - two).max()))
-    return worst
+    pairs = _both_sides(surrogate, n, seed)
+    sides = ((surrogate.slopes(v1, y1), surrogate.slopes(v2, y2)) for v1, v2, y1, y2 in pairs)
+    return max(float(np.abs(np.subtract(one[1:], two[1:])).max()) for one, two in sides)
 
 
 def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11) -> float:
     """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across all seams [-]."""
-    rng = np.random.default_rng(seed)
-    worst = 0.0
-    rise = np.geomspace(1e-9, 1e7, n)
-    for fixed in _log(rng, 1e-4, 1e6, lines):
-        worst = max(worst, float(-np.diff(surrogate.mu_ratio(rise, fixed)).min()))
-        worst = max(worst, float(np.diff(surrogate.mu_ratio(fixed, rise)).max()))
-    return max(worst, 0.0)
+    rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
+    for fixed in _log(np.random.default_rng(seed), 1e-4, 1e6, lines):
+        steps = -np.diff(surrogate.mu_ratio(rise, fixed)), np.diff(surrogate.mu_ratio(fixed, rise))
+        worst = max(worst, float(np.max(steps)))
+    return worst
 
 
 class _Compared(NamedTuple):
-    """Errors beyond the solver's own, the bounds, and the sources of some values."""
+    """Errors, which are beyond the solver's own for all but mu~, the same relative to the value, bounds, sources."""
 
     error: Array
+    relative: Array
     bound: Array
+    missed: NDArray[np.bool_]
     source: NDArray[np.int8]
 
 
-def _report(parts: list[_Compared], relative: bool) -> dict[str, Any]:
-    error, bound, source = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    error_name, bound_name = ("max_rel_error", "max_rel_bound") if relative else ("max_abs_error", "max_bound")
-
-    def said(at: NDArray[np.bool_]) -> dict[str, Any]:
-        return {
-            error_name: float(error[at].max()),
-            bound_name: float(bound[at].max()),
-            "not_covered": int(np.count_nonzero(error[at] > bound[at])),
-        }
-
-    by_source = {SOURCES[code]: said(source == code) for code in np.unique(source)}
-    return {**said(np.ones(error.size, dtype=np.bool_)), "sources": dict(sorted(by_source.items()))}
+def _values(surrogate: Surrogate, name: str, v: Array, y: Array, solved: dict[str, Array]) -> _Compared:
+    value, bound, source = surrogate.quantity(name, v, y)
+    truth = solved[name]
+    noise = solver_noise(name, v, y, solved, REGIME_OF_SOURCE[source] == CONTINUOUS)
+    error = np.abs(value - truth)
+    missed = error > bound + noise
+    if name != "mu_ratio":
+        error = np.maximum(error - noise, 0.0)
+    scale = np.where(truth == 0.0, 1.0, truth)
+    return _Compared(error, error / scale, bound, missed, source)
 
 
-def _compare(
-    surrogate: Surrogate, v: Array, y: Array, source: NDArray[np.int8], solved: dict[str, Array]
-) -> dict[str, _Compared]:
-    """The quantities beside mu~."""
-    sliding = REGIME_OF_SOURCE[source] == CONTINUOUS
-    found = {}
-    for name in surrogate.table.quantities[1:]:
-        value, bound, _ = surrogate.quantity(name, v, y)
-        off = np.maximum(np.abs(value - solved[name]) - solver_noise(name, v, y, solved, sliding), 0.0)
-        scale = solved[name] if SOLVED[name].relative else np.ones_like(v)
-        found[name] = _Compared(off / scale, bound / scale, source)
-    return found
+def _slopes(surrogate: Surrogate, around: Neighbours, name: str) -> _Compared:
+    """The logarithmic slopes, both of each point."""
+    (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
+    source = surrogate.ratio_with_bound(v, y)[2]
+    _, along_v, along_y, *bounds = surrogate.slopes(v, y, name, bounds=True)
+    off, bound = np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0), np.stack(bounds)
+    # at the border of one that is not smooth there, the last digits of v~crit decide
+    keep = np.full(v.shape, True)
+    if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
+        keep = np.abs(v / around.crit - 1.0) > BESIDE_BORDER
+    off, bound = off[:, keep].ravel(), bound[:, keep].ravel()
+    return _Compared(off, off, bound, off > bound, np.tile(source[keep], 2))
 
 
-def _compare_slopes(
-    surrogate: Surrogate, sweep: Sweep, v: Array, y: Array, source: NDArray[np.int8]
-) -> dict[str, _Compared]:
-    """The logarithmic slopes of all quantities, both of each point."""
-    around = neighbours(surrogate, sweep, v, y)
-    found = {}
-    for name in surrogate.table.quantities:
-        truth, noise = around.slopes(name)
-        _, along_v, along_y, bound_v, bound_y = surrogate.slopes(v, y, name, bounds=True)
-        off = np.maximum(np.abs(np.stack((along_v, along_y)) - truth) - noise, 0.0)
-        # at the border of one that is not smooth there, the last digits of v~crit decide
-        keep = np.full(v.shape, True)
-        if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
-            keep = np.abs(v / around.crit - 1.0) > BESIDE_BORDER
-        found[name] = _Compared(
-            off[:, keep].ravel(), np.concatenate((bound_v[keep], bound_y[keep])), np.tile(source[keep], 2)
-        )
-    return found
+def _said(found: _Compared, at: Any = slice(None)) -> dict[str, Any]:
+    return {
+        "points": int(found.error[at].size),
+        "max_abs_error": float(found.error[at].max()),
+        "max_rel_error": float(found.relative[at].max()),
+        "max_bound": float(found.bound[at].max()),
+        "not_covered": int(np.count_nonzero(found.missed[at])),
+    }
+
+
+def _report(parts: list[_Compared]) -> dict[str, Any]:
+    """All together, and by source."""
+    whole = _Compared(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
+    return {**_said(whole), "sources": {name: _said(whole, whole.source == code) for name, code in names}}
 
 
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
     """Of the report of :func:`verify`: how many values and slopes of each quantity miss their bound."""
-    found = {"mu_ratio": report["not_covered"]}
-    for name in report["slopes"]:
-        if name in report:
-            found[name] = report[name]["not_covered"]
-        found[f"slopes of {name}"] = report["slopes"][name]["not_covered"]
-    return found
+    found = {name: report.get(name, report)["not_covered"] for name in report["slopes"]}
+    return found | {f"slopes of {name}": part["not_covered"] for name, part in report["slopes"].items()}
+
+
+def holds(report: dict[str, Any], tolerance: float) -> bool:
+    """Whether a report of :func:`verify` keeps the tolerance and every bound."""
+    errors = report["max_abs_error"] <= tolerance and report["max_rel_error"] <= ABS_TO_REL * tolerance
+    return errors and not any(uncovered(report).values())
 
 
 def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) -> dict[str, Any]:
@@ -204,58 +175,28 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     Returns
     -------
     dict
-        ``points``, ``max_abs_error``, ``max_rel_error``, ``not_covered`` (values whose error exceeds their bound),
-        ``cases`` and ``sources`` (the same, by kind of case and by block or closed form), ``seam_jump``,
-        ``seam_slope_jump``, ``monotony``; by name of each other quantity, and in ``slopes`` by name of each: largest
-        error beyond the solver's own, ``not_covered``, and the same by source.  Errors are absolute, those of the power
-        relative.  Slopes are those along ln v~ and ln y~, of one point in twenty.
+        Of mu~: ``points``, ``max_abs_error``, ``max_rel_error``, ``max_bound``, ``not_covered`` (values whose error
+        exceeds their bound), and the same by kind of case in ``cases`` and by block or closed form in ``sources``;
+        ``seam_jump``, ``seam_slope_jump``, ``monotony``.  By name the same of each other quantity, beyond the solver's
+        own error, and in ``slopes`` of the slopes of each along ln v~ and ln y~, absolute, of one point in twenty.
     """
-    report: dict[str, Any] = {"points": 0, "max_abs_error": 0.0, "max_rel_error": 0.0, "not_covered": 0}
-    values: dict[str, list[_Compared]] = {name: [] for name in surrogate.table.quantities[1:]}
-    slopes: dict[str, list[_Compared]] = {name: [] for name in surrogate.table.quantities}
-    cases: dict[str, dict[str, Any]] = {}
-    by_source: dict[str, list[tuple[Array, Array, Array]]] = {}
-    for i, (name, share, how) in enumerate(CASES):
-        n = max(1, math.ceil(share * points))
-        v, y = how(np.random.default_rng([seed, i]), n, surrogate)
-        keep = (v > 0.0) & (y > 0.0)
-        v, y = v[keep], y[keep]
-        mu, bound, source = surrogate.ratio_with_bound(v, y)
+    names = surrogate.table.quantities
+    values: dict[str, list[_Compared]] = {name: [] for name in names}
+    slopes: dict[str, list[_Compared]] = {name: [] for name in names}
+    for i, (_, share, how) in enumerate(CASES):
+        v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
+        v, y = v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)]
         solved = sweep.solve("full", v, y)
-        truth = solved["mu_ratio"]
-        for key, compared in _compare(surrogate, v, y, source, solved).items():
-            values[key].append(compared)
-        some = slice(0, None, SLOPE_SHARE)
-        for key, compared in _compare_slopes(surrogate, sweep, v[some], y[some], source[some]).items():
-            slopes[key].append(compared)
-        error = np.abs(mu - truth)
-        relative = error / truth
-        missed = int(np.count_nonzero(error > bound + SOLVER_NOISE * truth))
-        cases[name] = {
-            "points": int(v.size), "max_abs_error": float(error.max()), "max_rel_error": float(relative.max()),
-            "not_covered": missed,
-        }  # fmt: skip
-        report["points"] += int(v.size)
-        report["not_covered"] += missed
-        for key in ("max_abs_error", "max_rel_error"):
-            report[key] = max(report[key], cases[name][key])
-        for code in np.unique(source):
-            at = source == code
-            by_source.setdefault(SOURCES[code], []).append((error[at], relative[at], bound[at]))
-    report["cases"] = cases
-    report["sources"] = {
-        name: {
-            "points": int(sum(e.size for e, _, _ in parts)),
-            "max_abs_error": float(max(e.max() for e, _, _ in parts)),
-            "max_rel_error": float(max(r.max() for _, r, _ in parts)),
-            "max_bound": float(max(b.max() for _, _, b in parts)),
-        }
-        for name, parts in sorted(by_source.items())
+        around = Neighbours(surrogate, sweep, v[::SLOPE_SHARE], y[::SLOPE_SHARE])
+        for name in names:
+            values[name].append(_values(surrogate, name, v, y, solved))
+            slopes[name].append(_slopes(surrogate, around, name))
+    return {
+        **_report(values["mu_ratio"]),
+        "cases": {case: _said(part) for (case, _, _), part in zip(CASES, values["mu_ratio"], strict=True)},
+        **{name: _report(values[name]) for name in names[1:]},
+        "slopes": {name: _report(parts) for name, parts in slopes.items()},
+        "seam_jump": seam_jumps(surrogate),
+        "seam_slope_jump": seam_slope_jumps(surrogate),
+        "monotony": monotony(surrogate),
     }
-    for key, parts in values.items():
-        report[key] = _report(parts, SOLVED[key].relative)
-    report["slopes"] = {key: _report(parts, False) for key, parts in slopes.items()}
-    report["seam_jump"] = seam_jumps(surrogate)
-    report["seam_slope_jump"] = seam_slope_jumps(surrogate)
-    report["monotony"] = monotony(surrogate)
-    return report

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 
 from mumacro.files.answering import numbers
 from mumacro.files.columns import find_columns
-from mumacro.files.reading import CsvSource, NdjsonSource
-from mumacro.files.records import Place
+from mumacro.files.reading import CsvSource, NdjsonSource, Place
 
 NAMES = ("mu0", "Fz", "y0", "omega", "v0")  # k may be rigid: text that is no number is valid there
 TOTAL = 10_000_000

@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import math
 import os
 import re
 import sys
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, check_inputs, read_number, scale_of, suggestion
+from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, check_inputs, read_number, read_range, scale_of, suggestion
 from mumacro.surrogate import Surrogate
 
-__all__ = ["ImpossibleError", "OneLineParser", "UsageError", "as_json", "open_table", "read_case", "read_value", "run"]
+__all__ = [
+    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_form", "add_table", "as_json",
+    "in_columns", "open_table", "read_case", "read_values", "run", "write_result",
+]  # fmt: skip
+
+INPUTS = """\
+inputs, each as name=value, in SI units or with a unit as in y0=2um:
+  mu0    Coulomb friction coefficient [-], > 0
+  Fz     normal force [N], > 0
+  k      tangential stiffness [N/m], > 0, or rigid
+  y0     amplitude of the transverse oscillation [m], >= 0
+  omega  its angular frequency [rad/s], or f, its frequency [Hz], >= 0
+  v0     sliding speed [m/s], >= 0
+"""
 
 
 class UsageError(Exception):
@@ -38,6 +53,21 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
+
+
+def add_table(parser: OneLineParser, words: str | None = None) -> None:
+    """The options of all commands that answer, after the inputs, if there are any, explained by ``words``."""
+    if words is not None:
+        parser.add_argument("words", nargs="*" if words.startswith("a case") else "+", metavar="name=value", help=words)
+    text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
+    parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
+    add_form(parser)
+
+
+def add_form(parser: OneLineParser) -> None:
+    """The options for the form of a result."""
+    parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
+    parser.add_argument("--digits", type=int, choices=range(1, 18), default=6, metavar="N", help="default: 6; 15: all")
 
 
 def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
@@ -65,7 +95,10 @@ def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
     return code
 
 
-def read_case(words: Sequence[str], without: str | None = None) -> dict[str, float]:
+# --- what a person writes -------------------------------------------------------------------------------
+
+
+def read_case(words: Sequence[str], without: str | None = None, ranges: bool = False) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; an infinite ``k`` is rigid.
 
     Parameters
@@ -74,6 +107,8 @@ def read_case(words: Sequence[str], without: str | None = None) -> dict[str, flo
         Each holds any number of ``name=value``, with or without a unit.
     without : str, optional
         The unknown or swept input, which must not be among them.
+    ranges : bool
+        ``k`` may be ``low..high``; then it is the pair of both.
 
     Returns
     -------
@@ -91,7 +126,7 @@ def read_case(words: Sequence[str], without: str | None = None) -> dict[str, flo
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
     1000000.0
     """
-    case: dict[str, float] = {}
+    case: dict[str, Any] = {}
     faults = []
     for name, text in _pairs(words):
         if text is None:
@@ -107,6 +142,9 @@ def read_case(words: Sequence[str], without: str | None = None) -> dict[str, flo
             faults.append(f"{name} is given twice")
         case[name] = math.nan
         try:
+            if ".." in text and name == "k" and ranges:
+                case[name] = read_range(name, text)
+                continue
             case[name] = read_number(name, text)
             field, value = ("omega", case[name] * RAD_PER_CYCLE) if name == "f" else (name, case[name])
             check_inputs({field: np.asarray(value)}, case[name] if name == "f" else None)
@@ -133,7 +171,7 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
     return found
 
 
-def _faults_of_names(case: dict[str, float], without: str | None) -> list[str]:
+def _faults_of_names(case: Mapping[str, Any], without: str | None) -> list[str]:
     frequencies = {"f", "omega"}
     left_out = frequencies if without in frequencies else {without}
     faults = [f"leave {name} out: {without} is the unknown or the swept input" for name in case if name in left_out]
@@ -145,12 +183,17 @@ def _faults_of_names(case: dict[str, float], without: str | None) -> list[str]:
     return faults + (["missing: " + ", ".join(absent)] if absent else [])
 
 
-def read_value(name: str, text: str) -> float:
-    """A value of an input, with or without a unit, in SI; UsageError where it is none."""
-    try:
-        return read_number(name, text)
-    except ValueError as error:
-        raise UsageError(str(error)) from None
+def read_values(given: Iterable[tuple[str, str]]) -> list[float]:
+    """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that are none."""
+    values, faults = [], []
+    for name, text in given:
+        try:
+            values.append(read_number(name, text))
+        except ValueError as error:
+            faults.append(str(error))
+    if faults:
+        raise UsageError("; ".join(dict.fromkeys(faults)))
+    return values
 
 
 def open_table(which: str | None) -> Surrogate:
@@ -161,6 +204,37 @@ def open_table(which: str | None) -> Surrogate:
         if which is None or not re.search(r"[^\d.eE+-]", which):
             raise
         return Surrogate.open(Path(which))
+
+
+# --- results --------------------------------------------------------------------------------------------
+
+
+def about(surrogate: Surrogate) -> dict[str, Any]:
+    """What names a table in JSON."""
+    return {"id": surrogate.id, "tolerance": surrogate.tolerance}
+
+
+def in_columns(rows: Iterable[Sequence[str]]) -> str:
+    """Rows of cells as text in columns."""
+    columns = list(zip_longest(*rows, fillvalue=""))
+    padded = ([cell.ljust(max(map(len, column))) for cell in column] for column in columns)
+    return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
+
+
+def write_result(path: Path, columns: Mapping[str, Sequence[Any]], draw: Callable[[Any], Any]) -> str:
+    """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that names the file."""
+    if path.suffix == ".csv":
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            rows = csv.writer(stream, lineterminator="\n")
+            rows.writerow(columns)
+            rows.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+    else:
+        from mumacro import plotting
+
+        if path.suffix not in plotting.ENDINGS:
+            raise UsageError(f"-o {path}: the name must end in .csv, {', '.join(plotting.ENDINGS)}")
+        plotting.save(path, draw)
+    return f"written: {path}"
 
 
 def as_json(value: object) -> str:

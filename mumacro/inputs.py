@@ -22,33 +22,11 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 
 __all__ = [
-    "BOUNDS",
-    "FIELDS",
-    "GAP",
-    "MOST_HZ",
-    "NAMES",
-    "PER_UNIT",
-    "POSITIVE",
-    "RAD_PER_CYCLE",
-    "RIGID",
-    "SI",
-    "UNITS",
-    "UNITS_OF",
-    "Scale",
-    "as_columns",
-    "check_inputs",
-    "is_rigid",
-    "length_scale",
-    "number_hint",
-    "read_number",
-    "read_quantity",
-    "real",
-    "refusal",
-    "scale_of",
-    "split_unit",
-    "suggestion",
+    "BODIES", "BOUNDS", "FIELDS", "GAP", "MOST_HZ", "NAMES", "PER_UNIT", "POSITIVE", "RAD_PER_CYCLE", "RIGID", "SI",
+    "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "is_rigid", "length_scale", "number_hint",
+    "read_number", "read_quantity", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion",
     "unknown_name",
-]
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -118,6 +96,13 @@ UNITS_OF: dict[str, dict[str, Scale]] = {
     },
 }  # fmt: skip
 
+_PRESSURE = {"Pa": Scale(), "kPa": Scale(1e3), "MPa": Scale(1e6), "GPa": Scale(1e9), "N/mm2": Scale(1e6)}
+#: what else a person types, of two bodies in contact: SI unit, its words, known units
+BODIES: dict[str, tuple[str, str, dict[str, Scale]]] = {
+    "radius": ("m", "metres", _LENGTH), "length": ("m", "metres", _LENGTH),
+    "E": ("Pa", "pascals", _PRESSURE), "nu": ("-", "a plain number", UNITS_OF["mu0"]),
+}  # fmt: skip
+
 # Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a file that has one of
 # them while the input itself is missing is refused.
 _OTHER_NAMES = {
@@ -176,7 +161,7 @@ def scale_of(name: str, unit: str) -> Scale | None:
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
     """
-    return _scale(UNITS_OF[name], unit)
+    return _scale(UNITS_OF[name] if name in SI else BODIES[name][2], unit)
 
 
 def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
@@ -260,7 +245,8 @@ def read_number(name: str, text: str) -> float:
     ...
     ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
     """
-    return read_quantity(name, text, SI[name][1], UNITS_OF[name], rigid=name == "k")
+    words, units = (SI[name][1], UNITS_OF[name]) if name in SI else BODIES[name][1:]
+    return read_quantity(name, text, words, units, rigid=name == "k")
 
 
 def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False) -> float:
@@ -279,6 +265,21 @@ def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], 
     known = ", ".join([unit for unit in units if unit][:4])
     hint = ", or rigid" if rigid else ""
     raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, ...{hint}")
+
+
+def read_range(name: str, text: str) -> tuple[float, float]:
+    """Both ends of ``low..high`` in SI; a unit behind the second end holds for both.  ValueError as in read_number.
+
+    >>> read_range("k", "0.8..1.2 N/um")
+    (800000.0, 1200000.0)
+    """
+    low, _, high = text.partition("..")
+    if _PLAIN.fullmatch(low.strip()) and (found := _WITH_UNIT.fullmatch(high.strip())):
+        low = f"{low} {found[2]}"
+    ends = read_number(name, low), read_number(name, high)
+    if not 0.0 < ends[0] < ends[1] < math.inf:
+        raise ValueError(f"{name}={text}: the ends of a range must be > 0, finite and ascending")
+    return ends
 
 
 # --- columns --------------------------------------------------------------------------------------------

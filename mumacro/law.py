@@ -95,6 +95,12 @@ class Law:
     mu_static: Array
     border: tuple[Crossing, ...]
 
+    def plot(self, axes: Any = None) -> Any:
+        """A picture, see :func:`mumacro.plotting.plot_law`; needs matplotlib."""
+        from mumacro.plotting import plot_law
+
+        return plot_law(self, axes)
+
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
     """``points`` values from ``start`` to ``stop``, both included exactly.

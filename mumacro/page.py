@@ -6,6 +6,7 @@ The service serves it, and ``python -m builder.export_page`` writes it into a fo
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,12 @@ _PAPER_BORDERS = tuple(name for name in BORDERS if name in EQUATIONS.values() an
 _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
 
 
-def names(guide: bool) -> dict[str, Any]:
-    """``names.json``: inputs, units, bounds, approximations and borders, and whether there is a guide."""
+def names(knows: Iterable[str] = ()) -> dict[str, Any]:
+    """``names.json``: inputs, units, bounds, approximations, borders, and the names of what the page's host ``knows``.
+
+    The page shows what needs them only if they are there: ``service`` (everything that is computed by the service),
+    ``guide``, and ``contact``, ``direction``, ``k_range``, fields of a case.
+    """
     inputs = {
         name: {
             "unit": SI[name][0], "bound": refusal(name, -1.0).removeprefix("must be "), "positive": name in POSITIVE,
@@ -41,7 +46,7 @@ def names(guide: bool) -> dict[str, Any]:
     }  # fmt: skip
     about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
     of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
-    return {"inputs": inputs, "approximations": about, "borders": of_paper, "guide": guide}
+    return {"inputs": inputs, "approximations": about, "borders": of_paper, "knows": list(knows)}
 
 
 def map_of(surrogate: Surrogate) -> dict[str, Any]:

@@ -31,15 +31,8 @@ from mumacro.errors import TableError
 from mumacro.writing import write_whole
 
 __all__ = [
-    "FORMAT_VERSION",
-    "Block",
-    "BorderPiece",
-    "Table",
-    "json_attributes",
-    "parse_table",
-    "read_table",
-    "write_table",
-]
+    "FORMAT_VERSION", "Block", "BorderPiece", "Table", "json_attributes", "parse_table", "read_table", "write_table",
+]  # fmt: skip
 
 FORMAT_VERSION = 3
 # More is refused before memory is taken; of the largest table that the builder makes:

@@ -1,14 +1,34 @@
 """A headless Chromium that opens the page, for tests and screenshots."""
 
-import base64
 import json
+import math
 import re
 import shutil
 import time
-
-import numpy as np
+from contextlib import contextmanager
 
 PATIENCE_S = 120  # a browser on a busy machine can be slow
+#: the case that the page starts with
+START = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
+
+#: a service that knows contacts, directions and intervals of k, and answers as for one spring across
+KNOWING = """async (path, options = {}) => {
+  window.asked ??= [];
+  const say = (body) => new Response(JSON.stringify(body));
+  if (path.includes('names.json')) {
+    const told = await (await real(path)).json();
+    return say({ ...told, knows: [...told.knows, 'contact', 'direction', 'k_range'] });
+  }
+  if (options.method !== 'POST') return real(path, options);
+  const { contact, direction, k_range, Fz_amplitude, ...body } = JSON.parse(options.body);
+  window.asked.push([path, JSON.parse(options.body)]);
+  if (direction === 'normal' && body.along !== 'y0') body.y0 = 1e-6;
+  const ask = async (k) => (await real(path, { ...options, body: JSON.stringify({ ...body, k }) })).json();
+  if (!k_range) return say(await ask(body.k));
+  const [low, high] = await Promise.all(k_range.map(ask));
+  const [mu_macro_high, mu_macro_low] = [low.mu_macro, high.mu_macro];
+  return say({ ...low, mu_macro: (mu_macro_low + mu_macro_high) / 2, mu_macro_low, mu_macro_high });
+}"""
 
 
 def start(folder):
@@ -47,7 +67,7 @@ class Opened:
     def __init__(self, browser, url):
         self.browser, self.url, self.shown = browser, url, None
 
-    def __call__(self, address="", width=1400, height=1000, url=None, path="", new=False):
+    def __call__(self, address="", width=1400, height=1000, url=None, path="", new=False, wait=True):
         wanted = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
         if new or wanted != self.shown or path:
@@ -64,9 +84,20 @@ class Opened:
                 "const heard = new Promise((done) => addEventListener('hashchange', done, { once: true }));"
                 f"location.hash = {json.dumps(address or '#mu0=0.3')}; await heard;"
             )
-        if not path and url is None:
+        if wait and not path and url is None:
             page.settle()
         return page
+
+    @contextmanager
+    def faked(self, function, address="", **size):
+        """The page with a function in the place of ``fetch`` from its first question on; ``real`` is the true one."""
+        source = f"const real = window.fetch; window.fetch = {function};"
+        added = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
+        try:
+            yield self(address, new=True, wait=False, **size)
+        finally:
+            self.browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
+            self.shown = None
 
 
 class Page:
@@ -76,9 +107,12 @@ class Page:
         self.browser, self.url = browser, url
 
     @staticmethod
-    def rounded(value, digits=6):
+    def rounded(value, digits=4):
         """A number as the page shows it."""
         return float(f"{value:.{digits - 1}e}")
+
+    def number(self, selector="#mu"):
+        return float(self.text(selector))
 
     def run(self, script):
         return self.browser.execute_async_script(
@@ -86,10 +120,11 @@ class Page:
         )
 
     def settle(self):
-        """Wait until every request that follows from the state is answered."""
+        """Wait until every request that follows from the state is answered, and what follows is drawn."""
         self.run(
             "while (document.getElementById('main')?.dataset.asking !== 'false')"
             " await new Promise((next) => setTimeout(next, 10));"
+            "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
         return self
 
@@ -148,23 +183,24 @@ class Page:
     def is_old(self, selector="#main"):
         return "old" in self.find(selector).get_attribute("class").split()
 
+    def is_red(self, selector):
+        """Whether a text has the colour of errors."""
+        colour = self.run(f"return getComputedStyle(document.querySelector({selector!r})).color;")
+        return colour == "rgb(179, 38, 30)"  # --bad of the light scheme
+
     def complaints(self):
         return [
             entry["message"] for entry in self.browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")
         ]
 
-    def pixels(self, name):
-        """The pixels of a canvas, (height, width, 4)."""
-        found = self.run(
-            f"const canvas = document.getElementById('{name}'); await new Promise(requestAnimationFrame);"
-            "const copy = new OffscreenCanvas(canvas.width, canvas.height)"
-            ".getContext('2d', { willReadFrequently: true });"
-            "copy.drawImage(canvas, 0, 0); const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);"
-            "let text = ''; for (let i = 0; i < data.length; i += 8192)"
-            " text += String.fromCharCode(...data.subarray(i, i + 8192));"
-            "return [canvas.height, canvas.width, btoa(text)];"
+    def place(self, name):
+        """Where the user's point is drawn in a plot, as shares of it: left to right, top to bottom."""
+        return self.run(
+            f"const [plot, point] = ['#{name}', '#{name} .point'].map((one) =>"
+            " document.querySelector(one).getBoundingClientRect());"
+            "return [(point.x + point.width / 2 - plot.x) / plot.width,"
+            " (point.y + point.height / 2 - plot.y) / plot.height];"
         )
-        return np.frombuffer(base64.b64decode(found[2]), np.uint8).reshape(found[0], found[1], 4)
 
     def touched(self, selector, x, y, click=False):
         """Move the pointer to a relative position in an element."""
@@ -189,8 +225,15 @@ class Page:
         return folder / name
 
     def scheme(self, name):
+        """Switch to the light or dark scheme, and wait until every colour has changed."""
         media = {"features": [{"name": "prefers-color-scheme", "value": name}]}
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+        self.run(
+            f"while (!matchMedia('(prefers-color-scheme: {name})').matches) await new Promise(requestAnimationFrame);"
+            "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"  # listeners of the change ran
+            "const changes = document.getAnimations().filter((one) => one instanceof CSSTransition);"
+            "await Promise.allSettled(changes.map((one) => one.finished));"
+        )
 
     def offline(self, state):
         rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from builder.assemble import ABS_TO_REL
+from comparing import close
 from mumacro import Surrogate
 from mumacro.table import read_table, write_table
 
@@ -27,7 +28,6 @@ def refused(done: Any, *parts: str) -> None:
         assert part in message
 
 
-@pytest.mark.slow
 def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) -> None:
     out = tmp_path / "rough.nc"
     done = run_builder("build", "--tolerance", "1e-3", "--out", out, "--workers", 2)
@@ -46,6 +46,7 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     verified = run_builder("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
     assert json.loads(verified.stdout)["holds"] is True
+    assert json.loads(verified.stdout)["not_covered"] == 0
 
 
 def test_build_refuses_a_folder_as_its_output(run_builder: Run, tmp_path: Path) -> None:
@@ -55,6 +56,8 @@ def test_build_refuses_a_folder_as_its_output(run_builder: Run, tmp_path: Path) 
 
 
 def test_solve_answers_at_the_ends_of_its_range(run_builder: Run) -> None:
+    done = run_builder("solve", "--v", 0.1, "--y", 0.5)
+    assert json.loads(done.stdout)["mu_ratio"] == close(0.9420042895137095, abs=1e-15)
     for v, y in (("1e10", "1e-15"), ("1e-60", "1e14")):
         done = run_builder("solve", "--v", v, "--y", y)
         assert done.returncode == 0, done.stderr
@@ -101,6 +104,21 @@ def test_verify_refuses_a_damaged_table(run_builder: Run, tables_dir: Path, tmp_
         (("verify", "x.nc", "--points", "99999999"), ("--points",)),
         (("verify", "x.nc", "--seed", "-1"), ("--seed",)),
         (("verify", "x.nc", "--workers", "0"), ("--workers",)),
+        (("build", "--tolerance", "1e-15", "--out", "x.nc"), ("1e-15",)),
+        (("build", "--tolerance", "nan", "--out", "x.nc"), ("--tolerance",)),
+        (("build", "--tolerance", "1e-3", "--out", "no/such/folder/x.nc"), ("no/such/folder",)),
+        (("build", "--tolerance", "1e-3", "--out", "x.nc", "--workers", "0"), ("--workers",)),
+        (("verify", "no-such-table.nc"), ("no-such-table.nc",)),
+        (("verify", "README.md"), ("README.md",)),
+        (("verify", "x.nc", "--points", "1"), ("--points",)),
+        (("figures", "--out", "no/such/folder"), ("--out",)),
+        (("figures", "--out", ".", "--table", "no-such-table.nc"), ("no-such-table.nc",)),
+        (("bake",), ("bake",)),
+        (("solve", "--v", "-1", "--y", "1"), ("--v",)),
+        (("solve", "--v", "1", "--y", "0"), ("--y",)),
+        (("solve", "--v", "nan", "--y", "1"), ("--v",)),
+        (("solve", "--v", "fast", "--y", "1"), ("--v",)),
+        (("solve", "--v", "1"), ("--y",)),
         (("verify",), ("required: table",)),
         (("solve", "--v", "", "--y", "1"), ("--v",)),
         (("solve", "--v", "1", "--y=-inf"), ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers")),

@@ -1,4 +1,4 @@
-"""mumacro.h from Fortran, Octave, Abaqus and Modelica interfaces: compiled by their tools and compared with Python."""
+"""mumacro.h from Fortran, Octave, Abaqus and Modelica: compiled by their tools and compared with Python."""
 
 import re
 import shutil
@@ -141,3 +141,11 @@ def test_the_files_compile_to_one_library(compilers, folder):
     declared = re.findall(r"MUMACRO_API .*?(mumacro_\w+)\(", (folder / "mumacro.h").read_text("ascii"))
     assert len(declared) == 18
     assert public == {*declared, "mumacro_table"}
+
+
+def test_modelicas_function_and_its_derivative_compile(repository, tmp_path):
+    rumoca = pytest.importorskip("rumoca", reason="the Modelica compiler rumoca is not installed")
+    source = shutil.copy(repository / "examples" / "c" / "Mumacro.mo", tmp_path)
+    assert [str(found) for found in rumoca.validate(str(source), model="Mumacro.SlidingMass")] == []
+    model = rumoca.Session().load(str(source), model="Mumacro.SlidingMass")
+    assert [one.name for one in model.states] == ["v"]

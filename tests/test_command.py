@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import Surrogate
+from mumacro import Surrogate, stiffness
 from mumacro.__main__ import COMMANDS, main
 from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 
@@ -37,7 +37,7 @@ def said(capsys, code, *words):
 
 
 def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightest):
-    text = said(capsys, 0, CASE)
+    text = said(capsys, 0, CASE, "--digits", "15")
     expected = tightest.evaluate(**VALUES)
     row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
     assert float(row.split()[1]) == close(expected.mu_macro, rel=1e-14)
@@ -45,6 +45,7 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightes
     assert f"+- {expected.error_bound:.2g}" in row
     for part in (expected.regime, expected.source, tightest.id):
         assert part in text
+    assert f"{expected.mu_macro:.6g} " in said(capsys, 0, CASE)
 
 
 def test_json_has_every_bit_and_the_inputs_may_be_separate_arguments(capsys, tightest):
@@ -147,14 +148,14 @@ def test_every_command_explains_itself(capsys, word):
     assert caught.value.code == 0
     text = capsys.readouterr().out
     assert "usage: " in text
-    if word in ("", "law", "solve-for"):
+    if word in ("", "law", "solve-for", "map"):
         assert all(f"[{unit}]" in text for unit, _ in SI.values())
     if word not in ("serve",):
         assert "mumacro " + word in text
 
 
 @pytest.mark.parametrize(
-    "words", [("--sideways",), ("law", CASE), LAW_FROM, ("solve-for", "mass", CASE), ("solve-for",)]
+    "words", [("--sideways",), ("law", CASE, "--digits", "0"), LAW_FROM, ("solve-for", "mass", CASE), ("solve-for",)]
 )
 def test_wrong_options_are_reported_in_one_line(capsys, words):
     with pytest.raises(SystemExit) as caught:
@@ -192,6 +193,113 @@ def test_a_law_along_the_frequency_is_one_along_omega(capsys):
     assert over_f["border"][0]["f"] * math.tau == close(over_omega["border"][0]["omega"], rel=1e-14)
     text = said(capsys, 0, "law", known, "--along", "f", "--from", "100", "--to", "1e5", "--approximations")
     assert "small_amplitude" in text
+
+
+def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(capsys, tightest):
+    case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-5, "omega": 1e5, "v0": 0.02}  # r = 100: mu_macro rises and falls along k
+    words = "mu0=0.3 Fz=10N k=0.1..100 N/um y0=20um omega=1e5 v0=2cm/s"
+    found = json.loads(said(capsys, 0, words, "--json"))
+    k = np.geomspace(1e5, 1e8, 20_001)
+    mu = tightest.evaluate(**case, k=k).mu_macro
+    low, high = (found["k_range"][f"mu_macro_{end}"] for end in ("low", "high"))
+    assert (low, high) == (close(mu.min(), rel=1e-6), close(mu.max(), rel=1e-6))
+    assert low <= mu.min() <= mu.max() <= high
+    assert found["inputs"]["k"] == close(math.sqrt(1e5 * 1e8), rel=1e-15)
+    assert f"{low:.6g}" in said(capsys, 0, words)
+    for wrong in ("2..1 N/um", "0..1 N/um", "1..inf", "a..2"):
+        assert "k=" in said(capsys, 2, words.replace("0.1..100 N/um", wrong.replace(" ", "")))
+    assert "k=1..2" in said(capsys, 2, "law", words.replace("0.1..100 N/um", "1..2").replace("v0=2cm/s", ""),
+                            "--along", "v0", "1", "2")  # fmt: skip
+
+
+PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s", "1m/s"),
+            "solve-for": ("solve-for", "y0", CASE.replace("y0=2e-6", ""), "--target", "0.15"),
+            "rest": ("solve-for", "v0", CASE.replace("v0=0.01", ""), "--target", "0.25", "--between", "0", "1"),
+            "map": ("map", CASE)}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", PICTURES.values(), ids=PICTURES)
+def test_results_go_into_pictures_and_csv(capsys, tmp_path, words):
+    pytest.importorskip("matplotlib")
+    for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
+        out = tmp_path / f"out{ending}"
+        assert str(out) in said(capsys, 0, *words, "-o", str(out))
+        assert out.read_bytes().startswith(begin)
+    said(capsys, 0, *words, "-o", str(tmp_path / "out.csv"))
+    head, *rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert rows
+    assert {row.count(",") for row in rows} == {head.count(",")}
+    assert "must end in .csv, .png" in said(capsys, 2, *words, "-o", str(tmp_path / "out.xyz"))
+    assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
+
+
+def test_a_law_in_csv_has_heads_with_units_and_all_digits(capsys, tmp_path, tightest):
+    out = tmp_path / "law.csv"
+    known = CASE.replace("v0=0.01", "")
+    said(capsys, 0, "law", "--along", "v0", "1mm/s", "1m/s", known, "--points", "3", "-o", str(out))
+    head, *rows = out.read_text().splitlines()
+    assert head == "v0 [m/s],mu_macro,regime,error_bound,source,mu_static"
+    for row in rows:
+        v0, mu = row.split(",")[:2]
+        assert float(mu) == tightest.evaluate(**{**VALUES, "v0": float(v0)}).mu_macro
+
+
+def test_without_matplotlib_a_picture_names_the_extra(capsys, tmp_path, monkeypatch):
+    for name in ("figure", "pyplot"):
+        monkeypatch.setitem(sys.modules, f"matplotlib.{name}", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "pip install 'mumacro[plot]'" in said(capsys, 1, "map", "-o", str(tmp_path / "map.png"))
+
+
+def test_a_case_beyond_the_map_is_said_to_be_so(capsys, tmp_path):
+    pytest.importorskip("matplotlib")
+    out = str(tmp_path / "map.png")
+    assert "outside" not in said(capsys, 0, "map", CASE, "-o", out)
+    for case in (CASE.replace("1e6", "rigid"), CASE.replace("0.01", "0"), CASE.replace("1e6", "1e30")):
+        assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)
+
+
+def test_objects_plot_themselves(tightest):
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    from mumacro.law import friction_law
+    from mumacro.plotting import plot_answer, plot_map
+
+    known = {name: value for name, value in VALUES.items() if name != "v0"}
+    law = friction_law(tightest, "v0", np.geomspace(1e-3, 1.0, 20), known)
+    axes = law.plot(figure.add_subplot())
+    np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro)))
+    assert [line.get_xdata()[0] for line in axes.lines[2:]] == [crossing.value for crossing in law.border]
+    axes = plot_map(tightest, figure.add_subplot(), point=(0.1, 0.5))
+    v, y = axes.lines[0].get_data()
+    np.testing.assert_array_equal(v, tightest.v_tilde_crit(y))
+    assert axes.lines[1].get_xydata().tolist() == [[0.1, 0.5]]
+    many = tightest.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
+    axes = plot_answer(many, figure.add_subplot())
+    shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
+    assert shown == {"continuous": 2, "stick_slip": 1}  # v~ = 0 has no place on a logarithmic axis
+    with pytest.raises(AttributeError, match="groups=True"):
+        plot_answer(tightest.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}), figure.add_subplot())
+
+
+def test_stiffness_from_materials_with_units(capsys):
+    ball = ("stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
+    found = json.loads(said(capsys, 0, *ball, "--json"))
+    steel = stiffness.Material(210e9, 0.3)
+    assert (found["k"], found["contact"]) == (stiffness.ball_on_flat(5e-3, 10.0, steel, steel).k, "ball")
+    soft = json.loads(said(capsys, 0, *ball, "--E2", "3 MPa", "--nu2", "0.5", "--json"))
+    assert soft["k"] == stiffness.ball_on_flat(5e-3, 10.0, steel, stiffness.Material(3e6, 0.5)).k
+    text = said(capsys, 0, "stiffness", "flat", *ball[2:])
+    assert "spring" in text
+    assert f"{stiffness.flat_punch(5e-3, 10.0, steel, steel).k:.6g}" in text
+    lying = ("stiffness", "cylinder", *ball[2:], "--length", "1cm", "--json")
+    ks = [json.loads(said(capsys, 0, *lying, *more))["k"] for more in ((), ("--along",))]
+    assert ks == [stiffness.cylinder_on_flat(5e-3, 0.01, 10.0, steel, steel, along).k for along in (False, True)]
+    message = said(capsys, 2, *ball[:3], "5mN", "--Fz", "10V", *ball[6:])
+    assert "radius=5mN" in message
+    assert "Fz=10V" in message
+    assert "--length is missing" in said(capsys, 2, "stiffness", "cylinder", *ball[2:])
+    assert "leave it out" in said(capsys, 2, *ball, "--length", "1")
+    assert "nu must be" in said(capsys, 2, *ball[:-1], "0.7")
 
 
 @pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])
@@ -234,6 +342,14 @@ def test_export_is_that_of_the_builder(capsys, tmp_path, tables_dir):
     found = json.loads(said(capsys, 0, "export", "--format", "csv", "--out", str(out), "--table", "1e-4"))
     assert found["table"] == str(tables_dir / "mumacro-1e-4.nc")
     assert out.read_text().startswith("v_tilde,")
+
+
+def test_a_law_needs_a_range_and_a_known_name(capsys):
+    assert "--along v0 LOW HIGH" in said(capsys, 2, "law", CASE)
+    assert "--along v0 LOW HIGH" in said(capsys, 2, "law", CASE, "--along", "v0", "1", "2", "3")
+    assert "--along v: the swept input is one of mu0" in said(capsys, 2, "law", CASE, "--along", "v", "1", "2")
+    both = said(capsys, 2, "law", CASE.replace("v0=0.01", ""), "--along", "v0", "1s", "2s")
+    assert both.count("give metres per second") == 2
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
-"""The figures, of cycles and of the paper: drawn by one command, equal to the committed ones, small files."""
+"""The figures, of cycles and of the paper: what they show compared with known values, and drawn by one command."""
 
 import doctest
 import json
 import sys
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 import matplotlib.image
 import numpy as np
@@ -11,41 +12,141 @@ import pytest
 
 from builder import cycle
 from builder.cycle import CASES, steady_cycle
-from builder.figures import FIGURES, FiguresError, draw_figures
+from builder.figures import FIGURES, Curve, FiguresError, Panel, draw_figures
+from builder.steady import border, solve
 from comparing import close
+from mumacro import Surrogate
 
 pytestmark = pytest.mark.slow
+AMPLITUDES = {  # of the figures whose lines are mu~ at these y~, over v~ times the scale
+    "fig08_cuts": (np.arange(21) * 0.1, lambda _: 1.0),
+    "fig10_large_amplitude": (np.arange(1, 101) * 0.8, lambda y: y),
+}
 
 
 @pytest.fixture(scope="module")
-def drawn(run_builder, tmp_path_factory) -> Path:
-    """A folder with all figures."""
-    folder = tmp_path_factory.mktemp("figures")
-    done = run_builder("figures", "--out", folder)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["figures"] == [str(folder / f"{name}.png") for name in FIGURES]
-    return folder
+def shown(surrogate: Surrogate) -> dict[str, list[Panel]]:
+    """What every figure shows."""
+    return {name: panels(surrogate) for name, panels in FIGURES.items()}
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_the_committed_figure_is_the_one_that_is_drawn(drawn, repository, name) -> None:
-    committed = repository / "docs" / "figures" / f"{name}.png"
-    assert committed.stat().st_size < 120_000
-    ours, theirs = (matplotlib.image.imread(path)[..., :3] for path in (drawn / committed.name, committed))
-    assert ours.shape == theirs.shape
-    # other versions of fonts and of the drawing library move edges by one pixel at most
-    assert float(np.abs(ours - theirs).mean()) < 0.02
+def labelled(panel: Panel, part: str) -> Curve:
+    (found,) = [curve for curve in panel.curves if part in curve.label]
+    return found
 
 
-def test_without_matplotlib_the_extra_is_named(surrogate, tmp_path, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(FiguresError, match="extra 'figures'"):
-        draw_figures(surrogate, tmp_path)
-    assert list(tmp_path.iterdir()) == []
+def test_every_curve_fills_its_figure_with_numbers(shown: dict[str, list[Panel]]) -> None:
+    for name, panels in shown.items():
+        for panel in panels:
+            (_, x_low, x_high), (_, y_low, y_high) = panel.x, panel.y
+            inside = []
+            for curve in panel.curves:
+                x, y = (curve.x, curve.y) if curve.z is None else np.meshgrid(curve.x, curve.y)
+                assert x.shape == y.shape == (x if curve.z is None else curve.z).shape, name
+                at = (x_low <= x) & (x <= x_high) & (y_low <= y) & (y <= y_high)
+                assert at.any() or curve.label == "stick", (name, curve.label)  # none in continuous sliding
+                inside.append(x[at])
+            if panel.settings.get("aspect") != "equal":  # both halves of the axis have curves
+                shares = (np.concatenate(inside) - x_low) / (x_high - x_low)
+                assert shares.min() < 0.1, name
+                assert shares.max() > 0.9, name
+            assert all(x_low <= x <= x_high and y_low <= y <= y_high for x, y in panel.notes), name
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [("fig04_regions", "border, exact"), ("fig05_border_small_amplitude", "exact, solved"),
+     ("fig06_border", "exact, solved"), ("fig07_surface", "border")],
+)  # fmt: skip
+def test_the_border_that_is_shown_is_the_solved_one(shown: dict[str, list[Panel]], name: str, label: str) -> None:
+    curve = labelled(shown[name][0], label)
+    at = np.flatnonzero(curve.x > 0.0)[:: max(1, curve.x.size // 40)]
+    assert curve.y[at] == close([border(y)[0] for y in curve.x[at]], rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "law"),
+    [
+        ("fig04_regions", "(20)", lambda y: np.sqrt(y * y - 1.0)),
+        ("fig05_border_small_amplitude", "(24)", lambda y: np.sqrt(0.25 + 0.5 * y * y) - 0.5),
+        ("fig06_border", "(26)", lambda y: np.sqrt(y / 4.5)),
+        ("fig09_master_curve", "(28)", lambda x: 1.0 - 0.75 * (x - 1.0) ** 2 - 0.25 * (x - 1.0) ** 4),
+    ],
+)
+def test_formulas_of_the_paper_are_shown(
+    shown: dict[str, list[Panel]], name: str, label: str, law: Callable[[Any], Any]
+) -> None:
+    curve = next(curve for curve in shown[name][0].curves if curve.label.startswith(label))
+    assert curve.y == close(law(curve.x), rel=1e-6, abs=1e-9)
+
+
+def test_the_surface_is_the_models(shown: dict[str, list[Panel]]) -> None:
+    surface = shown["fig07_surface"][0].curves[0]
+    assert surface.z is not None
+    for i, j in ((1, 1), (20, 120), (90, 60), (180, 240), (60, 200)):
+        assert surface.z[i, j] == close(solve(surface.y[i], surface.x[j]).mu_ratio, abs=1e-11)
+
+
+@pytest.mark.parametrize("name", AMPLITUDES)
+def test_lines_of_constant_amplitude_are_the_models(shown: dict[str, list[Panel]], name: str) -> None:
+    amplitudes, scale = AMPLITUDES[name]
+    (panel,) = shown[name]
+    for y, curve in zip(amplitudes, panel.curves, strict=False):
+        for i in (1, 200, 400):
+            found = solve(curve.x[i] * scale(y), y).mu_ratio if y else 1.0
+            assert curve.y[i] == close(found, abs=1e-11)
+    top = labelled(panel, "border")
+    for x, mu in zip(top.x, top.y, strict=True):
+        y = min(amplitudes[amplitudes > 0.0], key=lambda y: abs(border(y)[0] / scale(y) - x) + abs(border(y)[1] - mu))
+        assert (x * scale(y), mu) == close(border(y), rel=1e-14)
+
+
+def test_the_other_marks_of_the_cuts(shown: dict[str, list[Panel]]) -> None:
+    static = labelled(shown["fig08_cuts"][0], "static")
+    assert static.y == close(np.sqrt(1.0 - (np.arange(11) * 0.1) ** 2), abs=1e-7)
+    assert not static.x.any()
+    crosses = labelled(shown["fig10_large_amplitude"][0], "(35)")
+    for x, mu in zip(crosses.x, crosses.y, strict=True):  # the limit of large amplitude, to O(1/y~)
+        assert mu == close(solve(1e6 * x, 1e6).mu_ratio, abs=1e-5)
+
+
+def test_the_master_curve_rises_from_zero_to_one_at_the_border(shown: dict[str, list[Panel]]) -> None:
+    curves = shown["fig09_master_curve"][0].curves
+    for y, curve in zip(np.arange(1, 10) * 0.1, curves, strict=False):
+        crit, top = border(y)
+        low = np.sqrt(1.0 - y * y)
+        assert curve.y[0] == close(0.0, abs=1e-9)
+        for i in (100, 300, 600):
+            found = (solve(curve.x[i] * crit, y).mu_ratio - low) / (top - low)
+            assert curve.y[i] == close(found, abs=1e-7)
+    limit = labelled(curves_panel := shown["fig09_master_curve"][0], "N_0")
+    assert limit.y[[0, -1]] == close([0.0, 1.0], abs=1e-12)
+    assert np.abs(np.interp(limit.x, curves_panel.curves[0].x, curves_panel.curves[0].y) - limit.y).max() < 0.01
+
+
+def test_the_dimensional_law_is_the_dimensionless_one(shown: dict[str, list[Panel]], surrogate: Surrogate) -> None:
+    (panel,) = shown["fig11_friction_law"]
+    length, omega = 1e-6, 2.0 * np.pi * 20e3
+    for part, y in (("= 0.6 $l_0", 0.6), ("= 4 $l_0", 4.0)):
+        curve = labelled(panel, part)
+        assert curve.y == close(0.5 * surrogate.mu_ratio(curve.x / (length * omega), y), rel=1e-9)
+    crit, top = border(0.6)
+    mark = labelled(panel, "border")
+    assert (mark.x[0], mark.y[0]) == close((crit * length * omega, 0.5 * top), rel=1e-9)
+    assert labelled(panel, "static").y[0] == close(0.4, rel=1e-12)
+
+
+def test_the_error_of_the_border_formulas_is_that_of_the_two_curves(shown: dict[str, list[Panel]]) -> None:
+    _, off = shown["fig06_border"]
+    for curve in off.curves:
+        assert curve.y[-1] == close(-1.2, abs=0.4)  # [%] at y~ = 1e4
+    assert np.abs(labelled(off, "(27)").y).max() == close(5.2, abs=0.1)
 
 
 @pytest.mark.parametrize(("v", "y"), CASES)
-def test_the_cycle_that_is_drawn_is_the_steady_one(surrogate, v, y) -> None:
+def test_the_cycle_that_is_drawn_is_the_steady_one(
+    surrogate: Surrogate, shown: dict[str, list[Panel]], v: float, y: float
+) -> None:
     tau, u, sticks = steady_cycle(v, y)
     assert tau[-1] == close(2.0 * np.pi, rel=1e-14)
     assert np.hypot(*u.T).max() <= 1.0 + 1e-12
@@ -54,6 +155,33 @@ def test_the_cycle_that_is_drawn_is_the_steady_one(surrogate, v, y) -> None:
     # half a period later the same, mirrored
     half = tau.size // 2
     assert np.abs(u[:half] * (1.0, -1.0) - u[half:]).max() < 1e-6
+    place = list(CASES).index((v, y))
+    disc, trace = shown["cycle"][place], shown["cycle"][place + 3]
+    assert [labelled(trace, part).y.tolist() for part in ("along", "across")] == u.T.tolist()
+    at = np.where(sticks, labelled(disc, "stick").x, labelled(disc, "slip").x)
+    assert np.array_equal(at, u[:, 0])
+    assert np.array_equal(np.isfinite(labelled(trace, "stick").y), sticks)
+
+
+def test_all_are_drawn_by_one_command(run_builder: Callable[..., Any], repository: Any, tmp_path: Any) -> None:
+    folder = tmp_path / "made"
+    done = run_builder("figures", "--out", folder)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["figures"] == [str(folder / f"{name}.png") for name in FIGURES]
+    for name in FIGURES:
+        drawn, committed = (place / f"{name}.png" for place in (folder, repository / "docs" / "figures"))
+        assert committed.stat().st_size < 120_000
+        ours, theirs = (matplotlib.image.imread(path)[..., :3] for path in (drawn, committed))
+        assert ours.shape == theirs.shape
+        # other versions of fonts and of the drawing library move edges by one pixel at most
+        assert float(np.abs(ours - theirs).mean()) < 0.02
+
+
+def test_without_matplotlib_the_extra_is_named(surrogate: Surrogate, tmp_path: Any, monkeypatch: Any) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(FiguresError, match="extra 'figures'"):
+        draw_figures(surrogate, tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_example_runs() -> None:

@@ -15,7 +15,7 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
 from mumacro.__main__ import main  # noqa: E402
-from mumacro.files import FilesError, evaluate_files, reading, records, run  # noqa: E402
+from mumacro.files import FilesError, evaluate_files, reading, run  # noqa: E402
 
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 KINDS = ("csv", "csv.gz", "ndjson", "parquet")
@@ -24,7 +24,6 @@ KINDS = ("csv", "csv.gz", "ndjson", "parquet")
 @pytest.fixture(scope="module", autouse=True)
 def small_blocks():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(records, "BLOCK", 40_000)
         patch.setattr(reading, "ROWS", 400)
         yield
 
@@ -261,7 +260,7 @@ def test_a_second_run_to_one_output_is_refused(tmp_path, surrogate, cases, capsy
 def test_a_full_disk_is_reported_in_one_line_and_the_run_goes_on_later(tmp_path, surrogate, cases, repository, kind):
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     program = (
-        "import resource, sys; from mumacro.files import reading, records; records.BLOCK, reading.ROWS = 40_000, 400; "
+        "import resource, sys; from mumacro.files import reading; reading.ROWS = 400; "
         "from mumacro.__main__ import main; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); "
         f"sys.exit(main(['eval', {str(source)!r}, '-o', {str(out)!r}]))"
     )

@@ -1,1 +1,1 @@
-"""The table as C: a translator of the library's scalar functions, and the header made of them and of a table."""
+"""The table and the evaluation as C, and what is compiled of them."""

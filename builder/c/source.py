@@ -6,7 +6,11 @@ module needs only what the library itself needs.
 
 from __future__ import annotations
 
+import importlib.util
 import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -20,7 +24,7 @@ from mumacro.table import Table
 from mumacro.version import __version__
 from mumacro.writing import write_whole
 
-__all__ = ["DEFAULT_TOLERANCE", "OutputError", "files", "header_text", "write_c"]
+__all__ = ["DEFAULT_TOLERANCE", "CompilerError", "OutputError", "compiled", "files", "header_text", "write_c", "zig"]
 
 #: of the bundled table that is written if none is named: a C program holds it in its text
 DEFAULT_TOLERANCE = 1e-7
@@ -43,6 +47,28 @@ _PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
 
 class OutputError(MumacroError):
     """The text cannot be written there; the message states why."""
+
+
+class CompilerError(MumacroError):
+    """A C compiler refuses the text; this is its message."""
+
+
+def zig(target: str) -> list[str] | None:
+    """The command that compiles for a target of zig's; None where the package ziglang is not installed."""
+    found = importlib.util.find_spec("ziglang")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", target] if found else None
+
+
+def compiled(texts: dict[str, str], command: list[str]) -> bytes:
+    """What ``command`` makes in a folder that holds ``texts`` by name."""
+    with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
+        for name, text in texts.items():
+            Path(folder, name).write_text(text, "ascii")
+        words = [*command, "-o", "made"]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode != 0:
+            raise CompilerError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
+        return Path(folder, "made").read_bytes()
 
 
 def header_text(table: Table) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.files.columns import ANSWERS, Columns, FilesError, find_columns
-from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, RAD_PER_CYCLE, Scale
+from mumacro.inputs import FIELDS, POSITIVE, RAD_PER_CYCLE, Scale, refusal
 from mumacro.surrogate import Surrogate
 
 __all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "answer_columns", "numbers"]
@@ -217,8 +217,7 @@ def _reason(field: str, value: float, fault: int) -> str | None:
     """What is wrong with one value; None if it is legal."""
     if fault:
         return _WHY[fault]
-    if math.isnan(value):
-        return "is missing" + ("; write rigid or a number" if field == "k" else "")
-    if (value > 0.0 if field in POSITIVE else value >= 0.0) and (math.isfinite(value) or field == "k"):
-        return None
-    return f"must be {BOUNDS[field]}" + (", or rigid" if field == "k" else "")
+    if math.isnan(value) and field != "k":
+        return "is missing"
+    legal = (value > 0.0 if field in POSITIVE else value >= 0.0) and (math.isfinite(value) or field == "k")
+    return None if legal else refusal(field, value)

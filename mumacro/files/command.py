@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from mumacro.command import OneLineParser, open_table
 from mumacro.files.columns import FilesError
-from mumacro.files.evaluation import ON_ERROR, Evaluation
+from mumacro.files.evaluation import Evaluation
 from mumacro.files.reading import SEPARATORS, one_line
 from mumacro.files.run import evaluate_files
 
@@ -55,7 +55,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--include", choices=("gradient",), action="append", default=[], help="add d mu_macro / d input"
     )
-    parser.add_argument("--on-error", choices=ON_ERROR, default="list", help="list rejected rows, or stop")
     parser.add_argument("--force", action="store_true", help="replace an output, delete the parts of another run")
     return parser
 
@@ -107,10 +106,8 @@ def main(words: Sequence[str]) -> int:
     """
     chosen = _parser().parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
-    options = {
-        "rigid": chosen.rigid, "include": chosen.include, "on_error": chosen.on_error,
-        "sep": SEPARATORS[chosen.sep], "decimal": chosen.decimal,
-    }  # fmt: skip
+    options = {name: getattr(chosen, name) for name in ("rigid", "include", "decimal")}
+    options["sep"] = SEPARATORS[chosen.sep]
     try:
         with ExitStack() as stack:
             cases = chosen.cases

@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import hashlib
 from collections.abc import Iterator, Sequence
+from itertools import compress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,16 +14,14 @@ import pyarrow as pa
 
 from mumacro.files.answering import added_fields, answer_columns
 from mumacro.files.columns import FilesError, find_columns
-from mumacro.files.reading import Block, CsvSource, Fault, NdjsonSource, ParquetSource
-from mumacro.files.records import Place
-from mumacro.files.writing import Output, csv_line
+from mumacro.files.reading import Block, CsvSource, Fault, NdjsonSource, ParquetSource, Place
+from mumacro.files.writing import Output, csv_lines
 from mumacro.surrogate import Surrogate
 
-__all__ = ["ON_ERROR", "Evaluation", "Piece", "find_files", "format_of"]
+__all__ = ["Evaluation", "Piece", "find_files", "format_of"]
 
 FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
 ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"
-ON_ERROR = ("list", "stop")
 
 
 class Piece(NamedTuple):
@@ -95,7 +94,7 @@ class Evaluation:
 
     def __init__(
         self, given: Sequence[str | Path], out: Path | None, surrogate: Surrogate, *, rigid: bool = False,
-        include: Sequence[str] = (), on_error: str = "list", sep: str = ",", decimal: str = ".",
+        include: Sequence[str] = (), sep: str = ",", decimal: str = ".",
     ) -> None:  # fmt: skip
         if sep == decimal:
             raise FilesError(f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'")
@@ -110,7 +109,7 @@ class Evaluation:
             self.source = CsvSource(self.files, sep, decimal)
         else:
             self.source = NdjsonSource(self.files) if kind == "ndjson" else ParquetSource(self.files, folder)
-        self.surrogate, self.include, self.on_error = surrogate, include, on_error
+        self.surrogate, self.include = surrogate, include
         self.decimal = decimal if kind == "csv" else "."
         added = added_fields(include)
         names = [field.name for field in added]
@@ -127,11 +126,9 @@ class Evaluation:
         self.schema = pa.schema([*([] if self.verbatim else given_fields), *added], self.source.schema.metadata)
         self.head = b""
         if self.output.kind == "csv":
-            line = csv_line(names if self.verbatim else self.schema.names, sep).encode()
-            before = self.source.head + sep.encode() if isinstance(self.source, CsvSource) else b""
-            self.head = self.output.pack(before + line)
-        several = ["file"] if len(self.files) > 1 else []
-        self.rejects_head = csv_line([*several, *Fault._fields])
+            before = self.source.head if isinstance(self.source, CsvSource) and self.verbatim else []
+            self.head = self.output.pack(csv_lines([[*before, *self.schema.names]], sep))
+        self.rejects_head = csv_lines([[*(["file"] if len(self.files) > 1 else []), *Fault._fields]])
 
     def pieces(self, place: Place | None = None) -> Iterator[Piece]:
         """What follows ``place``, in order; from the beginning, the head comes first.
@@ -139,7 +136,7 @@ class Evaluation:
         Raises
         ------
         FilesError
-            A record, or a bad one with ``on_error="stop"``; at the end, an input that changed meanwhile.
+            A file that cannot be read; at the end, an input that changed meanwhile.
         """
         if place is None:
             place = Place()
@@ -157,21 +154,18 @@ class Evaluation:
         faults = [*block.faults]
         faults += [Fault(int(block.rows[row]), *why) for row, *why in zip(*rejects.to_pydict().values(), strict=True)]
         path, place = self.files[block.place.file], block.place
-        if faults and self.on_error == "stop":
-            row, field, value, reason = min(faults, key=lambda fault: fault.row)
-            raise FilesError(f"{path}: row {row}: {field + ' ' if field else ''}{reason}, got {value!r}")
         columns = [
             column if column.type == field.type else pa.array(given[field.name])
             for field, column in zip(self.schema, [] if self.verbatim else block.batch.columns, strict=False)
         ]
         batch = pa.RecordBatch.from_arrays([*columns, *added], schema=self.schema)
-        lines = block.lines if self.verbatim else None
+        texts = block.texts if self.verbatim else None
         if rejects.num_rows:
             kept = np.ones(batch.num_rows, np.bool_)
             kept[rejects.column("row")] = False
-            batch, lines = batch.filter(pa.array(kept)), None if lines is None else lines.filter(pa.array(kept))
+            batch, texts = batch.filter(pa.array(kept)), None if texts is None else [*compress(texts, kept)]
         several = [path] if len(self.files) > 1 else []
-        listed = "".join(csv_line([*several, *fault]) for fault in sorted(faults, key=lambda fault: fault.row))
+        listed = csv_lines([*several, *fault] for fault in sorted(faults))
         n = block.batch.num_rows + len(block.faults)
         share = (place.file + block.share) / len(self.files)
-        return Piece(self.output.piece(batch, lines), listed, place, n, len(faults), share)
+        return Piece(self.output.piece(batch, texts), listed, place, n, len(faults), share)

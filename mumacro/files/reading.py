@@ -7,33 +7,40 @@ from __future__ import annotations
 
 import csv
 import gzip
-import io
 import json
 import math
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv
 import pyarrow.dataset
 from numpy.typing import NDArray
 
 from mumacro.files.columns import Columns, FilesError
-from mumacro.files.records import Place, Records, opened, records_of
 from mumacro.inputs import split_unit, suggestion
 
-__all__ = ["SEPARATORS", "Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "one_line"]
+__all__ = ["SEPARATORS", "Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "Place", "one_line"]
 
 #: what may stand between the cells of CSV, by the word for it
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
-ROWS = 262_144  # of a block of Parquet
+ROWS = 65_536  # of a block, at most: a third of a second of work
+LONGEST = 64 * 2**20  # bytes of a line
 _SHOWN = 500  # characters of a bad record that are listed
 _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
+
+
+class Place(NamedTuple):
+    """Where the next record begins: file, byte (of unpacked text) or row (of Parquet), and records before it."""
+
+    file: int = 0
+    at: int = 0
+    rows: int = 0
 
 
 class Fault(NamedTuple):
@@ -49,14 +56,14 @@ class Block(NamedTuple):
     """Some records in order: those that could be read, and what is wrong with the others.
 
     ``rows`` are their numbers in the file, from 1; ``place`` is what follows, ``share`` how much of the file is read;
-    ``lines`` are the records themselves, where there are any.
+    ``texts`` are the records as they came in, where they are text: cells of CSV, lines of NDJSON.
     """
 
     batch: pa.RecordBatch
     rows: NDArray[np.int64]
     place: Place
     share: float
-    lines: pa.Array | None = None
+    texts: Sequence[Any] = ()
     faults: Sequence[Fault] = ()
 
 
@@ -84,6 +91,7 @@ class ParquetSource:
         """The blocks of the file at ``place`` from there on."""
         part, row = self.parts[place.file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
+        options = {"batch_size": ROWS, "batch_readahead": 1, "fragment_scan_options": scan, "use_threads": False}
         try:
             # group by group: blocks then begin at the same rows from wherever a run continues
             for group in part.split_by_row_group():
@@ -91,9 +99,7 @@ class ParquetSource:
                 if row + rows <= place.at:
                     row += rows
                     continue
-                for batch in group.to_batches(
-                    self.schema, batch_size=ROWS, batch_readahead=1, fragment_scan_options=scan, use_threads=False
-                ):
+                for batch in group.to_batches(self.schema, **options):
                     before, row = row, row + batch.num_rows
                     if row > place.at:
                         share = row / part.metadata.num_rows
@@ -102,19 +108,45 @@ class ParquetSource:
             raise FilesError(f"{part.path}: damaged after row {row} ({one_line(error)})") from None
 
 
-def _where(path: Path, records: Records) -> str:
-    return f"{path}: rows {records.numbers[0]} to {records.numbers[-1]}"
+class _Lines:
+    """The lines of a text file, also a compressed one, from a byte on; ``at`` is the byte after the last line."""
+
+    def __init__(self, path: Path, at: int = 0) -> None:
+        self.path, self.at, self.share = path, at, 0.0
+
+    def __iter__(self) -> Iterator[bytes]:
+        try:
+            with self.path.open("rb") as raw:
+                stream: Any = gzip.GzipFile(fileobj=raw) if self.path.name.lower().endswith(".gz") else raw
+                stream.seek(self.at)
+                size = max(self.path.stat().st_size, 1)
+                while line := stream.readline(LONGEST):
+                    if len(line) == LONGEST:
+                        raise FilesError(f"{self.path}: a line has more than {LONGEST >> 20} MiB")
+                    self.at, self.share = self.at + len(line), raw.tell() / size
+                    yield line
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise FilesError(f"{self.path}: the compressed file is damaged ({error})") from None
 
 
-def _block(records: Records, batch: pa.RecordBatch, texts: list[bytes], wrong: dict[int, str]) -> Block:
-    """A block of the records that were read (``batch``) and those that were not (``wrong``, by index)."""
-    rows, faults = np.array(records.numbers), []
-    for i, reason in sorted(wrong.items()):
-        shown = texts[i].decode("utf-8", "replace")
-        faults.append(Fault(int(rows[i]), None, shown if len(shown) <= _SHOWN else shown[:_SHOWN] + "…", reason))
-    kept = [text for i, text in enumerate(texts) if i not in wrong] if wrong else texts
-    rows = np.delete(rows, list(wrong))
-    return Block(batch, rows, records.place, records.share, pa.array(kept, pa.large_binary()), faults)
+def _block(
+    place: Place, lines: _Lines, texts: Sequence[Any], wrong: dict[int, tuple[str, str]], columns: dict[str, Any]
+) -> Block:
+    """A block of records: ``columns`` of those that were read, what is ``wrong`` with the others, by index."""
+    rows = place.rows + 1 + np.arange(len(texts))
+    faults = [
+        Fault(int(rows[i]), None, text if len(text) <= _SHOWN else text[:_SHOWN] + "…", reason)
+        for i, (text, reason) in wrong.items()
+    ]
+    place = Place(place.file, lines.at, place.rows + len(texts))
+    try:
+        arrays = [x if isinstance(x, pa.Array) else pa.array(x, pa.string()) for x in columns.values()]
+    except UnicodeEncodeError as error:
+        raise FilesError(f"{lines.path}: rows {rows[0]} to {rows[-1]}: no text in UTF-8 ({error.reason})") from None
+    batch = pa.RecordBatch.from_arrays(arrays, list(columns))
+    if wrong:
+        texts = [text for i, text in enumerate(texts) if i not in wrong]
+    return Block(batch, np.delete(rows, list(wrong)), place, lines.share, texts, faults)
 
 
 class CsvSource:
@@ -128,66 +160,67 @@ class CsvSource:
 
     def __init__(self, files: Sequence[Path], sep: str, decimal: str) -> None:
         self.files, self.sep = files, sep
-        heads = [self._header(path, sep, decimal) for path in files]
-        self.head, self.starts = heads[0].rstrip(b"\r\n"), [len(head) for head in heads]
-        names = [self._cells(head) for head in heads]
+        heads = [self._head(path, sep, decimal) for path in files]
+        self.head = heads[0]
+        names = [[cell.strip("\ufeff \t") for cell in head] for head in heads]
         self.schema = pa.schema([(name, pa.string()) for name in names[0]])
         for path, found in zip(files, names, strict=True):
             if found != names[0]:
                 raise FilesError(f"{path}: its header differs from that of {files[0]}")
 
-    def _cells(self, head: bytes) -> list[str]:
-        cells = next(csv.reader([head.decode("utf-8-sig").rstrip("\r\n")], delimiter=self.sep, strict=True), [])
-        return [cell.strip() for cell in cells]
-
-    def _header(self, path: Path, sep: str, decimal: str) -> bytes:
-        """The first line, after a look at the records behind it."""
+    def _head(self, path: Path, sep: str, decimal: str) -> list[str]:
+        """The cells of the first line, after a look at the records behind it; a mark of byte order stays."""
+        first, *rows = [*islice(_Lines(path), 51)] or [b""]
         try:
-            with path.open("rb") as raw:
-                stream = opened(path, raw)
-                head, sample = stream.readline(2**20), stream.read(2**16)
-            named = any(self._cells(head))
-        except (UnicodeDecodeError, csv.Error, EOFError, zlib.error, gzip.BadGzipFile) as error:
+            text = first.decode("utf-8-sig")
+            cells = next(csv.reader([text], delimiter=sep, strict=True), [])
+        except (UnicodeDecodeError, csv.Error) as error:
             raise FilesError(f"{path}: line 1 is no header of a CSV file in UTF-8 ({error})") from None
-        if not named:
+        if not any(map(str.strip, cells)):
             raise FilesError(f"{path}: is empty; the first line must name the columns")
-        rows = sample.decode("utf-8", "replace").splitlines()[:50]
-        found = _recognised(head.decode("utf-8-sig"), rows, sep, decimal)
+        found = _recognised(text, [row.decode("utf-8", "replace") for row in rows], sep, decimal)
         if found != (sep, decimal):
             word = next(word for word, known in SEPARATORS.items() if known == found[0])
             raise FilesError(
                 f"{path}: the columns are separated by {word!r} and the decimal sign is {found[1]!r}: "
                 f"give --sep '{word}' --decimal '{found[1]}'"
             )
-        return bytes(head)
+        return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
 
     def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
         """The blocks of the file at ``place`` from there on."""
-        path = self.files[place.file]
-        place = place if place.at else place._replace(at=self.starts[place.file])
-        names = columns.inputs if verbatim else self.schema.names
-        for records in records_of(path, place, self.sep):
-            wrong: dict[int, str] = {}
+        lines = _Lines(self.files[place.file], place.at)
+        texts = (line.decode("utf-8", "surrogateescape") for line in lines)  # bytes come out as they came in
+        reader = csv.reader(texts, delimiter=self.sep, strict=True)
+        if not place.at:
+            next(reader, None)
+        names, width = self.schema.names, len(self.head)
+        while rows := self._rows(reader, lines.path, place.rows):
+            wrong = {
+                i: (self.sep.join(row), f"has {len(row)} cells, the header has {width}")
+                for i, row in enumerate(rows)
+                if len(row) != width
+            }
+            by_name = dict(zip(names, zip(*(row for row in rows if len(row) == width), strict=True), strict=False))
+            wanted = columns.inputs if verbatim else names
+            yield (block := _block(place, lines, rows, wrong, {name: by_name.get(name, ()) for name in wanted}))
+            place = block.place
 
-            def note(row: Any, wrong: dict[int, str] = wrong) -> str:
-                wrong[row.number - 1] = f"has {row.actual_columns} cells, the header has {row.expected_columns}"
-                return "skip"
-
-            data = b"\n".join(records.texts)
-            size = max(len(data) + 1, 1024)
-            try:
-                table = pa.csv.read_csv(
-                    io.BytesIO(data),
-                    pa.csv.ReadOptions(column_names=self.schema.names, use_threads=False, block_size=size),
-                    pa.csv.ParseOptions(delimiter=self.sep, newlines_in_values=True, invalid_row_handler=note),
-                    pa.csv.ConvertOptions(include_columns=names, column_types=self.schema, strings_can_be_null=False),
-                )
-            except pa.ArrowInvalid as error:
-                raise FilesError(f"{_where(path, records)}: no CSV in UTF-8 ({one_line(error)})") from None
-            if table.num_rows + len(wrong) != len(records.texts):  # no row may get the result of another
-                raise FilesError(f"{_where(path, records)}: records end in several ways")
-            batches = table.combine_chunks().to_batches() or [pa.RecordBatch.from_pylist([], table.schema)]
-            yield _block(records, batches[0], records.texts, wrong)
+    @staticmethod
+    def _rows(reader: Iterator[list[str]], path: Path, before: int) -> list[list[str]]:
+        """The next records; blank lines are left out."""
+        rows: list[list[str]] = []
+        try:
+            for row in reader:
+                if len(row) > 1 or (row and row[0].strip()):
+                    rows.append(row)
+                    if len(rows) == ROWS:
+                        break
+        except csv.Error as error:
+            number = before + len(rows) + 1
+            fault = f"a quote is not closed, or not at the end of its cell ({error})"
+            raise FilesError(f"{path}: row {number}: {fault}") from None
+        return rows
 
 
 def _recognised(header: str, rows: list[str], sep: str, decimal: str) -> tuple[str, str]:
@@ -214,37 +247,34 @@ class NdjsonSource:
         self.files = files
         names: dict[str, None] = {}
         for path in files:
-            for records in records_of(path, Place()):
-                names |= dict.fromkeys(name for found, _, _ in _objects(records.texts) for name in found)
-                break
+            for found, _ in _objects(islice(_Lines(path), ROWS)):
+                names |= dict.fromkeys(found)
         if not names:
             raise FilesError(f"{files[0]}: holds no JSON object, one a line")
         self.schema = pa.schema([(name, pa.string()) for name in names])
 
     def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
         """The blocks of the file at ``place`` from there on."""
-        path = self.files[place.file]
-        schema = pa.schema([self.schema.field(name) for name in columns.inputs]) if verbatim else self.schema
-        for records in records_of(path, place):
-            objects, texts, wrong = [], [], {}
-            for i, (found, text, fault) in enumerate(_objects(records.texts)):
-                texts.append(text)
-                if fault is None:
-                    objects.append(found)
-                else:
-                    wrong[i] = fault
-            if not verbatim and (new := {name for found in objects for name in found} - set(schema.names)):
+        lines = _Lines(self.files[place.file], place.at)
+        texts, names = iter(lines), columns.inputs if verbatim else self.schema.names
+        while block := [*islice(texts, ROWS)]:
+            records = [line.strip() for line in block if line.strip()]
+            read = [*_objects(records)]
+            wrong = {i: (records[i].decode("utf-8", "replace"), why) for i, (_, why) in enumerate(read) if why}
+            objects = [found for found, why in read if not why]
+            if not verbatim and (new := {name for found in objects for name in found} - set(names)):
+                last = place.rows + len(records)
                 late = f"{min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
-                raise FilesError(f"{_where(path, records)}: {late}")
-            arrays = [_column([found.get(name) for found in objects], name in columns.inputs) for name in schema.names]
-            yield _block(records, pa.RecordBatch.from_arrays(arrays, schema.names), texts, wrong)
+                raise FilesError(f"{lines.path}: rows {place.rows + 1} to {last}: {late}")
+            given = {name: _column([found.get(name) for found in objects], name in columns.inputs) for name in names}
+            yield (found := _block(place, lines, records, wrong, given))
+            place = found.place
 
 
-def _objects(texts: Iterable[bytes]) -> Iterator[tuple[dict[str, Any], bytes, str | None]]:
-    """The object of each line; the line, with null for NaN and infinities, which JSON lacks; what is wrong with it."""
-    constants: list[str] = []
-    decoder = json.JSONDecoder(object_pairs_hook=_without_repeats, parse_constant=constants.append)
-    for text in texts:
+def _objects(texts: Iterable[bytes]) -> Iterator[tuple[dict[str, Any], str | None]]:
+    """The object of each line that is not blank, and what is wrong with it."""
+    decoder = json.JSONDecoder(object_pairs_hook=_without_repeats, parse_constant=_refuse_constant)
+    for text in filter(bytes.strip, texts):
         try:
             found = decoder.decode(text.decode("utf-8-sig"))
             if b"\\u" in text:
@@ -254,8 +284,7 @@ def _objects(texts: Iterable[bytes]) -> Iterator[tuple[dict[str, Any], bytes, st
             fault = "is no JSON: too deep"
         except ValueError as error:
             fault = str(error) if str(error).startswith("repeats") else f"is no JSON: {error}"
-        yield ({} if fault else found), (json.dumps(found).encode() if constants and not fault else text), fault
-        constants.clear()
+        yield ({} if fault else found), fault
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -266,14 +295,18 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _column(values: list[Any], is_input: bool) -> pa.Array:
+def _refuse_constant(word: str) -> None:
+    raise ValueError(f"{word} is not in it; write null")
+
+
+def _column(values: list[Any], is_input: bool) -> Any:
     """Values of JSON: inputs as doubles where all are numbers; else text: strings as they are, others as JSON."""
     if is_input and {*map(type, values)} <= {float, int}:
         with suppress(OverflowError):
             numbers = np.array(values, np.float64)
             if np.isfinite(numbers).all():
                 return pa.array(numbers)
-    return pa.array([_text(value) for value in values], pa.string())
+    return [_text(value) for value in values]
 
 
 def _text(value: Any) -> str | None:

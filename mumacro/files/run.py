@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from mumacro.files.columns import FilesError
 from mumacro.files.evaluation import Evaluation, stamp
-from mumacro.files.records import Place
+from mumacro.files.reading import Place
 from mumacro.files.writing import write_parquet
 from mumacro.surrogate import Surrogate
 from mumacro.version import __version__
@@ -65,7 +65,6 @@ def evaluate_files(
     *,
     rigid: bool = False,
     include: Sequence[str] = (),
-    on_error: str = "list",
     sep: str = ",",
     decimal: str = ".",
     force: bool = False,
@@ -87,8 +86,6 @@ def evaluate_files(
         All contacts are rigid and there is no column k.
     include : sequence of str
         ``"gradient"`` adds d mu_macro / d input.
-    on_error : str
-        ``"list"`` puts rejected rows into the side file, ``"stop"`` raises at the first one.
     sep, decimal : str
         Between the cells of CSV, and within its numbers, read and written.
     force : bool
@@ -118,9 +115,7 @@ def evaluate_files(
     >>> evaluate_files([folder / "cases.csv"], folder / "out.parquet", Surrogate.open()).answered
     1
     """
-    work = Evaluation(
-        given, Path(out), surrogate, rigid=rigid, include=include, on_error=on_error, sep=sep, decimal=decimal
-    )
+    work = Evaluation(given, Path(out), surrogate, rigid=rigid, include=include, sep=sep, decimal=decimal)
     return _Run(work, Path(out)).run(force, progress, say)
 
 
@@ -142,7 +137,7 @@ class _Run:
             "version": __version__,
             "table": work.surrogate.checksum,
             "inputs": [[path.name, checksum] for path, checksum in zip(work.files, work.checksums, strict=True)],
-            "options": [vars(work.output), list(work.include), work.on_error, [*work.columns.places.items()]],
+            "options": [vars(work.output), list(work.include), [*work.columns.places.items()]],
         }
         self.first = json.dumps(self.plan).encode() + b"\n"
 
@@ -165,8 +160,7 @@ class _Run:
             return self._summary(note.rows, note.rejected, resumed)
 
     def _summary(self, rows: int, rejected: int, resumed: int) -> Summary:
-        rejects = self.rejects if rejected else None
-        return Summary(rows, rows - rejected, rejected, self.out, rejects, resumed)
+        return Summary(rows, rows - rejected, rejected, self.out, self.rejects if rejected else None, resumed)
 
     def _record(self, rows: int, rejected: int) -> bytes:
         written = [self.out, *([self.rejects] if rejected else [])]
@@ -205,16 +199,10 @@ class _Run:
         return _Note()
 
     def _kept(self, say: Callable[[str], None]) -> _Note:
-        last, whole = _Note(), max((note.end for note, _ in self._noted()), default=0)
-        if not self.answers.exists() and self.out.exists() and self.out.stat().st_size == whole:
-            os.replace(self.out, self.answers)  # a run that was stopped here had put it into place
         self.answers.touch()
-        size = len(self.first)
-        with self.answers.open("rb") as answers:
-            for note, line in self._noted():
-                if zlib.crc32(answers.read(note.end - last.end)) != note.checksum:
-                    break
-                last, size = note, size + len(line)
+        last, size = _Note(), len(self.first)
+        for last, _ in self._pieces():
+            size += len(last.line())
         damaged = size < self.notes.stat().st_size
         os.truncate(self.answers, last.end)
         os.truncate(self.notes, size)
@@ -222,15 +210,19 @@ class _Run:
         say(f"{self.parts}: {last.rows:,} rows are done already ({last.rejected:,} rejected){again}")
         return last
 
-    def _noted(self) -> Iterator[tuple[_Note, bytes]]:
-        """The sound notes, and their lines."""
-        with self.notes.open("rb") as notes:
+    def _pieces(self) -> Iterator[tuple[_Note, bytes]]:
+        """The notes and the pieces that they tell of, as far as both are sound."""
+        with self.notes.open("rb") as notes, self.answers.open("rb") as answers:
             notes.readline()
             for line in notes:
                 body = line[9:-1]
                 if line != b"%08x %b\n" % (zlib.crc32(body), body):
                     return
-                yield _Note(*json.loads(body)), line
+                note = _Note(*json.loads(body))
+                text = answers.read(note.end - answers.tell())
+                if zlib.crc32(text) != note.checksum:
+                    return
+                yield note, text
 
     def _go_on(self, note: _Note, progress: Progress) -> _Note:
         # nothing is brought to the disk here: after a loss of power the checksums tell what is there
@@ -246,19 +238,19 @@ class _Run:
     def _finish(self, last: _Note) -> None:
         """Put the files into place; a run that is stopped here does this again."""
         if last.rejected:
-            with self.made.open("w", encoding="utf-8", newline="") as stream:
+            with self.made.open("w", encoding="utf-8", errors="surrogateescape", newline="") as stream:
                 stream.write(self.work.rejects_head)
-                stream.writelines(note.rejects for note, _ in self._noted())
+                stream.writelines(note.rejects for note, _ in self._pieces())
             put(self.made, self.rejects)
         else:
             self.rejects.unlink(missing_ok=True)
+        texts = (text for _, text in self._pieces() if text)
         if self.work.output.kind == "parquet":
-            with self.answers.open("rb") as answers:
-                texts = (answers.read(note.end - answers.tell()) for note, _ in self._noted())
-                write_parquet(self.made, self.work.schema, filter(None, texts))
-            put(self.made, self.out)
+            write_parquet(self.made, self.work.schema, texts)
         else:
-            put(self.answers, self.out)
+            with self.made.open("wb") as made:
+                made.writelines(texts)
+        put(self.made, self.out)
         write_whole(self.record, self._record(last.rows, last.rejected))
         self._clear()
 

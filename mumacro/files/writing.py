@@ -6,7 +6,7 @@ import csv
 import gzip
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,15 +17,13 @@ import pyarrow.parquet
 
 from mumacro.files.columns import FilesError
 
-__all__ = ["Output", "csv_line", "write_parquet"]
-
-ROWS = 262_144  # of a row group that is written, at least
+__all__ = ["Output", "csv_lines", "write_parquet"]
 
 
-def csv_line(cells: Iterable[object], sep: str = ",") -> str:
-    """One line of CSV."""
+def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
+    """Lines of CSV."""
     text = io.StringIO(newline="")
-    csv.writer(text, delimiter=sep, lineterminator="\n").writerow(cells)
+    csv.writer(text, delimiter=sep, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
@@ -42,87 +40,56 @@ class Output:
     decimal: str
     stiffness: str | None
 
-    def pack(self, text: bytes) -> bytes:
+    def pack(self, text: str) -> bytes:
         """A piece of text as it is in the file."""
+        data = text.encode("utf-8", "surrogateescape")
         # without name and time, so that the same text gives the same bytes
-        return gzip.compress(text, 6, mtime=0) if self.packed else text
+        return gzip.compress(data, 6, mtime=0) if self.packed else data
 
-    def piece(self, batch: pa.RecordBatch, lines: pa.Array | None = None) -> bytes | memoryview:
-        """Rows; where ``lines`` holds the records as they came in, the columns are put behind them."""
+    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes | memoryview:
+        """Rows; where ``texts`` holds the records as they came in, the columns are put behind them."""
         if self.kind == "parquet":
             sink = pa.BufferOutputStream()
             with pa.ipc.new_stream(sink, batch.schema) as writer:
                 writer.write_batch(batch)
             return memoryview(sink.getvalue())
-        cells: list[Any] = [] if lines is None else [lines]
-        if lines is not None and self.kind == "ndjson":  # without the brace that closes it
-            cells = [pa.array([line.rstrip()[:-1].rstrip() for line in lines.to_pylist()], pa.large_binary())]
-        for name, column in zip(batch.schema.names, batch.columns, strict=True):
-            if self.kind == "csv":
-                cells += [self.sep] if cells else []
-            else:
-                cells += [f"{', ' if cells else '{'}{json.dumps(name)}: "]
-            cells += [pc.fill_null(self._cell(name, column), "" if self.kind == "csv" else "null")]
-        return self.pack(_bytes_of(_joined(*cells, "\n" if self.kind == "csv" else "}\n")))
+        cells = [self._cells(name, column) for name, column in zip(batch.schema.names, batch.columns, strict=True)]
+        rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
+        if self.kind == "csv":
+            rows = rows if texts is None else ([*first, *row] for first, row in zip(texts, rows, strict=True))
+            return self.pack(csv_lines(rows, self.sep))
+        line = ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names) + "}\n"
+        if texts is None:
+            return self.pack("".join(map(f"{{{line}".__mod__, rows)))
+        begun = (text[:-1].decode().rstrip() for text in texts)  # without the brace that closes it
+        return self.pack("".join(f"{first}, {line % row}" for first, row in zip(begun, rows, strict=True)))
 
-    def _cell(self, name: str, column: pa.Array) -> pa.Array:
-        """A column as cells of text, null where it is."""
-        kind = column.type
-        if pa.types.is_dictionary(kind):
-            return self._cell(name, column.dictionary).take(column.indices)
-        text = self._text(name, column)
-        if self.kind == "ndjson":
-            if pa.types.is_nested(kind) or (pa.types.is_primitive(kind) and not pa.types.is_temporal(kind)):
-                return text
-            cells = [None if cell is None else json.dumps(cell) for cell in text.to_pylist()]
-            return pa.array(cells, pa.large_string())
-        if pa.types.is_floating(kind) or pa.types.is_decimal(kind):
-            return text if self.decimal == "." else pc.replace_substring(text, ".", self.decimal)
-        special = pc.match_substring_regex(text, f'[{self.sep}"\r\n]')
-        if pc.any(special).as_py():
-            text = pc.if_else(special, _joined('"', pc.replace_substring(text, '"', '""'), '"'), text)
-        return text
-
-    def _text(self, name: str, column: pa.Array) -> pa.Array:
-        kind = column.type
+    def _cells(self, name: str, column: pa.Array) -> list[str | None]:
+        """A column as cells of text."""
+        if pa.types.is_dictionary(column.type):
+            words = [*self._cells(name, column.dictionary), "null" if self.kind == "ndjson" else None]
+            return [words[i] for i in pc.fill_null(column.indices, len(words) - 1).to_pylist()]
+        kind, is_json = column.type, self.kind == "ndjson"
         if pa.types.is_nested(kind):
-            texts = [None if value is None else json.dumps(value, default=str) for value in column.to_pylist()]
-            return pa.array(texts, pa.large_string())
+            return [json.dumps(value, default=str) for value in column.to_pylist()]
         try:
-            text = pc.cast(column, pa.large_string())
+            text = pc.cast(column, pa.string())
         except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
             raise FilesError(f"the column {name!r} holds {kind}, which text cannot ({error})") from None
         if pa.types.is_floating(kind):
-            rigid = '"rigid"' if self.kind == "ndjson" else "rigid"
-            infinite = pc.if_else(pc.is_inf(column), rigid if name == self.stiffness else None, None)
+            infinite = pc.if_else(pc.is_inf(column), "rigid" if name == self.stiffness else None, None)
             text = pc.if_else(pc.is_finite(column), text, infinite)
-        return text
-
-
-def _joined(*parts: Any) -> pa.Array:
-    """Text of arrays and constants, element by element; of bytes where one of them holds bytes."""
-    binary = any(isinstance(part, pa.Array) and pa.types.is_large_binary(part.type) for part in parts)
-    kind = pa.large_binary() if binary else pa.large_string()
-    cast = [part.cast(kind) if isinstance(part, pa.Array) else pa.scalar(part, kind) for part in parts]
-    return pc.binary_join_element_wise(*cast, pa.scalar("", kind))
-
-
-def _bytes_of(lines: pa.Array) -> bytes:
-    """All the text of an array without nulls, one after the other."""
-    lines = pa.concat_arrays([lines])  # a separate array, whose text begins at its first entry
-    total = pc.sum(pc.binary_length(lines)).as_py()
-    return bytes(lines.buffers()[2][:total]) if total else b""
+        if not is_json:
+            is_real = pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+            return list((pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist())
+        if pa.types.is_primitive(kind) and not pa.types.is_temporal(kind):
+            return [cell if cell != "rigid" else '"rigid"' for cell in pc.fill_null(text, "null").to_pylist()]
+        return [json.dumps(cell) for cell in text.to_pylist()]
 
 
 def write_parquet(path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
     """One Parquet file of the pieces; doubles are written plainly, which is three times as fast."""
     coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
     with pa.parquet.ParquetWriter(path, schema, use_dictionary=coded, compression="snappy") as writer:
-        held: list[pa.RecordBatch] = []
         for piece in pieces:
-            held += pa.ipc.open_stream(piece)
-            if sum(batch.num_rows for batch in held) >= ROWS:
-                writer.write_table(pa.Table.from_batches(held).combine_chunks(), row_group_size=2 * ROWS)
-                held = []
-        if held:
-            writer.write_table(pa.Table.from_batches(held).combine_chunks(), row_group_size=2 * ROWS)
+            writer.write_table(pa.ipc.open_stream(piece).read_all())

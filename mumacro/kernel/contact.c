@@ -1,4 +1,4 @@
-/* A ball on a flat under a constant load, Hertz, as independent springs (method of dimensionality reduction): the spring
+/* A ball on a flat under a constant load, Hertz, as independent springs (method of dimensionality reduction): that
  * at the share xi of the contact radius carries 3/2 s d xi of the load, s = 1 - xi^2, and d xi of the stiffness.  So
  *
  *     mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(v~ / (1.5 s), y~ / (1.5 s)) d xi:
@@ -18,7 +18,7 @@ enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y, MU_ERROR_ALONG, MU_ERROR_ALONG_SL
 #define MU_STEEPEST_Y 1.29079076185
 #define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
 
-/* The springs that the rules take: v~, y~ and s of each, its share of the load; pieces from first[k] to first[k + 1]. */
+/* The springs that the rules take: v~, y~, s and share of the load of each; pieces from first[k] to first[k + 1]. */
 typedef struct {
     int n, first[MU_RULES + 1];
     double v[MU_CHUNK], y[MU_CHUNK], s[MU_CHUNK], share[MU_CHUNK];
@@ -33,7 +33,8 @@ static void mu_crossings(const mumacro_data *data, double r, double *entry, doub
     *leave = mu_max(r * r / 4.402914, MU_STEEPEST_Y);
     for (int i = 0; i < 30; ++i) {
         double tilt;
-        const double share = r * mu_border(data, *entry, &tilt, NULL) / *entry, step = (1.0 - 1.0 / share) / (tilt - 1.0);
+        const double share = r * mu_border(data, *entry, &tilt, NULL) / *entry;
+        const double step = (1.0 - 1.0 / share) / (tilt - 1.0);
         *entry = mu_min(*entry * (1.0 - step), MU_STEEPEST_Y);
         if (!(fabs(step) > 1e-9)) break;
     }

@@ -12,10 +12,10 @@ typedef struct {
     const double *polynomials, *errors, *slope_errors;
 } mumacro_cells;
 
-/* Quadrature over one piece of a ball: points (nodes, 2), the share of the piece that lies beyond a node, and its weight;
+/* Quadrature over one piece of a ball: points (nodes, 2), the share of the piece beyond a node, and its weight;
  * the largest errors found, absolute and relative to the smaller of the integral and what it lacks of the piece's load:
- * of mu~, power, stick fraction, of both slopes; for oscillation along the sliding direction of mu~, of slopes, of the stick
- * fraction. */
+ * of mu~, power, stick fraction, of both slopes; for oscillation along the sliding direction of mu~, of slopes, of
+ * the stick fraction. */
 typedef struct {
     int64_t nodes;
     const double *points;

@@ -166,7 +166,8 @@ static double mu_way_in_stick(const mu_turning *at, double a, double s, double w
     /* of (s^2/2 - 1 + cos s) / s^4 */
     static const double series[9] = {
         4.110317623312165e-19, -1.5619206968586225e-16, 4.779477332387385e-14, -1.1470745597729725e-11,
-        2.08767569878681e-09, -2.7557319223985894e-07, 2.48015873015873e-05, -0.001388888888888889, 0.041666666666666664,
+        2.08767569878681e-09, -2.7557319223985894e-07, 2.48015873015873e-05, -0.001388888888888889,
+        0.041666666666666664,
     };
     const mu_arc arc = mu_arc_of(s);
     const double q = s * s;
@@ -178,7 +179,7 @@ static double mu_way_in_stick(const mu_turning *at, double a, double s, double w
 
 static mu_line mu_line_of_reverse(const mu_turning *at, double v, double a, const mu_reverse *found) {
     const double m = found->m, p = found->p, both = m * m + p * p;
-    const double sweep = 2.0 / MU_PI * (at->b + p); /* mu~ of rigid contact where p = 0 */
+    const double sweep = 2.0 / MU_PI * (at->b + p); /* of rigid contact, for p = 0 */
     double layers; /* what stick adds */
     mu_line out;
     if (at->x < 0.5) layers = a * (at->x * (both - 2.0 * found->bent) - 2.0 * p * at->sine);

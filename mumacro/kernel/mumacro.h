@@ -55,8 +55,8 @@ enum {
     MUMACRO_SOURCES
 };
 
-/* The regime of an answer: slips all the time, sticks during a part of each period, at rest (v0 -> 0); some springs of a
- * ball slip all the time and others do not; slips backwards, too. */
+/* The regime of an answer: slips all the time, sticks during a part of each period, at rest (v0 -> 0); some springs of
+ * a ball slip all the time and others do not; slips backwards, too. */
 enum {
     MUMACRO_REGIME_CONTINUOUS,
     MUMACRO_REGIME_STICK_SLIP,
@@ -65,13 +65,14 @@ enum {
     MUMACRO_REGIME_REVERSE_SLIP
 };
 
-/* The contact: one spring, or a ball on a flat (Hertz, k = 8 a G*); the direction of the oscillation: across the sliding
- * direction, along it, or of the normal force. */
+/* The contact: one spring, or a ball on a flat (Hertz, k = 8 a G*); the direction of the oscillation: across the
+ * sliding direction, along it, or of the normal force. */
 enum { MUMACRO_SPRING, MUMACRO_BALL };
 enum { MUMACRO_ACROSS, MUMACRO_ALONG, MUMACRO_NORMAL };
 
-/* Returned where there is nothing to write to, no such quantity, no such contact or direction, a ball whose normal force
- * oscillates (its contact radius changes, which is not modelled), no such step; 0 is success, 1 to 6 are bad inputs, 7 is an amplitude
+/* Returned where there is nothing to write to, no such quantity, no such contact or direction, a ball whose normal
+ * force oscillates (its contact radius changes: not modelled), no such step; 0 is success, 1 to 6 are bad inputs, 7 is an
+ * amplitude
  * of the normal force that is not below it. */
 enum {
     MUMACRO_NO_STEP = -5,

@@ -8,6 +8,7 @@ from starlette.responses import Response
 from mumacro.page import POLICY, map_of, names
 
 from .. import __version__
+from ..options import CaseRequest
 from ..wire.json import dump
 from . import Endpoint, file_answer, in_thread, reply
 
@@ -34,8 +35,9 @@ def asset(path: Path, media_type: str, url: str, headers: dict[str, str]) -> End
 
 
 async def _names(request: Request) -> Response:
-    """The library's inputs, units, bounds, approximations and borders, and whether there is a guide."""
-    return reply(dump(names(request.app.state.settings.guide is not None)), _FRESH)
+    """The library's inputs, units, bounds, approximations and borders, and what this service can do."""
+    guide = ["guide"] if request.app.state.settings.guide is not None else []
+    return reply(dump(names(["service", *CaseRequest.model_fields, *guide])), _FRESH)
 
 
 async def _map(request: Request) -> Response:

@@ -43,7 +43,6 @@ EXPORT Status fmi2GetRealStatus(ME, int kind, double *value) {
 }
 
 RETURNS(OK, EnterInitializationMode, ME)
-RETURNS(NONE, SetInteger, ME, AT, const int value[])
 RETURNS(NONE, GetDerivatives, ME, double x[], size_t n)
 RETURNS(NONE, SetRealInputDerivatives, ME, AT, const int order[], const double value[])
 RETURNS(NONE, GetRealOutputDerivatives, ME, AT, const int order[], double value[])

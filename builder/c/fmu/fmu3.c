@@ -33,24 +33,6 @@ EXPORT Status fmi3GetAdjointDerivative(ME, const Reference unknowns[], size_t n,
     return OK;
 }
 
-EXPORT Status fmi3GetNumberOfVariableDependencies(ME, Reference at, size_t *n) {
-    *n = at == MU_MACRO || at == MU_RATIO ? INPUTS : 0;
-    return OK;
-}
-
-EXPORT Status fmi3GetVariableDependencies(ME, Reference at, size_t elements[], Reference inputs[],
-                                          size_t input_elements[], int kinds[], size_t n) {
-    size_t count;
-    fmi3GetNumberOfVariableDependencies(m, at, &count);
-    if (n != count) return ERROR;
-    for (size_t i = 0; i < n; ++i) {
-        elements[i] = input_elements[i] = 0;
-        inputs[i] = (Reference)i + 1;
-        kinds[i] = 0; /* dependent */
-    }
-    return OK;
-}
-
 EXPORT Status fmi3UpdateDiscreteStates(ME, bool *again, bool *terminate, bool *nominals, bool *values, bool *event,
                                        double *next) {
     *again = *terminate = *nominals = *values = *event = false;
@@ -65,17 +47,9 @@ EXPORT Status fmi3DoStep(ME, double time, double step, bool keeps, bool *event, 
     return answered(m);
 }
 
-#define NO_NUMBER(name) \
-    EXPORT Status FMI(name)(ME, size_t *n) { \
-        *n = 0; \
-        return OK; \
-    }
-NO_NUMBER(GetNumberOfEventIndicators)
-NO_NUMBER(GetNumberOfContinuousStates)
+EXPORT Status fmi3GetNumberOfEventIndicators(ME, size_t *n) { return *n = 0, OK; }
+EXPORT Status fmi3GetNumberOfContinuousStates(ME, size_t *n) { return *n = 0, OK; }
 
-#define NO_VALUES(name, type) \
-    RETURNS(NONE, Get##name, ME, AT, type value[], size_t values) \
-    RETURNS(NONE, Set##name, ME, AT, const type value[], size_t values)
 NO_VALUES(Float32, float)
 NO_VALUES(Int8, int8_t)
 NO_VALUES(UInt8, uint8_t)
@@ -84,7 +58,6 @@ NO_VALUES(UInt16, uint16_t)
 NO_VALUES(UInt32, uint32_t)
 NO_VALUES(Int64, int64_t)
 NO_VALUES(UInt64, uint64_t)
-RETURNS(NONE, SetInt32, ME, AT, const int32_t value[], size_t values)
 RETURNS(NONE, GetBinary, ME, AT, size_t size[], const uint8_t *value[], size_t values)
 RETURNS(NONE, SetBinary, ME, AT, const size_t size[], const uint8_t *const value[], size_t values)
 RETURNS(NONE, GetOutputDerivatives, ME, AT, const int32_t order[], double value[], size_t values)
@@ -104,3 +77,7 @@ RETURNS(OK, EnterConfigurationMode, ME)
 RETURNS(OK, ExitConfigurationMode, ME)
 RETURNS(OK, EvaluateDiscreteStates, ME)
 RETURNS(ERROR, ActivateModelPartition, ME, Reference clock, double time)
+/* of single elements of arrays, which this unit does not have and does not promise */
+RETURNS(ERROR, GetNumberOfVariableDependencies, ME, Reference at, size_t *n)
+RETURNS(ERROR, GetVariableDependencies, ME, Reference at, size_t elements[], Reference inputs[], size_t of[],
+        int kinds[], size_t n)

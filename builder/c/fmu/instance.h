@@ -34,6 +34,7 @@ typedef void (*Logger)(void *environment, String instance, Status status, String
 #define GET_NUMBERS fmi2GetReal
 #define SET_NUMBERS fmi2SetReal
 #define GET_WHOLES fmi2GetInteger
+#define SET_WHOLES SetInteger
 #define SIZE(name) /* 3.0 gives the length of arrays of values, too */
 #define SHORTER(name, n) 0
 #else
@@ -45,6 +46,7 @@ typedef void (*Logger)(void *environment, Status status, String category, String
 #define GET_NUMBERS fmi3GetFloat64
 #define SET_NUMBERS fmi3SetFloat64
 #define GET_WHOLES fmi3GetInt32
+#define SET_WHOLES SetInt32
 #define SIZE(name) , size_t name
 #define SHORTER(name, n) (name < n)
 #endif
@@ -65,8 +67,9 @@ typedef struct {
 #define ME Instance *m
 #define AT const Reference at[], size_t n
 #define NONE (n ? ERROR : OK) /* there are no variables of this kind */
-#define RETURNS(result, name, ...) \
-    EXPORT Status FMI(name)(__VA_ARGS__) { return result; }
+#define RETURNS(result, name, ...) RETURNING(result, FMI(name), __VA_ARGS__)
+#define RETURNING(result, name, ...) \
+    EXPORT Status name(__VA_ARGS__) { return result; }
 
 /* --- the model ------------------------------------------------------------------------------------------------ */
 
@@ -116,9 +119,7 @@ static Status get_whole(ME, Reference variable, int32_t *value) {
 
 static Status set_number(ME, Reference variable, double value) {
     if (variable <= TIME || variable > INPUTS) return ERROR;
-    m->state.x[variable - 1] = value;
-    m->state.known = 0;
-    return OK;
+    return m->state.x[variable - 1] = value, m->state.known = 0, OK;
 }
 
 /* Adds seed times d output / d input. */
@@ -136,10 +137,8 @@ static Status add_slope(ME, Reference output, Reference input, double seed, doub
 /* --- an instance ---------------------------------------------------------------------------------------------- */
 
 EXPORT Status FMI(Reset)(ME) {
-    static const double STARTS[INPUTS] = MUMACRO_FMU_STARTS;
-    memset(&m->state, 0, sizeof m->state);
-    memcpy(m->state.x, STARTS, sizeof STARTS);
-    return OK;
+    static const State start = {.x = MUMACRO_FMU_STARTS};
+    return m->state = start, OK;
 }
 
 static Instance *instantiate(String name, String token, Logger logger, void *environment) {
@@ -162,35 +161,16 @@ EXPORT void FMI(FreeInstance)(ME) { free(m); }
 
 static Status keep(void **kept, const void *state) {
     if (*kept == NULL) *kept = malloc(sizeof(State));
-    if (*kept == NULL) return ERROR;
-    memcpy(*kept, state, sizeof(State));
-    return OK;
+    return *kept == NULL ? ERROR : (memcpy(*kept, state, sizeof(State)), OK);
 }
 
 EXPORT Status STATE(Get, )(ME, void **kept) { return keep(kept, &m->state); }
-
-EXPORT Status STATE(Set, )(ME, const void *kept) {
-    memcpy(&m->state, kept, sizeof(State));
-    return OK;
-}
-
-EXPORT Status STATE(Free, )(ME, void **kept) {
-    free(*kept);
-    *kept = NULL;
-    return OK;
-}
-
-EXPORT Status STATE(Serialized, Size)(ME, void *kept, size_t *size) {
-    *size = sizeof(State);
-    return OK;
-}
-
+EXPORT Status STATE(Set, )(ME, const void *kept) { return memcpy(&m->state, kept, sizeof(State)), OK; }
+EXPORT Status STATE(Free, )(ME, void **kept) { return free(*kept), *kept = NULL, OK; }
+EXPORT Status STATE(Serialized, Size)(ME, void *kept, size_t *size) { return *size = sizeof(State), OK; }
 EXPORT Status STATE(Serialize, )(ME, const void *kept, void *bytes, size_t size) {
-    if (size < sizeof(State)) return ERROR;
-    memcpy(bytes, kept, sizeof(State));
-    return OK;
+    return size < sizeof(State) ? ERROR : (memcpy(bytes, kept, sizeof(State)), OK);
 }
-
 EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **kept) {
     return size < sizeof(State) ? ERROR : keep(kept, bytes);
 }
@@ -220,10 +200,7 @@ EXPORT Status FMI(GetDirectionalDerivative)(ME, const Reference unknowns[], size
     return OK;
 }
 
-EXPORT Status FMI(SetTime)(ME, double time) {
-    m->state.time = time;
-    return OK;
-}
+EXPORT Status FMI(SetTime)(ME, double time) { return m->state.time = time, OK; }
 
 /* --- functions that have nothing to do, in both standards ----------------------------------------------------- */
 
@@ -232,16 +209,17 @@ RETURNS(OK, ExitInitializationMode, ME)
 RETURNS(OK, EnterEventMode, ME)
 RETURNS(OK, EnterContinuousTimeMode, ME)
 RETURNS(OK, Terminate, ME)
-RETURNS(NONE, GetBoolean, ME, AT, Boolean value[] SIZE(values))
-RETURNS(NONE, SetBoolean, ME, AT, const Boolean value[] SIZE(values))
-RETURNS(NONE, GetString, ME, AT, String value[] SIZE(values))
-RETURNS(NONE, SetString, ME, AT, const String value[] SIZE(values))
+#define NO_VALUES(name, type) \
+    RETURNS(NONE, Get##name, ME, AT, type value[] SIZE(values)) \
+    RETURNS(NONE, Set##name, ME, AT, type const value[] SIZE(values))
+NO_VALUES(Boolean, Boolean)
+NO_VALUES(String, String)
+RETURNS(NONE, SET_WHOLES, ME, AT, const int32_t value[] SIZE(values))
 RETURNS(NONE, SetContinuousStates, ME, const double x[], size_t n)
 RETURNS(NONE, GetContinuousStates, ME, double x[], size_t n)
 RETURNS(NONE, GetEventIndicators, ME, double x[], size_t n)
 RETURNS(NONE, GetNominalsOfContinuousStates, ME, double x[], size_t n)
 
 EXPORT Status FMI(CompletedIntegratorStep)(ME, Boolean fixed, Boolean *event, Boolean *terminate) {
-    *event = *terminate = 0;
-    return OK;
+    return *event = *terminate = 0, OK;
 }

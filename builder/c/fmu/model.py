@@ -10,207 +10,144 @@ Windows for 64-bit Intel and AMD; without any compiler the sources alone.
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import platform
 import shutil
-import subprocess
 import sys
-import tempfile
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
-from xml.etree import ElementTree as Xml
+from xml.sax.saxutils import quoteattr
 
 from mumacro import charts
-from mumacro.errors import MumacroError
 from mumacro.inputs import FIELDS, UNITS
 from mumacro.table import Table
 from mumacro.version import __version__
 
-from ..source import header_text
+from ..source import compiled, header_text, zig
 
-__all__ = ["CompilerError", "write_fmu2", "write_fmu3"]
+__all__ = ["fmu2", "fmu3"]
 
 _HERE = Path(__file__).parent
-NAME = "mumacro"
 STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 OPTIONS = ("-O2", "-std=c99", "-fPIC", "-shared", "-fvisibility=hidden")
 _TEXTS = {
     "mu0": "Coulomb friction coefficient", "Fz": "normal force", "k": "tangential stiffness; infinite: rigid contact",
     "y0": "amplitude of the transverse oscillation", "omega": "angular frequency of the oscillation",
-    "v0": "sliding speed",
-}  # fmt: skip
-_OUTPUTS = {"mu_macro": "macroscopic friction coefficient", "mu_ratio": "mu_macro / mu0"}
-_OTHERS = {
+    "v0": "sliding speed", "mu_macro": "macroscopic friction coefficient", "mu_ratio": "mu_macro / mu0",
     "error_bound": "bound of the absolute error of mu_macro", "v_tilde": "v0 k / (mu0 Fz omega)",
     "y_tilde": "y0 k / (mu0 Fz)", "regime": ", ".join(f"{i}: {name}" for i, name in enumerate(charts.REGIMES)),
     "source": ", ".join(f"{i}: {name}" for i, name in enumerate(charts.SOURCES)),
 }  # fmt: skip
-_WHOLE = ("regime", "source")
-#: unit -> exponents of SI base units
-_UNITS: dict[str, dict[str, int]] = {
-    "N": {"kg": 1, "m": 1, "s": -2}, "N/m": {"kg": 1, "s": -2}, "m": {"m": 1}, "rad/s": {"s": -1, "rad": 1},
-    "m/s": {"m": 1, "s": -1},
-}  # fmt: skip
+_OUTPUTS, _WHOLE = ("mu_macro", "mu_ratio"), ("regime", "source")
+_UNITS = """<UnitDefinitions>
+<Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit><Unit name="N/m"><BaseUnit kg="1" s="-2"/></Unit>
+<Unit name="m"><BaseUnit m="1"/></Unit><Unit name="rad/s"><BaseUnit s="-1" rad="1"/></Unit>
+<Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit>
+</UnitDefinitions>"""
+_BUILD = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="mumacro">
+<SourceFileSet language="C99"><SourceFile name="fmu3.c"/></SourceFileSet>
+</BuildConfiguration></fmiBuildDescription>
+"""
 
 
-class CompilerError(MumacroError):
-    """The C compiler refuses the unit's sources; the text is its message."""
+def fmu2(table: Table) -> bytes:
+    """An FMU of FMI 2.0."""
+    return _unit(table, 2)
 
 
-def write_fmu2(table: Table, out: BinaryIO) -> None:
-    """Write an FMU of FMI 2.0."""
-    _write(table, out, 2)
+def fmu3(table: Table) -> bytes:
+    """An FMU of FMI 3.0."""
+    return _unit(table, 3)
 
 
-def write_fmu3(table: Table, out: BinaryIO) -> None:
-    """Write an FMU of FMI 3.0."""
-    _write(table, out, 3)
-
-
-def _write(table: Table, out: BinaryIO, version: int) -> None:
+def _unit(table: Table, version: int) -> bytes:
     starts = ", ".join(repr(STARTS[name]) for name in FIELDS)
-    sources = {
-        "mumacro.h": header_text(table),
-        "instance.h": f"#define MUMACRO_FMU_STARTS {{{starts}}}\n" + (_HERE / "instance.h").read_text("ascii"),
-        f"fmu{version}.c": (_HERE / f"fmu{version}.c").read_text("ascii"),
-    }
-    token = str(table.attributes["content_sha256"])
-    files: dict[str, bytes] = {"modelDescription.xml": _bytes(_description(version, token))}
-    files |= {f"sources/{name}": text.encode("ascii") for name, text in sources.items()}
+    sources = {name: (_HERE / name).read_text("ascii") for name in ("instance.h", f"fmu{version}.c")}
+    sources["instance.h"] = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n" + sources["instance.h"]
+    sources["mumacro.h"] = header_text(table)
+    described = _description(version, str(table.attributes["content_sha256"]))
+    files: dict[str, str | bytes] = {"modelDescription.xml": described}
+    files |= {f"sources/{name}": text for name, text in sources.items()}
     if version == 3:
-        files["sources/buildDescription.xml"] = _bytes(_build_description())
-    files |= _binaries(sources, version)
+        files["sources/buildDescription.xml"] = _BUILD
+    binaries: dict[str, str | bytes] = {}
+    for place, command in _targets(version):
+        if f"binaries/{place}" not in binaries:
+            library = [] if place.endswith(".dll") else ["-lm"]
+            binaries[f"binaries/{place}"] = compiled(sources, [*command, *OPTIONS, f"fmu{version}.c", *library])
+    if not binaries:
+        print("mumacro: no C compiler is installed: the FMU has sources and no binary", file=sys.stderr)
+    out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
+        for name, content in (files | binaries).items():
             entry = zipfile.ZipInfo(name)  # 1980: the same table gives the same bytes
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, content)
+    return out.getvalue()
 
 
-# --- binaries -------------------------------------------------------------------------------------------
+def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
+    """Files below ``binaries`` and the commands that make them; zig first, which binds to an old C library."""
+    folders = {
+        "x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-darwin": "darwin64",
+    }  # fmt: skip
+
+    def place(three: str) -> str:
+        suffix = {"windows": ".dll", "darwin": ".dylib"}.get(three.partition("-")[2], ".so")
+        return f"{folders.get(three, three) if version == 2 else three}/mumacro{suffix}"
+
+    for three, target in (("x86_64-linux", "x86_64-linux-gnu.2.17"), ("x86_64-windows", "x86_64-windows-gnu")):
+        if command := zig(target):
+            yield place(three), [*command, "-s"]
+    processor = {"arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    found = next((path for path in map(shutil.which, ("gcc", "clang", "cc")) if path), None)
+    if found and platform.system() in ("Linux", "Darwin") and processor in ("x86_64", "aarch64"):
+        yield place(f"{processor}-{platform.system().lower()}"), [found]
 
 
-def _binaries(sources: dict[str, str], version: int) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
-    with tempfile.TemporaryDirectory(prefix="mumacro-") as name:
-        folder = Path(name)
-        for source, text in sources.items():
-            (folder / source).write_text(text, "ascii")
-        for (two, three), suffix, command in _targets():
-            place = f"binaries/{two if version == 2 else three}/{NAME}{suffix}"
-            if place not in found:
-                made = folder / f"{three}{suffix}"
-                words = [*command, *OPTIONS, f"fmu{version}.c", "-o", made.name, *(["-lm"] if suffix != ".dll" else [])]
-                done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-                if done.returncode != 0:
-                    raise CompilerError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
-                found[place] = made.read_bytes()
-    if not found:
-        print("mumacro: no C compiler is installed: the FMU has sources and no binary", file=sys.stderr)
-    return found
-
-
-def _targets() -> Iterable[tuple[tuple[str, str], str, list[str]]]:
-    """Platform names of FMI 2.0 and 3.0, suffix, command; zig first, which binds to an old C library."""
-    if importlib.util.find_spec("ziglang") is not None:
-        zig = [sys.executable, "-m", "ziglang", "cc", "-s", "-target"]
-        yield ("linux64", "x86_64-linux"), ".so", [*zig, "x86_64-linux-gnu.2.17"]
-        yield ("win64", "x86_64-windows"), ".dll", [*zig, "x86_64-windows-gnu"]
-    here = {
-        ("Linux", "x86_64"): (("linux64", "x86_64-linux"), ".so"),
-        ("Linux", "aarch64"): (("aarch64-linux", "aarch64-linux"), ".so"),
-        ("Darwin", "x86_64"): (("darwin64", "x86_64-darwin"), ".dylib"),
-        ("Darwin", "arm64"): (("aarch64-darwin", "aarch64-darwin"), ".dylib"),
-    }.get((platform.system(), platform.machine()))
-    compiler = next((path for path in map(shutil.which, ("gcc", "clang", "cc")) if path), None)
-    if here is not None and compiler is not None:
-        yield *here, [compiler]
-
-
-# --- descriptions ---------------------------------------------------------------------------------------
-
-
-def _bytes(root: Any) -> bytes:
-    Xml.indent(root)
-    buffer = io.BytesIO()
-    Xml.ElementTree(root).write(buffer, encoding="UTF-8", xml_declaration=True)
-    return buffer.getvalue()
-
-
-def _description(version: int, token: str) -> Any:
+def _description(version: int, token: str) -> str:
     """modelDescription.xml."""
-    second = version == 2
-    root = Xml.Element("fmiModelDescription", {
-        "fmiVersion": f"{version}.0", "modelName": NAME, "guid" if second else "instantiationToken": token,
-        "description": "Macroscopic friction of a contact that is oscillated transversely to its sliding direction",
-        "version": __version__, "license": "Apache-2.0", "generationTool": f"mumacro {__version__}",
-        "variableNamingConvention": "flat", **({"numberOfEventIndicators": "0"} if second else {}),
-    })  # fmt: skip
-    state = "canGetAndSetFMUstate" if second else "canGetAndSetFMUState"
-    serial = "canSerializeFMUstate" if second else "canSerializeFMUState"
-    able = {
-        "modelIdentifier": NAME, state: "true", serial: "true",
-        "providesDirectionalDerivative" if second else "providesDirectionalDerivatives": "true",
-    }  # fmt: skip
+    second, first = version == 2, len(FIELDS) + 1
+    token_name, state, able = (
+        ("guid", "canGetAndSetFMUstate", "providesDirectionalDerivative") if second
+        else ("instantiationToken", "canGetAndSetFMUState", "providesDirectionalDerivatives")
+    )  # fmt: skip
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<fmiModelDescription fmiVersion="{version}.0" modelName="mumacro" {token_name}="{token}"'
+        ' description="Macroscopic friction of a contact that is oscillated transversely to its sliding direction"'
+        f' version="{__version__}" license="Apache-2.0" generationTool="mumacro {__version__}"'
+        f' variableNamingConvention="flat"{" numberOfEventIndicators=" + quoteattr("0") if second else ""}>',
+    ]
+    for kind, extra in (("ModelExchange", ""), ("CoSimulation", ' canHandleVariableCommunicationStepSize="true"')):
+        inside = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if second else ""
+        lines.append(f'<{kind} modelIdentifier="mumacro" {state}="true" {able}="true"{extra}>{inside}</{kind}>')
+    lines += [_UNITS, '<DefaultExperiment startTime="0" stopTime="1"/>', "<ModelVariables>"]
     if not second:
-        able["providesAdjointDerivatives"] = "true"
-    for kind in ("ModelExchange", "CoSimulation"):
-        extra = {"canHandleVariableCommunicationStepSize": "true"} if kind == "CoSimulation" else {}
-        element = Xml.SubElement(root, kind, {**able, **extra})
-        if second:
-            Xml.SubElement(Xml.SubElement(element, "SourceFiles"), "File", name="fmu2.c")
-    units = Xml.SubElement(root, "UnitDefinitions")
-    for unit, base in _UNITS.items():
-        exponents = {name: str(power) for name, power in base.items()}
-        Xml.SubElement(Xml.SubElement(units, "Unit", name=unit), "BaseUnit", exponents)
-    Xml.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1")
-    variables = Xml.SubElement(root, "ModelVariables")
-    if not second:
-        Xml.SubElement(variables, "Float64", name="time", valueReference="0", causality="independent",
-                       variability="continuous")  # fmt: skip
-    for reference, (name, text) in enumerate((_TEXTS | _OUTPUTS | _OTHERS).items(), 1):
-        _variable(variables, version, name, str(reference), text)
-    structure = Xml.SubElement(root, "ModelStructure")
-    first = len(_TEXTS) + 1
-    known = " ".join(str(i) for i in range(1, first))
+        lines.append('<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>')
+    lines += [_variable(second, name, reference) for reference, name in enumerate(_TEXTS, 1)]
+    lines += ["</ModelVariables>", "<ModelStructure>"]
+    known = " ".join(map(str, range(1, first)))
+    for group in ("Output", "InitialUnknown"):
+        name, index = ("Unknown", "index") if second else (group, "valueReference")
+        rows = [f'<{name} {index}="{first + i}" dependencies="{known}"/>' for i in range(len(_OUTPUTS))]
+        lines += [f"<{group}s>", *rows, f"</{group}s>"] if second else rows
+    return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>", ""])
+
+
+def _variable(second: bool, name: str, reference: int) -> str:
+    kind = "input" if name in STARTS else "output" if name in _OUTPUTS else "local"
+    about = (
+        f'name="{name}" valueReference="{reference}" description={quoteattr(_TEXTS[name])} causality="{kind}"'
+        f' variability="{"discrete" if name in _WHOLE else "continuous"}"'
+    )
+    value = "" if UNITS.get(name, "-") == "-" else f' unit="{UNITS[name]}"'
+    if name in STARTS:
+        value += f' start="{STARTS[name]!r}" min="0"'
+    else:
+        about += ' initial="calculated"'
     if second:
-        for group in ("Outputs", "InitialUnknowns"):
-            element = Xml.SubElement(structure, group)
-            for i in range(first, first + len(_OUTPUTS)):
-                Xml.SubElement(element, "Unknown", index=str(i), dependencies=known)
-    else:
-        for group in ("Output", "InitialUnknown"):
-            for i in range(first, first + len(_OUTPUTS)):
-                Xml.SubElement(structure, group, valueReference=str(i), dependencies=known)
-    return root
-
-
-def _variable(parent: Any, version: int, name: str, reference: str, text: str) -> None:
-    given = name in _TEXTS
-    about = {
-        "name": name, "valueReference": reference, "description": text,
-        "causality": "input" if given else "output" if name in _OUTPUTS else "local",
-        "variability": "discrete" if name in _WHOLE else "continuous",
-    }  # fmt: skip
-    if not given:
-        about["initial"] = "calculated"
-    unit = UNITS.get(name, "-")
-    value = {} if unit == "-" else {"unit": unit}
-    if given:
-        value |= {"start": repr(STARTS[name]), "min": "0"}
-    if version == 2:
-        variable = Xml.SubElement(parent, "ScalarVariable", about)
-        Xml.SubElement(variable, "Integer" if name in _WHOLE else "Real", value)
-    else:
-        Xml.SubElement(parent, "Int32" if name in _WHOLE else "Float64", {**about, **value})
-
-
-def _build_description() -> Any:
-    root = Xml.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = Xml.SubElement(root, "BuildConfiguration", modelIdentifier=NAME)
-    files = Xml.SubElement(configuration, "SourceFileSet", language="C99")
-    Xml.SubElement(files, "SourceFile", name="fmu3.c")
-    return root
+        return f"<ScalarVariable {about}><{'Integer' if name in _WHOLE else 'Real'}{value}/></ScalarVariable>"
+    return f"<{'Int32' if name in _WHOLE else 'Float64'} {about}{value}/>"

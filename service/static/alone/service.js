@@ -1,5 +1,5 @@
 // Answers without a service: from the table in mumacro.wasm, in the form in which the service gives them.
-import { Refused, Unanswered } from "./failures.js";
+import { Refused, Unanswered } from "./ask.js";
 
 const FIELDS = ["mu0", "Fz", "k", "y0", "omega", "v0"];
 const FOUND = ["error", "mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "source", "regime", "v0_crit", "power", "stick_fraction"];
@@ -23,16 +23,14 @@ const sourceName = names("source_name");
 const regimeName = names("regime_name");
 const about = { table: { id: `${text(table.checksum()).slice(0, 12)}, in this page`, tolerance: table.tolerance() } };
 
-/** All about one case; k null or "rigid" is rigid contact. */
+/** All about one case; k "rigid" is rigid contact. */
 export function evaluate(values) {
-  const given = FIELDS.map((name) => (name === "k" && [null, "rigid"].includes(values.k) ? Infinity : Number(values[name])));
+  const given = FIELDS.map((name) => (values[name] === "rigid" ? Infinity : Number(values[name])));
   const numbers = new Float64Array(table.memory.buffer, table.evaluate(...given), FOUND.length + FIELDS.length);
   const found = Object.fromEntries(FOUND.map((name, i) => [name, numbers[i]]));
-  if (found.error) {
-    const field = FIELDS[found.error - 1];
-    throw new Refused(text(table.error_text(found.error)), [{ field, reason: "is out of bounds" }]);
-  }
-  found.gradient = Object.fromEntries(FIELDS.map((name, i) => [name, name === "k" && given[i] === Infinity ? null : finite(numbers[FOUND.length + i])]));
+  if (found.error) throw new Refused(text(table.error_text(found.error)));
+  const slopes = [...numbers.subarray(FOUND.length)].map((slope, i) => (given[i] === Infinity ? null : finite(slope)));
+  found.gradient = Object.fromEntries(FIELDS.map((name, i) => [name, slopes[i]]));
   return { ...found, source: sourceName(found.source), regime: regimeName(found.regime) };
 }
 
@@ -40,10 +38,11 @@ function point(values) {
   const found = evaluate(values);
   const { mu0, Fz, k, v0 } = values;
   return {
-    mu_macro: found.mu_macro, mu_ratio: found.mu_ratio, regime: found.regime, error_bound: found.error_bound, source: found.source,
+    mu_macro: found.mu_macro, mu_ratio: found.mu_ratio, regime: found.regime, error_bound: found.error_bound,
+    source: found.source, stick_fraction: finite(found.stick_fraction),
     groups: { v_tilde: finite(found.v_tilde), y_tilde: finite(found.y_tilde), l0: k === "rigid" ? 0 : (mu0 * Fz) / k },
     limits: { mu_static: evaluate({ ...values, v0: 0 }).mu_macro, v0_crit: finite(found.v0_crit) },
-    stick_fraction: finite(found.stick_fraction), power: { oscillation: finite(found.power), saved: finite((mu0 - found.mu_macro) * Fz * v0) },
+    power: { oscillation: finite(found.power), saved: finite((mu0 - found.mu_macro) * Fz * v0) },
     gradient: found.gradient, ...about,
   };
 }
@@ -83,17 +82,16 @@ function curve(values, along, others) {
 }
 
 function law({ along, start, stop, points, scale, family, include, ...others }) {
-  if (!(stop > start)) throw new Refused("The law cannot be drawn: stop must be > start.", [{ field: "stop", reason: "must be > start" }]);
-  if (scale === "log" && start <= 0) throw new Refused("The law cannot be drawn: start must be > 0.", [{ field: "start", reason: "must be > 0" }]);
+  if (!(stop > start)) throw new Refused("The law cannot be drawn: stop must be > start.");
+  if (scale === "log" && start <= 0) throw new Refused("The law cannot be drawn: start must be > 0.");
   const values = sweep({ start, stop, points, scale });
   if (!family) return { along, values, ...curve(values, along, others), ...about };
   const [[name, listed]] = Object.entries(family);
   return { along, values, family: name, curves: listed.map((value) => ({ value, ...curve(values, along, { ...others, [name]: value }) })), ...about };
 }
 
-/** Answers what the page asks; files of the page itself come from where it is. */
-export async function get(path, values) {
-  if (path === "v1/mu-macro") return point(values);
+/** A file of the page itself. */
+export async function get(path) {
   try {
     return await (await fetch(path)).json();
   } catch {
@@ -101,7 +99,10 @@ export async function get(path, values) {
   }
 }
 
+const CALLS = { "v1/mu-macro": point, "v1/law": law };
+
+/** Answers what the page asks. */
 export async function post(path, body) {
-  if (path === "v1/law") return law(body);
-  throw new Refused("This page has no service to ask.", []);
+  if (!(path in CALLS)) throw new Refused("This page has no service to ask.");
+  return CALLS[path](body);
 }

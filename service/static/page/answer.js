@@ -1,61 +1,166 @@
-// The readout: mu_macro with its error and uncertainty, what goes with it, and what each input does to it.
-import { INPUTS, NAMES } from "./inputs.js";
-import { REGIMES, show, watts, withUnit } from "./show.js";
+// The readout: mu_macro with its uncertainty and model, what goes with it, what each input does to it; and "solve for".
+import { Channel, KeyWanted, Refused, wantKey } from "./ask.js";
+import { Field, make } from "./form.js";
+import {
+  INPUTS, MODELS, REGIMES, caseOf, endsOf, friction, fromSI, inUnit, namesOf, readNumber, show, symbolOf, textOf,
+  valueOf, watts,
+} from "./inputs.js";
+import { draw } from "./plots.js";
+import { post } from "./service.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** What is asked of the service for the readout. */
-export function question({ values, rigid, std }) {
-  const given = NAMES.filter((name) => std[name] > 0 && !(name === "k" && rigid));
-  const include = ["groups", "limits", "stick_fraction", "power", "gradient", ...(given.length ? ["std"] : [])];
-  const spread = Object.fromEntries(given.map((name) => [`std_${name}`, std[name]]));
-  return { ...values, ...(rigid ? { k: "rigid" } : {}), ...spread, include: include.join(",") };
-}
-
+/** Shows the answer to a state; with the digits that the inputs support, or with all that the table supports. */
 export function showAnswer(found, state) {
-  const { values } = state;
-  const { limits, groups, power } = found;
+  const { limits, groups, power, mu_macro: mu, error_bound: bound } = found;
+  const spread = found.std_first_order_enough ? found.std : found.std_sampled;
+  const known = Math.max(spread ?? 0, endsOf(state) ? (found.mu_macro_high - found.mu_macro_low) / 2 : 0);
+  const all = state.digits === "all";
+  const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
+  const kind = state.rigid ? "rigid contact" : MODELS[state.contact];
   const texts = {
-    mu: show(found.mu_macro, 6), regime: REGIMES[found.regime], ratio: show(found.mu_ratio, 6),
-    "peak-speed": withUnit("v0", values.y0 * values.omega), stick: found.stick_fraction === null ? "–" : `${show(100 * found.stick_fraction, 4)} %`,
-    shaker: power.oscillation === null && state.rigid ? "– (rigid)" : watts(power.oscillation), saved: watts(power.saved), static: show(limits.mu_static, 6),
-    crit: withUnit("v0", limits.v0_crit), "v-tilde": groups.v_tilde === null ? "∞" : show(groups.v_tilde, 5),
-    "y-tilde": groups.y_tilde === null ? "∞" : show(groups.y_tilde, 5),
-    bound: found.error_bound === null ? "not known" : `± ${show(found.error_bound, 2)}`, source: found.source, table: found.table.id,
+    mu: all ? friction(mu, bound, 15) : friction(mu, known), regime: REGIMES[found.regime],
+    ratio: all ? friction(found.mu_ratio, bound / valueOf(state, "mu0"), 15) : show(found.mu_ratio, 4),
+    "peak-speed": inUnit("v0", state.direction === "normal" ? null : valueOf(state, "y0") * valueOf(state, "omega")),
+    stick: found.stick_fraction === null ? "–" : `${show(100 * found.stick_fraction, 4)} %`,
+    shaker: power.oscillation === null && state.rigid ? "– (rigid)" : watts(power.oscillation),
+    saved: watts(power.saved), static: show(limits.mu_static, 4), crit: inUnit("v0", limits.v0_crit), "v-tilde": group(groups.v_tilde),
+    "y-tilde": group(groups.y_tilde), bound: bound === null ? "not known" : `± ${show(bound, 2)}`, source: found.source,
+    table: `${found.table.id}, tolerance ${show(found.table.tolerance)}`,
+    model: `Model: ${kind}, ${MODELS[state.direction]}; not compared with measured points.`,
+    uncertainty: uncertainty(found, state),
   };
   for (const [id, text] of Object.entries(texts)) $(id).textContent = text;
-  showUncertainty(found);
-  showBars(found, values);
+  showBars(found, state);
 }
 
-function showUncertainty(found) {
-  const place = $("uncertainty");
-  place.hidden = found.std === undefined;
-  if (place.hidden) return;
-  if (found.std === null) place.textContent = "± not finite: the slope is infinite here";
-  else if (found.std_first_order_enough) place.textContent = `± ${show(found.std, 3)} (one standard deviation)`;
-  else place.textContent = `± ${show(found.std_sampled, 3)} (one standard deviation, from samples; first order, ${show(found.std, 3)}, is not accurate enough here)`;
+function uncertainty(found, state) {
+  const { std, std_sampled: sampled, mu_macro_low: low, mu_macro_high: high } = found;
+  const ends = endsOf(state) && [low, high].map((value) => friction(value, high - low)).join(" to ");
+  const parts = ends ? [`${ends} for k = ${textOf(state.given.k, 4)}`] : [];
+  if (std === null) parts.push("± not finite: the slope is infinite here");
+  else if (found.std_first_order_enough) parts.push(`± ${show(std, 2)} (one standard deviation)`);
+  else if (std !== undefined) {
+    const why = `from samples; first order, ${show(std, 2)}, is not accurate enough here`;
+    parts.push(`± ${show(sampled, 2)} (one standard deviation, ${why})`);
+  }
+  return parts.join("; ");
 }
 
 /** Per cent that mu_macro changes when an input grows by 1 %, and the input's share of the variance. */
-function showBars(found, values) {
-  const shares = NAMES.map((name) => (found.gradient[name] === null || !found.mu_macro ? null : (found.gradient[name] * values[name]) / found.mu_macro));
+function showBars(found, state) {
+  const names = namesOf(state);
+  const shares = names.map((name) => {
+    const slope = found.gradient[name] ?? null;
+    return slope === null || !found.mu_macro ? null : (slope * valueOf(state, name)) / found.mu_macro;
+  });
   const most = Math.max(1, ...shares.map(Math.abs));
   const variance = found.std_share;
   $("variance-head").hidden = !variance;
-  $("bars").tBodies[0].replaceChildren(...NAMES.map((name, i) => {
-    const row = document.createElement("tr");
-    row.append(Object.assign(document.createElement("th"), { scope: "row", textContent: INPUTS[name].symbol }));
+  $("bars").tBodies[0].replaceChildren(...names.map((name, i) => {
     const share = shares[i];
-    const bar = Object.assign(document.createElement("div"), { className: "bar" });
-    const fill = Object.assign(document.createElement("span"), { className: share < 0 ? "less" : "more" });
     const width = (50 * Math.abs(share)) / most;
-    Object.assign(fill.style, { width: `${width}%`, left: `${share < 0 ? 50 - width : 50}%` });
-    bar.append(fill);
-    row.insertCell().append(bar);
+    const fill = { x: share < 0 ? 50 - width : 50, width, height: 10, class: share < 0 ? "less" : "more" };
+    const box = { class: "bar", viewBox: "0 0 100 10", preserveAspectRatio: "none", "aria-hidden": true };
+    const bar = draw("svg", box, draw("rect", fill), draw("path", { d: "M50 0v10" }));
     const text = share === null ? "–" : `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`;
-    Object.assign(row.insertCell(), { id: `bar-${name}`, textContent: text });
-    if (variance) Object.assign(row.insertCell(), { id: `share-${name}`, textContent: variance[name] === null ? "–" : `${(100 * variance[name]).toFixed(1)} %` });
-    return row;
+    const cells = [make("td", {}, bar), make("td", { id: `bar-${name}` }, text)];
+    const part = variance && (variance[name] === null ? "–" : `${(100 * variance[name]).toFixed(1)} %`);
+    if (variance) cells.push(make("td", { id: `share-${name}` }, part));
+    return make("tr", {}, make("th", { scope: "row" }, INPUTS[name].symbol), ...cells);
   }));
+}
+
+// --- "solve for": which value of an input gives a wanted friction ---------------------------------------------
+
+export class Solver {
+  /** `use(name, quantity)` takes a found value over. */
+  constructor(use) {
+    this.use = use;
+    this.channel = new Channel({
+      ask: ({ request }) => post("v1/solve-for", request),
+      answer: (found, { unit }) => this.show(found, unit),
+      fail: (error) => {
+        this.say(error instanceof Refused ? error.message : `${error.message} Asking again by itself.`);
+        if (error instanceof KeyWanted) wantKey();
+      },
+    });
+    const blame = (fault) => this.say(fault ? `The target ${fault}.` : "");
+    this.target = new Field($("target"), { read: (text) => this.read(text), use: () => {}, blame });
+    $("solve-form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.ask();
+    });
+    for (const id of ["unknown", "quantity", "target"]) $(id).addEventListener("input", () => this.clear());
+  }
+
+  /** Follows a state: what was found for another one is taken away. */
+  sync(state) {
+    if (this.state?.direction !== state.direction) {
+      $("unknown").replaceChildren(...namesOf(state).map((name) => new Option(INPUTS[name].label, name)));
+      $("unknown").value = namesOf(state).find((name) => /^y0|amplitude/.test(name));
+    }
+    this.state = state;
+    if (this.found && this.found !== JSON.stringify(caseOf(state))) this.clear();
+  }
+
+  say(text) {
+    $("solve-status").textContent = text;
+    $("roots").replaceChildren();
+  }
+
+  clear() {
+    this.channel.cancel();
+    this.found = null;
+    this.target.clear();
+    this.say("");
+  }
+
+  /** { value } of a typed target, or { fault }. */
+  read(text) {
+    const { value, unit, fault } = readNumber(text);
+    if (fault) return { fault };
+    if (!["", "%"].includes(unit)) return { fault: `“${unit}” is no unit of friction: leave it out` };
+    if (value < 0) return { fault: "must be >= 0" };
+    const senseless = $("unknown").value === "mu0" && $("quantity").value === "mu_ratio";
+    if (senseless) return { fault: "as a share of µ₀ makes no sense for µ₀: give µ" };
+    return { value: unit === "%" ? value / 100 : value };
+  }
+
+  ask() {
+    this.clear();
+    this.target.commit();
+    if (this.target.fault) return;
+    const unknown = $("unknown").value;
+    const { value: target } = this.read($("target").value);
+    this.found = JSON.stringify(caseOf(this.state));
+    this.channel.push({
+      request: { ...caseOf(this.state, unknown), unknown, quantity: $("quantity").value, target, include: ["power"] },
+      unit: this.state.given[unknown].unit,
+    });
+  }
+
+  show({ unknown, quantity, reachable, results: [{ roots, reason }] }, unit) {
+    const { min, max, min_included, max_included } = reachable;
+    const symbol = symbolOf(unknown, unit);
+    if (!roots.length) {
+      const [from, to] = [min_included ? "from" : "from above", max_included ? "to" : "to below"];
+      const can = `${quantity === "mu_ratio" ? "µ/µ₀" : "µ"} can be ${from} ${show(min, 4)} ${to} ${show(max, 4)} here`;
+      this.say(min === max ? reason : `No value of ${symbol} gives that: ${can}.`);
+      return;
+    }
+    this.say(roots.length > 1 ? `${roots.length} values give it:` : "");
+    $("roots").replaceChildren(...roots.map((root) => {
+      const told = `${symbol} = ${inUnit(unknown, root.value, unit, 6)}`;
+      const take = make("button", { type: "button", "aria-label": `use ${told}` }, "Use");
+      take.addEventListener("click", () => {
+        this.found = null; // it stays on the screen until something else changes
+        this.use(unknown, { value: fromSI(unknown, root.value, unit), unit });
+        this.found = JSON.stringify(caseOf(this.state));
+      });
+      const power = root.power?.oscillation ?? null;
+      const text = `${told}: µ = ${show(root.mu_macro, 5)}, ${REGIMES[root.regime]}`;
+      return make("li", {}, make("span", {}, power === null ? text : `${text}, shaker ${watts(power)}`), take);
+    }));
+  }
 }

@@ -1,141 +1,166 @@
-// The fields of the six inputs: value, unit, slider, standard deviation.  Typed values apply on commit.
-import { INPUTS, NAMES, fromSI, unitText } from "./inputs.js";
-import { readDeviation, readValue } from "./read.js";
-import { show } from "./show.js";
+// Typed fields, and the form of the inputs: value with unit, slider, standard deviation, contact, direction.
+import { CHOICES, INPUTS, about, fromSI, namesOf, readDeviation, readValue, si, symbolOf, textOf } from "./inputs.js";
 
 const STEPS = 1000; // of a slider, a decade
-const make = (tag, properties, ...children) => {
-  const element = Object.assign(document.createElement(tag), properties);
+
+/** An element with properties, attributes ("aria-label") and children. */
+export function make(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [key, value] of Object.entries(properties)) {
+    if (key.includes("-")) element.setAttribute(key, value);
+    else element[key] = value;
+  }
   element.append(...children);
   return element;
-};
+}
+
+/** A typed text: read on Enter and on leaving the field; Escape brings the last good one back. */
+export class Field {
+  /** `read(text)` -> anything, or { fault }; `use(found)`; `blame(fault)` with the reason, or null. */
+  constructor(input, { read, use, blame }) {
+    Object.assign(this, { input, read, use, told: blame, fault: null, shown: "" });
+    input.addEventListener("change", () => this.commit());
+    input.addEventListener("keydown", ({ key }) => {
+      if (key !== "Escape") return;
+      this.clear();
+      this.show(this.shown);
+    });
+  }
+
+  commit() {
+    const found = this.read(this.input.value);
+    this.blame(found?.fault ?? null);
+    if (!this.fault) this.use(found);
+  }
+
+  blame(fault) {
+    if (fault === null && this.fault === null) return;
+    this.fault = fault;
+    this.input.setAttribute("aria-invalid", String(fault !== null && !this.empty));
+    this.told(fault);
+  }
+
+  get empty() {
+    return this.input.value.trim() === "";
+  }
+
+  /** Forgets what is typed and cannot be used. */
+  clear() {
+    this.blame(null);
+  }
+
+  /** Shows a text; what is typed and cannot be used stays. */
+  show(text) {
+    this.shown = text;
+    if (!this.fault) this.input.value = text;
+  }
+}
 
 export class Form {
   /** `change(part of the state)` when something is committed; `trouble()` when what is wrong changes. */
   constructor(form, change, trouble) {
-    Object.assign(this, { change, trouble, rows: {}, faults: new Map(), typed: {} });
-    for (const name of NAMES) form.append(this.build(name));
+    Object.assign(this, { change, trouble, rows: {} });
+    this.rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
+    this.rigid.addEventListener("change", () => {
+      this.settle("k");
+      change({ rigid: this.rigid.checked });
+    });
+    for (const name of Object.keys(INPUTS)) form.append(this.build(name));
     form.addEventListener("submit", (event) => event.preventDefault());
+    for (const name of Object.keys(CHOICES)) {
+      for (const radio of document.getElementsByName(name)) {
+        radio.addEventListener("change", () => change({ [name]: radio.value }));
+      }
+    }
   }
 
   build(name) {
-    const { label, offered, range } = INPUTS[name];
-    const text = make("input", { type: "text", id: `field-${name}`, inputMode: name === "k" ? "text" : "decimal", spellcheck: false });
-    const spread = make("input", { type: "text", id: `std-${name}`, placeholder: "0", spellcheck: false });
-    const unit = make("select", { id: `unit-${name}`, disabled: offered.length === 1 });
-    const slider = make("input", { type: "range", id: `slider-${name}`, min: range[0] * STEPS, max: range[1] * STEPS, step: 1 });
+    const { label, range: [low, high] } = INPUTS[name];
     const fault = make("p", { id: `fault-${name}`, className: "fault" });
-    unit.setAttribute("aria-label", `unit of ${label}`);
-    slider.setAttribute("aria-label", `${label}, slider`);
-    spread.setAttribute("aria-label", `uncertainty of ${label}, one standard deviation, in its unit or in %`);
-    for (const input of [text, spread]) input.setAttribute("aria-describedby", fault.id);
+    const described = { spellcheck: false, type: "text", "aria-describedby": fault.id };
+    const text = make("input", { ...described, id: `field-${name}` });
+    const spread = make("input", {
+      ...described, id: `std-${name}`, placeholder: "0",
+      "aria-label": `uncertainty of ${label}, one standard deviation, with its unit or in %`,
+    });
+    const range = { min: low * STEPS, max: high * STEPS, step: 1 };
+    const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...range });
+    slider.addEventListener("input", () => {
+      const { unit } = this.state.given[name];
+      const value = Number(fromSI(name, 10 ** (slider.value / STEPS), unit).toPrecision(4));
+      this.settle(name);
+      this.change({ given: { ...this.state.given, [name]: { value, unit } } });
+    });
     const deviation = make("label", { className: "deviation" }, "±", spread);
-    const row = make("div", { className: "field" }, make("label", { htmlFor: text.id, textContent: label }), text, unit, slider, deviation);
-    this.rows[name] = { row, text, unit, slider, spread, fault };
-    if (name === "k") row.append(this.buildSwitch());
+    const row = make("div", { className: "field" }, make("label", { htmlFor: text.id }, label), text, slider);
+    if (about.knows.has("service")) row.append(deviation);
+    if (name === "k") row.append(make("label", { className: "switch" }, this.rigid, "rigid (no spring)"));
     row.append(fault);
-    this.listen(name);
+    this.rows[name] = { row, slider, fault, ...this.fields(name, text, spread) };
     return row;
   }
 
-  buildSwitch() {
-    this.rigid = make("input", { type: "checkbox", id: "rigid" });
-    this.rigid.setAttribute("role", "switch");
-    this.rigid.addEventListener("change", () => {
-      this.settle("k");
-      this.change({ rigid: this.rigid.checked });
-    });
-    return make("label", { className: "switch" }, this.rigid, "rigid contact (no spring)");
+  fields(name, text, spread) {
+    const blame = () => this.blame(name);
+    const unit = () => this.state.given[name].unit;
+    const use = (found) => this.change(found.rigid ? found : { given: { ...this.state.given, [name]: found } });
+    return {
+      value: new Field(text, { read: (typed) => readValue(name, typed, unit()), use, blame }),
+      deviation: new Field(spread, {
+        read: (typed) => readDeviation(name, typed, unit()),
+        use: (found) => this.change({ std: { ...this.state.std, [name]: found } }), blame,
+      }),
+    };
   }
 
-  listen(name) {
-    const { text, unit, slider, spread } = this.rows[name];
-    this.onCommit(text, () => this.commit(name));
-    this.onCommit(spread, () => this.commitDeviation(name));
-    unit.addEventListener("change", () => this.change({ units: { ...this.state.units, [name]: unit.value } }));
-    slider.addEventListener("input", () => {
-      this.settle(name);
-      this.change({ values: { ...this.state.values, [name]: Number((10 ** (slider.value / STEPS)).toPrecision(4)) } });
-    });
-  }
-
-  /** Commits on Enter and on leaving a field, where it was changed; Escape brings the last good value back. */
-  onCommit(input, commit) {
-    input.addEventListener("change", commit);
-    input.addEventListener("keydown", (event) => {
-      if (event.key !== "Escape") return;
-      this.blame(input, null);
-      this.sync(this.state);
-    });
-  }
-
-  commit(name) {
-    const { text } = this.rows[name];
-    const { units, values } = this.state;
-    const found = readValue(name, text.value, units[name]);
-    this.blame(text, found.fault && `${INPUTS[name].symbol}: ${found.fault}.`);
-    if (found.fault) return;
-    if (found.rigid) {
-      this.change({ rigid: true });
-      return;
-    }
-    this.typed[name] = found;
-    this.change({ values: { ...values, [name]: found.si }, units: { ...units, [name]: found.unit } });
-  }
-
-  commitDeviation(name) {
-    const { spread } = this.rows[name];
-    const { units, values, std } = this.state;
-    const found = readDeviation(name, spread.value, units[name], values[name]);
-    this.blame(spread, found.fault && `± of ${INPUTS[name].symbol}: ${found.fault}.`);
-    if (!found.fault) this.change({ std: { ...std, [name]: found.si } });
-  }
-
-  /** Says what is wrong with an input, or (null) that nothing is. */
-  blame(input, fault) {
-    if (!fault && !this.faults.has(input)) return;
-    if (fault) this.faults.set(input, fault);
-    else this.faults.delete(input);
-    input.setAttribute("aria-invalid", String(Boolean(fault)));
-    for (const { text, spread, fault: place } of Object.values(this.rows)) {
-      place.textContent = [text, spread].map((one) => this.faults.get(one)).filter(Boolean).join(" ");
-    }
+  /** Says beside the fields of an input what is wrong with them. */
+  blame(name) {
+    const { value, deviation, fault } = this.rows[name];
+    const { symbol } = INPUTS[name];
+    fault.textContent = [[symbol, value], [`± of ${symbol}`, deviation]]
+      .filter(([, field]) => field.fault).map(([what, field]) => `${what}: ${field.fault}.`).join(" ");
+    fault.classList.toggle("bad", [value, deviation].some((field) => field.fault && !field.empty));
     this.trouble();
+  }
+
+  /** Whether what is wrong is only that fields are empty. */
+  get calm() {
+    return namesOf(this.state).every((name) => !this.rows[name].fault.classList.contains("bad"));
+  }
+
+  /** What is wrong, in words; "" if nothing is. */
+  get faults() {
+    return namesOf(this.state).map((name) => this.rows[name].fault.textContent).filter(Boolean).join(" ");
   }
 
   /** Takes a typed text back: another way of setting the value was used. */
   settle(name) {
-    if (this.faults.has(this.rows[name].text)) this.blame(this.rows[name].text, null);
+    this.rows[name].value.clear();
   }
 
   /** Forgets all that is typed and not applied. */
   clear() {
-    for (const input of [...this.faults.keys()]) this.blame(input, null);
+    for (const { value, deviation } of Object.values(this.rows)) for (const field of [value, deviation]) field.clear();
   }
 
-  /** Shows a state; what is typed and cannot be used stays. */
+  /** Shows a state. */
   sync(state) {
     this.state = state;
     this.rigid.checked = state.rigid;
-    for (const name of NAMES) {
-      const { row, text, unit, slider, spread } = this.rows[name];
-      const [value, chosen, typed] = [state.values[name], state.units[name], this.typed[name]];
-      const { offered } = INPUTS[name];
-      const options = offered.includes(chosen) ? offered : [...offered, chosen];
-      if (unit.options.length !== options.length || unit.value !== chosen) {
-        unit.replaceChildren(...options.map((one) => new Option(unitText(one) || "–", one)));
-        unit.value = chosen;
-      }
+    const shown = namesOf(state);
+    for (const [name, { row, slider, value, deviation }] of Object.entries(this.rows)) {
       const off = name === "k" && state.rigid;
-      for (const input of [text, unit, slider, spread]) input.disabled = off || (input === unit && options.length === 1);
-      row.classList.toggle("off", off);
-      // all digits that were typed, else as many as are read easily
-      const exact = typed && typed.si === value && typed.unit === chosen;
-      const shown = exact ? String(typed.value) : show(fromSI(name, chosen, value), 7);
-      if (!this.faults.has(text)) text.value = off ? "rigid" : shown;
-      if (!this.faults.has(spread)) spread.value = state.std[name] && !off ? show(fromSI(name, chosen, state.std[name]), 5) : "";
-      slider.value = value > 0 ? Math.round(STEPS * Math.log10(value)) : slider.min;
-      slider.setAttribute("aria-valuetext", `${shown} ${unitText(chosen)}`.trim());
+      const quantity = state.given[name];
+      const size = si(name, quantity);
+      row.hidden = !shown.includes(name);
+      for (const input of [value.input, deviation.input, slider]) input.disabled = off;
+      value.show(off ? "rigid" : textOf(quantity));
+      deviation.show(state.std[name] && !off ? textOf(state.std[name]) : "");
+      slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
+      slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${textOf(quantity)}`);
+    }
+    for (const name of Object.keys(CHOICES)) {
+      for (const radio of document.getElementsByName(name)) radio.checked = radio.value === state[name];
     }
   }
 }

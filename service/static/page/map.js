@@ -1,151 +1,180 @@
 // The map of mu~ over (v~, y~): colours with their bar, isolines, the border, the user's point.
-import { Grid, colourOf } from "./grid.js";
-import { Axis, Plot, drawAxes, drawPoint, theme } from "./plot.js";
+import { Axis, Plot, axes, curve, draw, inside, label, line, point } from "./plots.js";
 
 const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
 // label -> where along v~ it stands, so that labels keep clear of each other and of the border
 const LABELS = new Map([[0.01, 0.45], [0.1, 0.55], [0.3, 0.66], [0.5, 0.75], [0.7, 0.83], [0.9, 0.9], [0.99, 0.94]]);
 /** How the border by each of the paper's formulas is drawn: colours that are seen on the map and on the card. */
-export const FORMULAS = { eq_23: ["#e07000", [6, 3]], eq_24: ["#e5246f", [3, 3]], eq_26: ["#b84dff", [8, 3, 2, 3]], eq_27: ["#e53935", []] };
+export const FORMULAS = {
+  eq_23: ["#e07000", "6 3"], eq_24: ["#e5246f", "3 3"], eq_26: ["#b84dff", "8 3 2 3"], eq_27: ["#e53935", ""],
+};
 const BAR = 66; // room on the right for the colour bar and its numbers
+const FINE = 4; // painted cells per cell of the grid, along each side
+const VIRIDIS = ["440154", "482878", "3e4989", "31688e", "26828e", "1f9e89", "35b779", "6ece58", "b5de2b", "fde725"];
+
+/** [red, green, blue] of a share from 0 to 1. */
+function colourOf(share) {
+  const x = Math.min(Math.max(share, 0), 1) * (VIRIDIS.length - 1);
+  const i = Math.min(Math.floor(x), VIRIDIS.length - 2);
+  return [0, 2, 4].map((at) => {
+    const [low, high] = [i, i + 1].map((shade) => parseInt(VIRIDIS[shade].slice(at, at + 2), 16));
+    return Math.round(low + (x - i) * (high - low));
+  });
+}
 
 /** Where to mark a case: { place: [v~, y~], out: [-1 | 0 | 1, ...] }; null where nothing moves at all. */
-export function placed(x, y, v, a, slope) {
-  if (v === Infinity && a === Infinity) {
-    // rigid contact: the end of the line v~ / y~ = v0 / (y0 omega), where it leaves the frame
-    if (Number.isNaN(slope)) return null;
-    const top = slope * y.high;
-    return top <= x.high ? { place: [x.clamp(top), y.high], out: [x.side(top) || 1, 1] } : { place: [x.high, y.clamp(x.high / slope)], out: [1, y.side(x.high / slope) || 1] };
-  }
-  return { place: [x.clamp(v), y.clamp(a)], out: [x.side(v), y.side(a)] };
+function placed(x, y, v, a, slope) {
+  if (v !== Infinity || a !== Infinity) return { place: [x.clamp(v), y.clamp(a)], out: [x.side(v), y.side(a)] };
+  // rigid contact: the end of the line v~ / y~ = v0 / (y0 omega), where it leaves the frame
+  if (Number.isNaN(slope)) return null;
+  const top = slope * y.high;
+  if (top <= x.high) return { place: [x.clamp(top), y.high], out: [x.side(top) || 1, 1] };
+  return { place: [x.high, y.clamp(x.high / slope)], out: [1, y.side(x.high / slope) || 1] };
 }
 
 export class FrictionMap {
-  /** `pick(vTilde, yTilde)` when the user moves the point, `hover(vTilde, yTilde, ratio)` or `hover(null)`. */
-  constructor(canvas, pick, hover) {
-    Object.assign(this, { grid: null, point: null, formulas: false });
-    this.plot = new Plot(canvas, (...place) => this.draw(...place));
-    const at = (x, y) => [this.x.clamp(this.x.value(x)), this.y.clamp(this.y.value(y))];
+  /** `pick(vTilde, yTilde)` when the user moves the point, `hover(vTilde, yTilde)` or `hover(null)`. */
+  constructor(svg, pick, hover) {
+    Object.assign(this, { data: null, point: null, formulas: false });
+    this.plot = new Plot(svg, (...size) => this.paint(...size));
     this.plot.follow({
       move: (x, y) => {
         if (!this.x) return;
-        const inside = x >= this.x.from && x <= this.x.to && y >= this.y.to && y <= this.y.from;
-        if (inside) hover(...at(x, y), this.grid.ratio(...at(x, y)));
-        else hover(null);
+        const within = x >= this.x.from && x <= this.x.to && y >= this.y.to && y <= this.y.from;
+        hover(within ? this.x.value(x) : null, this.y.value(y));
       },
-      pick: (x, y) => this.x && pick(...at(x, y)),
+      pick: (x, y) => this.x && pick(this.x.value(x), this.y.value(y)),
       leave: () => hover(null),
     });
   }
 
+  /** Takes map.json. */
   show(data) {
-    Object.assign(this, { grid: new Grid(data), border: data.border, borders: data.borders, image: null, lines: null });
+    Object.assign(this, { data, columns: data.v_tilde.n - 1, rows: data.y_tilde.n - 1 });
+    this.image = this.colours();
+    this.isolines = LEVELS.map((level) => [level, this.isoline(level)]);
     this.plot.redraw();
   }
 
-  /** Draws the paper's formulas for the border, or does not. */
-  compare(formulas) {
-    if (formulas === this.formulas) return;
-    this.formulas = formulas;
+  /** Changes what is drawn: `point` = [v~, y~, slope] or null; `formulas`: those of the paper for the border. */
+  set(changed) {
+    Object.assign(this, changed);
     this.plot.redraw();
   }
 
-  /** Marks v~, y~; where both are infinite, the end of the line v~ / y~ = slope. */
-  move(v, y, slope) {
-    this.point = [v, y, slope];
-    this.plot.redraw();
+  axis(name, from, to) {
+    const { start, stop } = this.data[name];
+    return new Axis(start, stop, true, from, to);
   }
 
   /** [-1 | 0 | 1, ...]: on which sides of the map v~ and y~ are, 0 inside. */
   outside(v, y) {
-    if (!this.grid) return [0, 0];
-    return [[this.grid.v_tilde, v], [this.grid.y_tilde, y]].map(([{ start, stop }, value]) => new Axis(start, stop, true, 0, 1).side(value));
+    return this.data ? [this.axis("v_tilde", 0, 1).side(v), this.axis("y_tilde", 0, 1).side(y)] : [0, 0];
   }
 
-  draw(context, width, height) {
-    if (!this.grid) return;
-    const { v_tilde: a, y_tilde: b } = this.grid;
-    const { x, y } = Object.assign(this, { x: new Axis(a.start, a.stop, true, 58, width - BAR), y: new Axis(b.start, b.stop, true, height - 46, 10) });
-    this.image ??= this.grid.paint();
-    this.lines ??= LEVELS.map((level) => [level, this.grid.isoline(level)]);
-    context.imageSmoothingEnabled = true;
-    context.drawImage(this.image, x.from, y.to, x.to - x.from, y.from - y.to);
-    drawAxes(context, x, y, "dimensionless speed ṽ", "dimensionless amplitude ỹ", false);
-    this.drawBar(context, width);
-    const px = (i) => x.from + (i / (a.n - 1)) * (x.to - x.from);
-    const py = (j) => y.from + (j / (b.n - 1)) * (y.to - y.from);
-    context.save();
-    context.beginPath();
-    context.rect(x.from, y.to, x.to - x.from, y.from - y.to);
-    context.clip();
-    this.drawLines(context, px, py);
-    this.drawLabels(context, px, py);
-    const formulas = this.formulas ? Object.entries(FORMULAS).map(([name, [style, dash]]) => [this.borders[name], style, 2, dash]) : [];
-    for (const [line, style, lineWidth, dash] of [[this.border, "rgb(0 0 0 / 60%)", 4, []], ...formulas, [this.border, "#ffffff", 2, [9, 6]]]) {
-      Object.assign(context, { strokeStyle: style, lineWidth });
-      context.setLineDash(dash);
-      context.beginPath();
-      line.forEach(([v, amplitude], i) => context[i ? "lineTo" : "moveTo"](x.pixel(v), y.pixel(amplitude)));
-      context.stroke();
-    }
-    context.setLineDash([]);
-    context.restore();
-    context.font = "600 13px system-ui, sans-serif";
-    this.tag(context, "stick–slip", x.from + 0.16 * (x.to - x.from), y.pixel(0.3));
-    this.tag(context, "continuous", x.from + 0.78 * (x.to - x.from), y.pixel(0.06));
-    const found = this.point && placed(x, y, ...this.point);
-    if (found) drawPoint(context, x.pixel(found.place[0]), y.pixel(found.place[1]), found.out);
+  node(i, j) {
+    return this.data.mu_ratio[j * (this.columns + 1) + i] * this.data.unit;
   }
 
-  drawLines(context, px, py) {
-    context.lineWidth = 1;
-    for (const [level, segments] of this.lines) {
-      context.strokeStyle = level > 0.75 ? "rgb(0 0 0 / 45%)" : "rgb(255 255 255 / 55%)";
-      context.beginPath();
-      for (const [x1, y1, x2, y2] of segments) {
-        context.moveTo(px(x1), py(y1));
-        context.lineTo(px(x2), py(y2));
+  /** mu~ at a place in cells. */
+  ratio(x, y) {
+    const i = Math.min(Math.max(Math.floor(x), 0), this.columns - 1);
+    const j = Math.min(Math.max(Math.floor(y), 0), this.rows - 1);
+    const [s, t] = [x - i, y - j];
+    const along = (row) => (1 - s) * this.node(i, row) + s * this.node(i + 1, row);
+    return (1 - t) * along(j) + t * along(j + 1);
+  }
+
+  colours() {
+    const [width, height] = [FINE * this.columns, FINE * this.rows];
+    const canvas = Object.assign(document.createElement("canvas"), { width, height });
+    const image = new ImageData(width, height);
+    for (let row = 0; row < height; row += 1) {
+      for (let column = 0; column < width; column += 1) {
+        const rgb = colourOf(this.ratio((column + 0.5) / FINE, (height - row - 0.5) / FINE));
+        image.data.set([...rgb, 255], 4 * (row * width + column));
       }
-      context.stroke();
     }
+    canvas.getContext("2d").putImageData(image, 0, 0);
+    return canvas.toDataURL();
   }
 
-  drawLabels(context, px, py) {
-    context.font = "11px system-ui, sans-serif";
-    for (const [level, segments] of this.lines) {
-      if (!LABELS.has(level) || !segments.length) continue;
-      const target = LABELS.get(level) * this.grid.v_tilde.n;
-      const [x1, y1] = segments.reduce((best, segment) => (Math.abs(segment[0] - target) < Math.abs(best[0] - target) ? segment : best));
-      if (py(y1) > this.y.to + 12 && py(y1) < this.y.from - 12) this.tag(context, String(level), px(x1), py(y1));
+  /** Segments [x1, y1, x2, y2] in cells where mu~ = level: marching squares, saddles by the mean. */
+  isoline(level) {
+    const found = [];
+    for (let j = 0; j < this.rows; j += 1) {
+      for (let i = 0; i < this.columns; i += 1) {
+        const places = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+        const corners = places.map((place) => this.node(...place) - level);
+        const cuts = [];
+        for (let e = 0; e < 4; e += 1) {
+          const [a, b] = [corners[e], corners[(e + 1) % 4]];
+          if (a >= 0 === b >= 0) continue;
+          const [p, q] = [places[e], places[(e + 1) % 4]];
+          cuts.push([0, 1].map((k) => p[k] + (a / (a - b)) * (q[k] - p[k])));
+        }
+        for (let c = 0; c + 1 < cuts.length; c += 2) found.push([...cuts[c], ...cuts[c + 1]]);
+      }
     }
+    return found;
+  }
+
+  paint(width, height) {
+    if (!this.data) return [];
+    const [x, y] = [this.axis("v_tilde", 58, width - BAR), this.axis("y_tilde", height - 46, 10)];
+    Object.assign(this, { x, y });
+    const border = (points, attributes) =>
+      curve(points.map(([v]) => x.pixel(v)), points.map(([, a]) => y.pixel(a)), attributes);
+    const formulas = (this.formulas ? Object.entries(FORMULAS) : []).map(([name, [stroke, dash]]) =>
+      border(this.data.borders[name], { class: name, stroke, "stroke-width": 2, "stroke-dasharray": dash }));
+    const found = this.point && placed(x, y, ...this.point);
+    const box = { x: x.from, y: y.to, width: x.to - x.from, height: y.from - y.to };
+    return [
+      draw("image", { ...box, href: this.image, preserveAspectRatio: "none" }),
+      axes(x, y, "dimensionless speed ṽ", "dimensionless amplitude ỹ", false),
+      this.bar(width),
+      inside(x, y,
+        this.lines(x, y),
+        border(this.data.border, { class: "border shade" }),
+        formulas,
+        border(this.data.border, { class: "border" }),
+        label("stick–slip", x.from + 0.16 * box.width, y.pixel(0.3), "tag strong"),
+        label("continuous", x.from + 0.78 * box.width, y.pixel(0.06), "tag strong")),
+      found ? point(x.pixel(found.place[0]), y.pixel(found.place[1]), found.out) : null,
+    ];
+  }
+
+  lines(x, y) {
+    const px = (i) => x.from + (i / this.columns) * (x.to - x.from);
+    const py = (j) => y.from + (j / this.rows) * (y.to - y.from);
+    const labels = []; // that are drawn: [x, y]
+    return this.isolines.flatMap(([level, segments]) => {
+      const place = (i, j) => `${px(i).toFixed(1)} ${py(j).toFixed(1)}`;
+      const pieces = segments.map(([x1, y1, x2, y2]) => `M${place(x1, y1)}L${place(x2, y2)}`);
+      const drawn = [draw("path", { d: pieces.join(""), class: level > 0.75 ? "isoline dark" : "isoline" })];
+      if (!LABELS.has(level) || !segments.length) return drawn;
+      const target = LABELS.get(level) * this.columns;
+      const away = ([at]) => Math.abs(at - target);
+      const [at, up] = segments.reduce((best, segment) => (away(segment) < away(best) ? segment : best));
+      if (labels.some(([left, top]) => Math.hypot(left - px(at), top - py(up)) < 24)) return drawn;
+      labels.push([px(at), py(up)]);
+      return [...drawn, label(String(level), px(at), py(up) + 4, "tag")];
+    });
   }
 
   /** The colours from 0 to 1, right of the map. */
-  drawBar(context, width) {
-    const { from, to } = this.y;
-    const [left, thick] = [width - BAR + 14, 14];
-    const shades = context.createLinearGradient(0, from, 0, to);
-    for (let i = 0; i <= 18; i += 1) shades.addColorStop(i / 18, `rgb(${colourOf(i / 18).join(" ")})`);
-    context.fillStyle = shades;
-    context.fillRect(left, to, thick, from - to);
-    const colour = theme();
-    Object.assign(context, { fillStyle: colour("soft"), strokeStyle: colour("soft"), font: "12px system-ui, sans-serif", textAlign: "left", textBaseline: "middle", lineWidth: 1 });
-    for (let i = 0; i <= 5; i += 1) {
-      const y = Math.round(from + (i / 5) * (to - from)) + 0.5;
-      context.beginPath();
-      context.moveTo(left + thick, y);
-      context.lineTo(left + thick + 4, y);
-      context.stroke();
-      context.fillText(String(i / 5), left + thick + 7, y);
-    }
-    Object.assign(context, { fillStyle: colour("text"), textAlign: "center", textBaseline: "bottom" });
-    context.fillText("µ/µ₀", left + thick / 2 + 4, from + 40);
-  }
-
-  tag(context, text, x, y) {
-    Object.assign(context, { textAlign: "center", textBaseline: "middle", lineJoin: "round", lineWidth: 4, strokeStyle: "rgb(0 0 0 / 55%)" });
-    context.strokeText(text, x, y);
-    context.fillStyle = "#ffffff";
-    context.fillText(text, x, y);
+  bar(width) {
+    const { y: { from, to } } = this;
+    const left = width - BAR + 14;
+    const step = (from - to) / 50;
+    const shades = Array.from({ length: 50 }, (_, i) => {
+      const fill = `rgb(${colourOf((i + 0.5) / 50).join(" ")})`;
+      return draw("rect", { x: left, y: from - (i + 1) * step, width: 14, height: step + 0.5, fill });
+    });
+    const ticks = [0, 0.2, 0.4, 0.6, 0.8, 1].flatMap((share) => {
+      const at = from + share * (to - from);
+      return [line(left + 14, at, left + 18, at, "grid"), label(String(share), left + 21, at + 4, "tick", "start")];
+    });
+    return [...shades, ...ticks, label("µ/µ₀", left + 11, from + 38)];
   }
 }

@@ -1,6 +1,5 @@
 // Questions to the service.  A page without one has another file in the place of this: ../alone/service.js.
-import { KeyWanted, Refused, Unanswered } from "./failures.js";
-import { withKey } from "./key.js";
+import { KeyWanted, Refused, Unanswered, withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
 
@@ -19,10 +18,9 @@ async function ask(path, options) {
   if (response.status >= 500 || response.status === 408 || response.status === 429) {
     throw new Unanswered(`The service cannot answer now: ${why}.`, Number(response.headers.get("Retry-After")) || null);
   }
-  throw new Refused(`The service refuses this: ${why}.`, body.errors ?? []);
+  throw new Refused(`The service refuses this: ${why}.`);
 }
 
-const query = (values) => new URLSearchParams(Object.entries(values).filter(([, value]) => value !== undefined));
-export const get = (path, values) => ask(values ? `${path}?${query(values)}` : path, withKey());
+export const get = (path) => ask(path, withKey());
 export const post = (path, body) =>
   ask(path, { method: "POST", ...withKey({ "Content-Type": "application/json" }), body: JSON.stringify(body) });

@@ -1,7 +1,6 @@
 // The description is fetched here and not by the interface, so that a service with an API key can be asked for it.
-import { KeyWanted, Channel, get } from "../page/api.js";
-import { withKey } from "../page/key.js";
-import { keyTaken, onKey, wantKey } from "../page/keyform.js";
+import { KeyWanted, Channel, keyTaken, onKey, wantKey, withKey } from "../page/ask.js";
+import { get } from "../page/service.js";
 
 const $ = (id) => document.getElementById(id);
 

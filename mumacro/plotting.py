@@ -1,0 +1,137 @@
+"""Pictures of a law, of the map of mu~ and of answers, by matplotlib, which is loaded at the first of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mumacro.charts import REGIMES
+from mumacro.errors import InputError, MumacroError
+from mumacro.extras import missing
+from mumacro.inputs import SI
+
+if TYPE_CHECKING:
+    from mumacro.answer import Answer
+    from mumacro.law import Law
+    from mumacro.surrogate import Surrogate
+
+__all__ = ["ENDINGS", "plot_answer", "plot_law", "plot_map", "save"]
+
+ENDINGS = (".png", ".svg", ".pdf")
+V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
+_SYMBOLS = {"mu0": r"$\mu_0$", "Fz": "$F_z$", "k": "$k$", "y0": "$y_0$", "omega": r"$\omega$", "v0": "$v_0$"}
+
+
+def _loaded(name: str) -> Any:
+    import importlib
+
+    try:
+        return importlib.import_module(f"matplotlib.{name}")
+    except ModuleNotFoundError as error:
+        raise MumacroError(missing("plot", error)) from None
+
+
+def _own(axes: Any) -> Any:
+    return _loaded("pyplot").subplots(layout="constrained")[1] if axes is None else axes
+
+
+def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
+    """Write a picture; ``draw`` gets its axes.
+
+    Raises
+    ------
+    InputError
+        The name does not end in one of :data:`ENDINGS`.
+    MumacroError
+        matplotlib is not installed.
+    """
+    path = Path(path)
+    if path.suffix not in ENDINGS:
+        raise InputError("file name", str(path), f"a name that ends in {', '.join(ENDINGS)}")
+    figure = _loaded("figure").Figure(figsize=(7.0, 4.5), layout="constrained")
+    draw(figure.subplots())
+    figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+
+
+def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None) -> Any:
+    """mu_macro along one input, with the static limit, the border of continuous sliding, and roots of a target.
+
+    Parameters
+    ----------
+    law : Law
+        What :func:`mumacro.law.friction_law` returns.
+    axes : matplotlib Axes, optional
+        Where to draw; new ones if left out.
+    roots, target : optional
+        Values of the input [SI] to mark, and the mu_macro [-] that they give.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    MumacroError
+        matplotlib is not installed; names the extra.
+    """
+    axes, x = _own(axes), law.values
+    axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")
+    axes.plot(x, law.mu_static, ":", color="grey", label="static limit")
+    for i, crossing in enumerate(law.border):
+        axes.axvline(crossing.value, ls="--", lw=1.0, color="grey", label=None if i else "border of continuous sliding")
+    if target is not None:
+        axes.axhline(target, lw=0.8, color="tab:red", label=f"target {target:.6g}")
+        axes.plot([*roots], [target] * len([*roots]), "o", color="tab:red")
+    if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
+        axes.set_xscale("log")
+    axes.set(xlabel=f"{_SYMBOLS[law.along]} [{SI[law.along][0]}]", ylabel=r"$\mu_\mathrm{macro}$ [-]")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+    return axes
+
+
+def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, float] | None = None) -> Any:
+    """mu~ over the dimensionless speed and amplitude, with the border of continuous sliding and a ``point`` (v~, y~).
+
+    Returns the matplotlib Axes; raises MumacroError where matplotlib is not installed.
+    """
+    axes = _own(axes)
+    v, y = np.geomspace(*V_RANGE, 281), np.geomspace(*Y_RANGE, 201)
+    found = axes.contourf(v, y, surrogate.mu_ratio(v, y[:, None]), np.linspace(0.0, 1.0, 21), cmap="viridis")
+    axes.figure.colorbar(found, ax=axes, label=r"$\mu_\mathrm{macro} / \mu_0$ [-]")
+    _plane(axes, surrogate.v_tilde_crit(y), y)
+    if point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
+        axes.plot(*point, "o", color="tab:red", markeredgecolor="white")
+    axes.set(xlim=V_RANGE, ylim=Y_RANGE)
+    return axes
+
+
+def plot_answer(answer: Answer[Any], axes: Any = None) -> Any:
+    """The cases of an answer over (v~, y~), one colour a regime; of arrays the groups must have been requested.
+
+    Returns the matplotlib Axes; raises MumacroError where matplotlib is not installed.
+    """
+    from mumacro.closed_forms import border_blend  # an answer has no table
+
+    axes = _own(axes)
+    v, y, codes = (np.ravel(np.asarray(x)) for x in (answer.v_tilde, answer.y_tilde, answer.regime_code))
+    for code, name in enumerate(REGIMES):
+        shown = (codes == code) & (v > 0.0) & (y > 0.0) & np.isfinite(v) & np.isfinite(y)
+        if shown.any():
+            axes.plot(v[shown], y[shown], "o", ms=4.0, label=name)
+    inside = y[(y > 0.0) & np.isfinite(y)]
+    ends = (0.5 * float(inside.min()), 2.0 * float(inside.max())) if inside.size else Y_RANGE
+    heights = np.geomspace(*ends, 201)
+    _plane(axes, border_blend(heights), heights)
+    return axes
+
+
+def _plane(axes: Any, v_crit: Any, y: Any) -> None:
+    axes.plot(v_crit, y, "--", color="tab:grey", label="border of continuous sliding")
+    axes.set(xscale="log", yscale="log", xlabel=r"$\tilde v = v_0 k / (\mu_0 F_z \omega)$")
+    axes.set_ylabel(r"$\tilde y = y_0 k / (\mu_0 F_z)$")
+    axes.legend()

@@ -1,0 +1,126 @@
+// The page's reading of texts, its numbers, its address and its questions: node --test, started by test_page.py.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import {
+  about, caseOf, friction, fromAddress, inUnit, question, readCurves, readDeviation, readValue, setNames, show, si,
+  startState, textOf, toAddress, watts,
+} from "../../service/static/page/inputs.js";
+
+const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
+const ALL = [...told.knows, "contact", "direction", "k_range"];
+setNames({ ...told, knows: ALL });
+
+const near = (value, expected) => assert.ok(Math.abs(value - expected) <= 1e-15 * Math.abs(expected), `${value}, not ${expected}`);
+
+const READ = [ // input, unit of its field, text: SI value, or part of the reason
+  ["y0", "µm", "5 mm", 5e-3], ["y0", "µm", "2um", 2e-6], ["y0", "µm", "2 μm", 2e-6], ["y0", "µm", "2", 2e-6],
+  ["y0", "m", "2e-6", 2e-6], ["y0", "µm", ".5", 0.5e-6], ["Fz", "N", "10N", 10], ["Fz", "kN", "3 [N]", 3],
+  ["k", "N/m", "1 N/um", 1e6], ["k", "N/µm", "300 N/mm", 3e5], ["omega", "kHz", "20", 2 * Math.PI * 20e3],
+  ["omega", "Hz", "20kHz", 2 * Math.PI * 20e3], ["omega", "kHz", "130 krad/s", 1.3e5],
+  ["omega", "kHz", "6000 rpm", 2 * Math.PI * 100], ["mu0", "-", "30 %", 0.3], ["v0", "mm/s", "0", 0],
+  ["v0", "mm/s", "−0", 0], ["Fz", "N", "1.5E3", 1500],
+  ["y0", "µm", "2,9", "the decimal sign is a point, 2.9"], ["Fz", "N", "1 500", "“500” is not a unit of Fz"],
+  ["Fz", "N", "1,500,000", "is not a number"], ["Fz", "N", "1.2.3", "is not a number"], ["Fz", "N", "", "give a number"],
+  ["Fz", "N", "abc", "is not a number"], ["Fz", "N", "1e", "“e” is not a unit of Fz: give N, mN, kN"],
+  ["Fz", "N", "5 mm", "“mm” is not a unit of Fz"], ["Fz", "N", "3 n", "did you mean N?"],
+  ["omega", "Hz", "20khz", "did you mean kHz?"], ["Fz", "N", "1e999", "too large"], ["Fz", "N", "1e-999", "too small"],
+  ["Fz", "N", "1e-324 mN", "too small"], ["Fz", "N", "-1", "must be finite and > 0"], ["Fz", "N", "0", "must be finite and > 0"],
+  ["v0", "mm/s", "-1", "must be finite and >= 0"], ["k", "N/m", "1e308 N/µm", "must be finite"],
+  ["omega", "kHz", "5 1/s", "can be Hz or rad/s"], ["mu0", "-", "3 N", "leave it out"],
+  ["y0", "µm", "constructor", "is not a number"], ["y0", "µm", "5 constructor", "is not a unit"],
+  ["k", "N/m", "1..2 mm", "“mm” is not a unit of k"], ["k", "N/m", "2..1", "must go up"], ["k", "N/m", "1..1", "must go up"],
+  ["k", "N/m", "1..rigid", "two numbers"], ["k", "N/m", "1..2..3", "not an interval"], ["k", "N/m", "..2", "give a number"],
+  ["Fz", "N", "1..2", "is not a number"],
+];
+for (const [name, unit, text, expected] of READ) {
+  test(`${name}: “${text}”`, () => {
+    const found = readValue(name, text, unit);
+    if (typeof expected === "string") assert.match(found.fault ?? "", new RegExp(expected.replace(/[.?[\]]/g, "\\$&")));
+    else near(si(name, found), expected);
+  });
+}
+
+test("a stiffness is rigid by its word, an interval by two numbers", () => {
+  assert.deepEqual(readValue("k", " Rigid ", "N/m"), { rigid: true });
+  assert.deepEqual(readValue("k", "0.8..1.2 N/um", "N/m"), { low: 0.8, high: 1.2, unit: "N/µm" });
+  assert.deepEqual(readValue("k", "1..2", "kN/m"), { low: 1, high: 2, unit: "kN/m" });
+  const mixed = readValue("k", "800 N/mm .. 1.2 N/um", "N/m");
+  near(mixed.low, 0.8);
+  setNames(told);
+  assert.match(readValue("k", "1..2", "kN/m").fault, about.knows.has("k_range") ? /./ : /knows no interval/);
+  setNames({ ...told, knows: ALL });
+});
+
+test("deviations: an empty field means none, per cent stay per cent", () => {
+  assert.equal(readDeviation("y0", " ", "µm"), null);
+  assert.deepEqual(readDeviation("y0", "5 %", "µm"), { value: 5, unit: "%" });
+  assert.deepEqual(readDeviation("y0", "±0.1", "µm"), { value: 0.1, unit: "µm" });
+  assert.deepEqual(readDeviation("Fz", "0", "N"), { value: 0, unit: "N" });
+  for (const text of ["-1", "-1 %", "x", "1 N"]) assert.ok(readDeviation("y0", text, "µm").fault, text);
+});
+
+test("curves have a unit each, or none", () => {
+  assert.deepEqual(readCurves("y0", "1; 2", "µm").map((one) => textOf(one)), ["1 µm", "2 µm"]);
+  assert.deepEqual(readCurves("y0", "500 nm; 0.0025 mm", "µm").map((one) => textOf(one)), ["500 nm", "0.0025 mm"]);
+  for (const text of ["1; 2 mm", "", "1; x", "1;".repeat(21)]) assert.ok(readCurves("y0", text, "µm").fault, text);
+  assert.ok(readCurves("k", "1; rigid", "N/m").fault);
+});
+
+test("numbers are short, and as exact as they are known", () => {
+  for (const [value, digits, text] of [
+    [0.24, 6, "0.24"], [1e-5, 3, "1e-5"], [123456789, 4, "1.235e8"], [0, 6, "0"], [Infinity, 3, "∞"], [null, 3, "–"],
+  ]) assert.equal(show(value, digits), text);
+  assert.equal(friction(0.2405049), "0.2405");
+  assert.equal(friction(0.2400049, 0.0146), "0.240");
+  assert.equal(friction(0.2405049, 0.3), "0.24");
+  assert.equal(friction(0.24, 2.4e-11, 15), "0.240000000000");
+  assert.equal(friction(0, 1e-12), "0");
+  assert.equal(inUnit("v0", 0.2), "200 mm/s");
+  assert.equal(watts(0.0134), "13.4 mW");
+  assert.equal(watts(0), "0 W");
+});
+
+test("an address in the words of the command line gives the same state back", () => {
+  assert.equal(toAddress(startState()), "#mu0=0.3&Fz=10N&k=1N/um&y0=2um&f=20kHz&v0=10mm/s");
+  for (const address of [
+    "#mu0=0.3&Fz=10N&k=0.8..1.2N/um&y0=1e-7m&omega=130000rad/s&v0=1e-310m/s&mu0.std=5%25&Fz.std=0.5N&contact=ball&digits=all&along=y0&scale=linear&approximations=true&range=1..2000nm&family=v0&curves=1mm/s;2mm/s",
+    "#mu0=0.3&Fz=10N&k=rigid&Fz_amplitude=5N&f=20kHz&v0=10mm/s&direction=normal",
+  ]) {
+    const { state, faults } = fromAddress(address);
+    assert.deepEqual(faults, []);
+    assert.equal(toAddress(state), address);
+  }
+  const { state } = fromAddress("#y0=1e-6&Fz=5&f=1000");
+  assert.deepEqual([state.given.y0, state.given.Fz, state.given.omega].map((one) => textOf(one)), ["0.000001 m", "5 N", "1000 Hz"]);
+});
+
+for (const [address, said] of [
+  ["mu0=-1", "mu0 = -1 (must be finite and > 0)"], ["k=", "k = nothing (give a number)"],
+  ["v0=5 mm", "v0 = 5 mm (“mm” is not a unit of v₀"], ["along=constructor", "along = constructor (must be one of"],
+  ["scale=<script>", "scale = <script> (must be one of log, linear)"], ["omega=1&f=1", "f = 1 (omega is given, too)"],
+  ["family=y0&curves=1;x", "curves = 1;x"], ["std_mu0=1&range=z", "range = z (“z” is not an interval: write low..high); std_mu0 = 1 (unknown)"],
+  ["along=k&range=1..rigid", "range = 1..rigid (must be an interval of two numbers)"], ["direction=normal&y0=1um", "y0 = 1um (unknown)"],
+  ["contact=box", "contact = box (must be one of spring, ball)"],
+]) {
+  test(`a link with ${address} is reported`, () => {
+    const { state, faults } = fromAddress(`#${encodeURIComponent(address).replace(/%(3D|26)/g, decodeURIComponent)}`);
+    assert.ok(faults.join("; ").includes(said), faults.join("; "));
+    assert.ok(Number.isFinite(caseOf(state).mu0));
+  });
+}
+
+test("the question says what was chosen, and nothing else", () => {
+  const plain = question(startState());
+  assert.deepEqual(Object.keys(plain), ["mu0", "Fz", "k", "y0", "omega", "v0", "include"]);
+  const { state } = fromAddress("#k=0.8..1.2N/um&k.std=1&y0.std=5%25&contact=ball&direction=along");
+  const asked = question(state);
+  assert.deepEqual([asked.contact, asked.direction, "k" in asked], ["ball", "along", false]);
+  asked.k_range.forEach((value, i) => near(value, [8e5, 1.2e6][i]));
+  near(asked.std.y0, 1e-7);
+  assert.deepEqual(Object.keys(asked.std), ["y0"]);
+  assert.ok(asked.include.includes("std"));
+  near(caseOf(state).k, Math.sqrt(8e5) * Math.sqrt(1.2e6));
+  const normal = question(fromAddress("#direction=normal&k=rigid").state);
+  assert.deepEqual([normal.Fz_amplitude, normal.k, "y0" in normal], [5, "rigid", false]);
+});
