@@ -724,7 +724,11 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
 
 
 def _picked(cases: Any, columns: Sequence[str]) -> dict[str, Any]:
-    """The inputs among the columns of a mapping, a data frame, an Arrow table or a Dataset."""
+    """The inputs among the columns of a mapping, a data frame, an Arrow table or stream, or a Dataset."""
+    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a query of DuckDB
+        import pyarrow as pa  # its columns come from one reading: a second one may have another order
+
+        cases = pa.table(cases)
     try:
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
         there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns

@@ -39,7 +39,8 @@ def folder(repository, table, compilers, tmp_path_factory):
 
 
 def numbers(text):
-    return np.array([[float(word) for word in line.split()] for line in text.strip().splitlines()])
+    rows = [[float(word) for word in line.split()] for line in text.strip().splitlines()]
+    return np.array(rows, dtype=object if len({len(row) for row in rows}) > 1 else float)
 
 
 def test_fortran_has_the_same_answers(compilers, folder, table):
@@ -110,6 +111,45 @@ def test_abaqus_gets_the_coefficient_and_its_derivatives(compilers, folder, tabl
     assert np.all(np.isfinite(corner))
 
 
+def test_abaqus_gets_the_shear_stress_its_derivatives_and_the_force_of_nodes(compilers, folder, table):
+    for name in ("aba_param.inc", "vaba_param.inc"):
+        (folder / name).write_text("      implicit real*8(a-h,o-z)\n", "ascii")
+    sources = ("mumacro.f90", "fric.f", "vfric.f", "fric_driver.f90", *OBJECTS)
+    options = ("-Wall", "-Wno-unused-dummy-argument", "-Wno-unused-parameter", "-Werror", "-o", "fric", "-lm")
+    compilers.run(*compilers.compiler("gfortran"), "-ffixed-line-length-none", *sources, *options, cwd=folder)
+    case = {"mu0": 0.3, "Fz": 1e5, "k": 1e10, "y0": 2e-6, "omega": 1.3e5}
+
+    def call(*line):
+        return numbers(compilers.run(folder / "fric", given="{} {} {} {}\n".format(*line)))
+
+    def stress(*line):
+        return call(*line)[0][:2]
+
+    dt, gamma, step = 1e-3, np.array([3e-5, -4e-5]), 1e-4  # 0.05 m/s, above v_rest; 5e-4 m/s, below
+    for scale in (1.0, 0.01):
+        p, slip = 1e5, scale * gamma
+        row = call(p, dt, *slip)[0]
+        if scale == 1.0:
+            mu = table.evaluate(**case, v0=0.05).mu_macro
+            np.testing.assert_allclose(row[:2], mu * p * np.array([0.6, -0.8]), rtol=1e-14)
+        assert row[8] == close(row[:2] @ slip, rel=1e-14)
+        assert row[9] == 0.0
+        by_slip = [
+            (stress(p, dt, *(slip + move)) - stress(p, dt, *(slip - move))) / (2.0 * step * 5e-5 * scale)
+            for move in step * 5e-5 * scale * np.eye(2)
+        ]
+        np.testing.assert_allclose(row[2:6].reshape(2, 2), by_slip, rtol=1e-6, atol=1e-6 * abs(row[2]))
+        by_load = (stress(p * (1 + step), dt, *slip) - stress(p * (1 - step), dt, *slip)) / (2.0 * step * p)
+        np.testing.assert_allclose(row[6:8], by_load, rtol=1e-5)
+    assert np.all(stress(0.0, dt, *gamma) == 0.0)
+    at_rest, nodes = map(np.array, call(1e5, dt, 0.0, 0.0))
+    assert np.all(at_rest[:2] == 0.0)
+    assert at_rest[2] > 0.0
+    assert at_rest[2:6] == close([at_rest[2], 0.0, 0.0, at_rest[2]], rel=1e-14)
+    free = table.evaluate(**{**case, "Fz": 10.0, "k": 1e10 * 2e-4}, v0=0.01).mu_macro * 10.0
+    assert nodes == close([-free, 0.0, -0.01, 0.0, 0.0, 0.0], rel=1e-14)
+
+
 def test_modelicas_gradient_is_the_gradient(compilers, folder, table):
     program = (
         '#include <stdio.h>\n#include "mumacro_modelica.h"\nint main(void) { double g[6];\n'
@@ -139,7 +179,7 @@ def test_the_files_compile_to_one_library(compilers, folder):
     table = compilers.run(*compilers.compiler("nm"), "-D", "--defined-only", "libm.so", cwd=folder)
     public = {line.split()[-1] for line in table.splitlines()}
     declared = re.findall(r"MUMACRO_API .*?(mumacro_\w+)\(", (folder / "mumacro.h").read_text("ascii"))
-    assert len(declared) == 18
+    assert len(declared) == 19
     assert public == {*declared, "mumacro_table"}
 
 

@@ -340,10 +340,26 @@ def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> Non
     assert np.isnan(table.evaluate(**{**CASE, "k": gap}).mu_macro).tolist() == [True, False]
 
 
-def test_what_has_no_columns_by_name_is_refused_with_its_type_and_a_remedy(table: Surrogate) -> None:
+def test_a_stream_of_arrow_is_read_once(table: Surrogate) -> None:
     pa = pytest.importorskip("pyarrow")
-    reader = pa.RecordBatchReader.from_batches(pa.schema([]), [])
-    for cases, kind in ((reader, "pyarrow.lib.RecordBatchReader"), ([1.0], "builtins.list"), ("cases", "builtins.str")):
+    rows = pa.table({**{name: [value] * 3 for name, value in CASE.items()}, "v0": [0.01, 0.02, None]})
+    found = table.evaluate(rows.to_reader(max_chunksize=2)).mu_macro
+    np.testing.assert_array_equal(found, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro)
+
+
+def test_a_query_of_duckdb_gives_arrays(table: Surrogate) -> None:
+    duckdb = pytest.importorskip("duckdb")
+    pytest.importorskip("pyarrow")
+    query = duckdb.sql(
+        "select 0.3::double mu0, 10::double Fz, 1e6::double k, 2e-6::double y0, 1.3e5::double omega, i / 1000.0 v0 "
+        "from range(5000) t(i) order by (i * 7919) % 5000"
+    )
+    v0 = query.fetchnumpy()["v0"]
+    np.testing.assert_array_equal(table.evaluate(query).mu_macro, table.evaluate({**CASE, "v0": v0}).mu_macro)
+
+
+def test_what_has_no_columns_by_name_is_refused_with_its_type_and_a_remedy(table: Surrogate) -> None:
+    for cases, kind in (([1.0], "builtins.list"), ("cases", "builtins.str")):
         with pytest.raises(InputError, match=r"Arrow table.*\{name: array\}.*read_all\(\)") as caught:
             table.evaluate(cases)
         assert kind in str(caught.value)

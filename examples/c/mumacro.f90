@@ -5,7 +5,7 @@ module mumacro
   implicit none
   private
   public :: mumacro_answer, mumacro_cycle, mumacro_evaluate, mumacro_evaluate_cycle, mumacro_mu_macro
-  public :: mumacro_mu_ratio, mumacro_v_tilde_crit, mumacro_power, mumacro_stick_fraction
+  public :: mumacro_mu_ratio, mumacro_v_tilde_crit, mumacro_power, mumacro_stick_fraction, mumacro_force
 
   !> Answer to a case; the gradient is in the order mu0, Fz, k, y0, omega, v0.
   type, bind(c) :: mumacro_answer
@@ -58,6 +58,13 @@ module mumacro
       real(c_double), value :: v_tilde, y_tilde
       real(c_double) :: share
     end function mumacro_stick_fraction
+
+    !> Friction force [N] for time integration at any v0 [m/s], regularised below v_rest.
+    pure function mumacro_force(v0, v_rest, mu0, Fz, k, y0, omega) result(force) bind(c)
+      import :: c_double
+      real(c_double), value :: v0, v_rest, mu0, Fz, k, y0, omega
+      real(c_double) :: force
+    end function mumacro_force
 
     pure function mumacro_v_tilde_crit(y_tilde) result(crit) bind(c)
       import :: c_double

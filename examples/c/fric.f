@@ -1,0 +1,57 @@
+c     Abaqus/Standard: the whole shear stress of a contact that is oscillated transversely, with its derivatives.
+c     Link with mumacro.f90, mumacro.c and mumacro_table.c.
+c
+c     *Friction, user, properties=5
+c     mu0 [-], k [N/m^3], y0 [m], omega [rad/s], v_rest [m/s]
+c
+c     k is the tangential stiffness per area: a pressure stands for the force.  The slip rate that the model sees must be
+c     the mean over a period of the oscillation.  Below v_rest the stress rises with the slip rate (mumacro_force): take
+c     v_rest well below the speeds that matter.  fric_coef.f gives the coefficient alone, from release 2020 on.
+      subroutine fric(lm, tau, ddtddg, ddtddp, dslip, sed, sfd, ddtddt,
+     &     pnewdt, statev, dgam, taulm, press, dpress, ddpddh, slip,
+     &     kstep, kinc, time, dtime, noel, ciname, slname, msname, npt,
+     &     node, npatch, coords, rcoord, drot, temp, predef, nfdir,
+     &     mcrd, npred, nstatv, chrlngth, props, nprops)
+      use mumacro, only: mumacro_force
+      include 'aba_param.inc'
+      character*80 ciname, slname, msname
+      dimension tau(nfdir), ddtddg(nfdir, nfdir), ddtddp(nfdir),
+     &     dslip(nfdir), ddtddt(nfdir, 2), statev(*), dgam(nfdir),
+     &     taulm(nfdir), slip(nfdir), time(2), coords(mcrd),
+     &     rcoord(mcrd), drot(2, 2), temp(2), predef(2, *),
+     &     props(nprops)
+      parameter (step = 1d-5)
+      dimension rate(nfdir), way(nfdir)
+
+      lm = 0
+      tau = 0
+      ddtddg = 0
+      ddtddp = 0
+      if (press <= 0 .or. dtime <= 0) return
+      rate = dgam/dtime
+c     at rest the stress is linear in the rate: a thousandth of v_rest stands for it
+      v = max(sqrt(sum(rate**2)), 1d-3*props(5))
+      way = rate/v
+      stress = at(v, press)
+      slope = (at(v*(1 + step), press) - at(v*(1 - step), press))/
+     &     (2*step*v)
+      tau = stress*way
+      do i = 1, nfdir
+         ddtddg(i, i) = stress/v/dtime
+         do j = 1, nfdir
+            ddtddg(i, j) = ddtddg(i, j) +
+     &           (slope - stress/v)*way(i)*way(j)/dtime
+         end do
+      end do
+      ddtddp = (at(v, press*(1 + step)) - at(v, press*(1 - step)))/
+     &     (2*step*press)*way
+      dslip = dgam
+      sfd = sum(tau*dgam)
+
+      contains
+
+      function at(speed, pressure)
+      at = mumacro_force(speed, props(5), props(1), pressure, props(2),
+     &     props(3), props(4))
+      end function at
+      end subroutine fric
