@@ -4,7 +4,7 @@
     python benchmarks/check_values.py --write    writes it
 
 Values come from tests/data/points.csv and border.csv, computed by another solver, and from closed forms in 50 digits;
-not from this project's own solver or tables.  docs/check-values.md describes the columns.
+not from this project's own solver or tables.  docs/accuracy.md describes them.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import mumacro
 __all__ = ["solver_kernel", "source_digest"]
 
 #: Compiles a function at its first call in a process; it runs without the interpreter's lock and without fused
-#: multiply-add.  Nothing is stored: see docs/decisions/0020-compiling-the-solver.md.
+#: multiply-add.  Nothing is stored: see docs/decisions.md.
 solver_kernel = numba.njit(error_model="numpy", nogil=True)
 
 _LIBRARY = Path(mumacro.__file__).resolve().parent

@@ -144,7 +144,7 @@ class Element:
 
     @property
     def state(self) -> Array:
-        """Forces of the springs [N], a copy of shape (*contacts, springs, 2); may be assigned."""
+        """Forces of the springs [N], a copy of shape ``(*contacts, springs, 2)``; may be assigned."""
         return self._forces.reshape(*self.shape, self.springs, 2).copy()
 
     @state.setter

@@ -57,7 +57,7 @@ def fit(
     Returns
     -------
     Fit
-        Values with covariance, every solution, and warnings, which are also issued by :mod:`warnings`.
+        Values with covariance, every solution, and warnings, which are also issued by ``warnings``.
 
     Raises
     ------

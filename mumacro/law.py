@@ -96,7 +96,7 @@ class Law:
     border: tuple[Crossing, ...]
 
     def plot(self, axes: Any = None) -> Any:
-        """A picture, see :func:`mumacro.plotting.plot_law`; needs matplotlib."""
+        """A picture, see ``mumacro.plotting.plot_law``; needs matplotlib."""
         from mumacro.plotting import plot_law
 
         return plot_law(self, axes)

@@ -188,7 +188,7 @@ def stiffness_of(words: Sequence[str]) -> str:
     faults = []
     for name in ("length", "along"):
         given = getattr(chosen, name)
-        if given and name not in wanted:
+        if given and {"along": "oscillation"}.get(name, name) not in wanted:
             faults.append(f"--{name}: a {chosen.geometry} has none; leave it out")
         elif name == "length" and name in wanted and not given:
             faults.append("--length is missing: the length of the cylinder [m]")
@@ -199,9 +199,9 @@ def stiffness_of(words: Sequence[str]) -> str:
     si = dict(zip(there, values, strict=True))
     bodies = [stiffness.Material(si["E"], si["nu"]), stiffness.Material(si["E2"], si["nu2"])]
     sizes = {name: si[name] for name in ("radius", "length", "Fz") if name in wanted}
-    more = {"along": chosen.along} if "along" in wanted else {}
+    more = {"oscillation": "along" if chosen.along else "across"} if "oscillation" in wanted else {}
     found = asdict(GEOMETRIES[chosen.geometry](**sizes, **more, first=bodies[0], second=bodies[1]))
-    contact = "ball" if chosen.geometry == "ball" else "spring"
+    contact = found.pop("contact")
     if chosen.json:
         materials = [asdict(body) for body in bodies]
         return as_json({**found, "contact": contact, "geometry": chosen.geometry, **sizes, "bodies": materials})

@@ -11,7 +11,7 @@ Half-space elasticity, two smooth elastic bodies, small strains:
 
 k is the stiffness of a contact that sticks everywhere.  Under a ball the rim slips first, and gross slip begins at the
 displacement 3/2 mu0 Fz/k: ``contact="ball"``, which no single spring stands for.  Under a flat punch with full contact
-all of it slips at once, and one spring is exact.  A result holds both, k and the kind of the contact:
+all of it slips at once, and one spring is exact.  A result holds both, k and the kind of the contact::
 
     surrogate.evaluate(**ball_on_flat(5e-3, 10.0, steel, steel), mu0=0.3, Fz=10.0, y0=2e-6, f=20e3, v0=0.01)
 

@@ -67,7 +67,7 @@ class Application(FastAPI):
     """The whole service.
 
     FastAPI describes the endpoints, starts and ends the application, and answers what is none of them (the guide).
-    Requests to endpoints do not pass its layers (docs/decisions/0011-wire.md).
+    Requests to endpoints do not pass its layers (docs/decisions.md).
 
     Attributes
     ----------

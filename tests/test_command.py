@@ -293,7 +293,7 @@ def test_stiffness_from_materials_with_units(capsys):
     assert f"{stiffness.flat_punch(5e-3, 10.0, steel, steel).k:.6g}" in text
     lying = ("stiffness", "cylinder", *ball[2:], "--length", "1cm", "--json")
     ks = [json.loads(said(capsys, 0, *lying, *more))["k"] for more in ((), ("--along",))]
-    assert ks == [stiffness.cylinder_on_flat(5e-3, 0.01, 10.0, steel, steel, along).k for along in (False, True)]
+    assert ks == [stiffness.cylinder_on_flat(5e-3, 0.01, 10.0, steel, steel, way).k for way in stiffness.AXES]
     message = said(capsys, 2, *ball[:3], "5mN", "--Fz", "10V", *ball[6:])
     assert "radius=5mN" in message
     assert "Fz=10V" in message

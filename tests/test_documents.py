@@ -1,4 +1,4 @@
-"""Documents: links are valid, metadata agrees with the package, terms agree with the code."""
+"""Documents: links lead somewhere, formulas survive GitHub, metadata and stated figures agree with the code."""
 
 import json
 import re
@@ -13,8 +13,14 @@ from mumacro import Surrogate, __version__, closed_forms
 from mumacro.law import APPROXIMATIONS, BORDERS, borders
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+DOCS = ROOT / "docs"
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *(ROOT / "tables").glob("*.md"), *ROOT.glob("examples/*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(r"^```.*?^```$|^(?:    .*\n)+|<!-- begin .*?<!-- end|`[^`\n]+`|<!--.*?-->", re.MULTILINE | re.DOTALL)
+
+
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
 
 
 def anchors(page: Path) -> set[str]:
@@ -23,33 +29,34 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_within_the_project_lead_somewhere(page: Path) -> None:
-    for link in LINK.findall(page.read_text("utf-8")):
+    for link in LINK.findall(CODE.sub("", page.read_text("utf-8"))):
         if link.startswith(("http://", "https://", "mailto:")):
             continue
-        name, _, anchor = link.partition("#")
-        target = (page.parent / name).resolve() if name else page
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
         assert target.exists(), f"{page.name}: {link}"
         if anchor:
             assert anchor in anchors(target), f"{page.name}: {link}"
 
 
-def test_the_rest_reference_names_the_fields_within_fields(monkeypatch) -> None:
-    from service.app import create_app
-    from service.settings import Settings
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_github_strikes_nothing_through_and_eats_nothing(page: Path) -> None:
+    text = CODE.sub("", page.read_text("utf-8"))
+    assert re.findall(r".*~.*", text) == [], "a tilde outside of code and formulas"
+    assert re.findall(r"<(?!https?://|->)[\w/][^>\n]*>", text) == [], "a tag"
+    for formula in re.findall(r"\$([^$\n]+)\$", text):
+        assert not re.search(r"\\[^a-zA-Z]|\}_|\*|(?<!\\)<\w", formula), f"Markdown changes {formula}"
 
-    monkeypatch.syspath_prepend(ROOT / "docs" / "_ext")
-    from interface import _operations
 
-    text = "\n".join(_operations(create_app(Settings(tables=(ROOT / "tables",))).openapi()))
-    for name in ("power.saved", "results[].roots[].settling.periods", "curves[].border[].value", "errors[].reason"):
-        assert f"| `{name}`" in text
-    # an object is followed by its fields, unless the description does not fix them
-    rows = re.findall(r"^\| `(\S+?)`(?:, required)? \| (.*?) \|", text, re.MULTILINE)
-    objects = [place for place, (_, kind) in enumerate(rows) if re.search(r"\bobject\b(?! of)", kind)]
-    bare = {rows[place][0] for place in objects if not rows[place + 1][0].startswith(rows[place][0])}
-    assert bare == {"attributes", "blocks"}
+def test_the_readme_is_short_and_has_the_figures_of_the_page_on_accuracy() -> None:
+    readme, page = (ROOT / "README.md").read_text("utf-8"), (DOCS / "accuracy.md").read_text("utf-8")
+    assert len(readme.split()) <= 600
+    rows = re.findall(r"^\| \**(\w[\w-]+(?: order \d+)?).*?\** \| +(\S+) \| +(\S+) \|$", readme, re.MULTILINE)
+    assert len(rows) >= 3
+    for method, *figures in rows:
+        assert re.search(rf"{method}\b.*\| +{figures[0]} \| +{figures[1]} \|", page), method
 
 
 def number(text: str) -> float:
@@ -59,69 +66,93 @@ def number(text: str) -> float:
 
 
 def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate) -> None:
-    page = (ROOT / "docs" / "asking.md").read_text("utf-8")
+    page = (DOCS / "http.md").read_text("utf-8")
     seen = set()
-    for name, given, errors in re.findall(r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE):
-        seen.add(name)
-        low, high = {"y~ <= 1": (1e-4, 1.0), "y~ >= 1": (1.0, 1e8), "everywhere": (1e-4, 1e8)}[given]
+    for column, given, errors in re.findall(r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE):
+        seen.add(column)
+        low, high = (1e-4, 1.0) if r"\le 1" in given else (1.0, 1e8) if r"\ge 1" in given else (1e-4, 1e8)
         for told in errors.split("; "):
-            inner = re.search(r"(up to|from) y~ = ([\d.]+)", told)
+            inner = re.search(r"(up to|from) \$\\tilde\{y\} = ([\d.]+)\$", told)
             ends = low, high
             if inner is not None:
                 ends = (low, float(inner[2])) if inner[1] == "up to" else (float(inner[2]), high)
             y = np.geomspace(*ends, 4001)
             y[[0, -1]] = ends
-            off = np.abs(borders(y)[name] / surrogate.v_tilde_crit(y) - 1.0)
-            assert off.max() == close(number(told), rel=0.03), f"{name}: {told}"
+            off = np.abs(borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0)
+            assert off.max() == close(number(told), rel=0.03), f"{column}: {told}"
     assert seen == BORDERS.keys() - {"exact"}
 
 
-def test_the_folds_are_those_on_the_page(surrogate, monkeypatch) -> None:
-    page = (ROOT / "docs" / "asking.md").read_text("utf-8")
-    born, first, last = re.findall(r"above ([\d.]+) it has a minimum \(y~ from ([\d.]+) to ([\d.]+)\)", page)[0]
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    from folds import turning_points
+def test_the_folds_along_k_are_those_on_the_page(surrogate) -> None:
+    page = (DOCS / "http.md").read_text("utf-8")
+    pattern = r"above ([\d.]+) it has a minimum \(\$\\tilde\{y\}\$ from ([\d.]+) to ([\d.]+)\)"
+    born, first, last = map(float, re.findall(pattern, page)[0])
+    y = np.geomspace(2.0, 20.0, 4001)
 
-    low, high = 9.0, 10.0
-    for _ in range(24):
+    def minimum(r: float) -> float | None:
+        """y~ of the minimum along k, at y~/v~ = r."""
+        rises = np.flatnonzero(np.diff(surrogate.mu_ratio(y / r, y)) > 0.0)
+        return float(y[rises[0]]) if rises.size else None
+
+    low, high = born - 0.005, born + 0.005
+    assert minimum(low) is None
+    for _ in range(12):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if turning_points(surrogate, middle) else (middle, high)
-    assert high == close(float(born), abs=0.005)
-    # the minimum moves from its first position to the one at large r
-    assert turning_points(surrogate, high)[0][0] == close(float(last), abs=0.05)
-    assert turning_points(surrogate, 1e8)[0][0] == close(float(first), abs=0.05)
+        low, high = (middle, high) if minimum(middle) is None else (low, middle)
+    assert minimum(high) == close(last, abs=0.05)
+    assert minimum(1e8) == close(first, abs=0.05)
 
 
-def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_pages(surrogate) -> None:
+def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(surrogate) -> None:
     y = np.geomspace(1e-4, 1e8, 20_001)
-    largest = {}
-    for name, table in (("tightest", surrogate), ("coarsest", Surrogate.open(1e-4))):
-        largest[name] = max(
-            table.stick_fraction_with_bound(share * table.v_tilde_crit(y), y)[1].max()
-            for share in (1.0, 1.0 - 1e-15, 1.0 + 1e-15)
-        )
-    for page in ("asking.md", "accuracy.md"):
-        text = (ROOT / "docs" / page).read_text("utf-8")
-        fine, coarse = re.findall(r"up to ([\d.e-]+) with the tightest table, ([\d.e-]+\d) with the coarsest", text)[0]
-        assert largest["tightest"] == close(float(fine), rel=0.05)
-        assert largest["coarsest"] == close(float(coarse), rel=0.05)
+    text = (DOCS / "accuracy.md").read_text("utf-8")
+    told = re.findall(r"up to ([\d.e-]+) with the tightest table, ([\d.e-]+\d) with the coarsest", text)[0]
+    for table, bound in zip((surrogate, Surrogate.open(1e-4)), told, strict=True):
+        shares = (1.0, 1.0 - 1e-15, 1.0 + 1e-15)
+        largest = max(table.stick_fraction_with_bound(share * table.v_tilde_crit(y), y)[1].max() for share in shares)
+        assert largest == close(float(bound), rel=0.05)
 
 
-def project() -> dict:
-    return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> None:
+    text = (DOCS / "operations.md").read_text("utf-8").partition("## Threats")[2]
+    named = re.findall(r"`(tests/\w+\.py)::(\w+)`", text)
+    assert len(named) >= 30
+    for path, test in named:
+        assert re.search(rf"^def {test}\(", (ROOT / path).read_text("utf-8"), re.MULTILINE), f"{path}::{test}"
+    lines = [line for line in text.splitlines() if line.startswith("| ")]
+    assert len(lines) >= 20
+    assert [line for line in lines[2:] if "::" not in line] == []
+
+
+def test_the_rest_reference_names_the_fields_within_fields(monkeypatch) -> None:
+    from service.app import create_app
+    from service.settings import Settings
+
+    monkeypatch.syspath_prepend(DOCS / "_ext")
+    from interface import _operations
+
+    text = "\n".join(_operations(create_app(Settings(tables=(ROOT / "tables",))).openapi()))
+    for field in ("power.saved", "results[].roots[].settling.periods", "curves[].border[].value", "errors[].reason"):
+        assert f"| `{field}`" in text
+    # an object is followed by its fields, unless the description does not fix them
+    rows = re.findall(r"^\| `(\S+?)`(?:, required)? \| (.*?) \|", text, re.MULTILINE)
+    objects = [place for place, (_, kind) in enumerate(rows) if re.search(r"\bobject\b(?! of)", kind)]
+    bare = {rows[place][0] for place in objects if not rows[place + 1][0].startswith(rows[place][0])}
+    assert bare == {"attributes", "blocks"}
 
 
 def test_metadata_agrees_with_the_package() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     meta = json.loads((ROOT / "codemeta.json").read_text("utf-8"))
     assert meta["version"] == __version__
-    assert meta["description"] == project()["description"]
-    assert meta["license"].endswith(project()["license"])
-    assert meta["keywords"] == project()["keywords"]
-    assert meta["softwareRequirements"] == project()["dependencies"]
-    assert meta["runtimePlatform"] == f"Python {project()['requires-python']}"
+    assert meta["description"] == project["description"]
+    assert meta["license"].endswith(project["license"])
+    assert meta["keywords"] == project["keywords"]
+    assert meta["softwareRequirements"] == project["dependencies"]
+    assert meta["runtimePlatform"] == f"Python {project['requires-python']}"
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     assert f"version: {__version__}\n" in citation
-    assert f"license: {project()['license']}\n" in citation
+    assert f"license: {project['license']}\n" in citation
     (article,) = meta["referencePublication"]
     assert article["name"] in citation
     for author in article["author"]:
@@ -135,19 +166,12 @@ def test_every_citation_of_the_paper_is_in_its_bibliography() -> None:
 
 
 def test_the_columns_of_a_law_are_all_described() -> None:
-    page = (ROOT / "docs" / "asking.md").read_text("utf-8")
-    assert [name for name in (*APPROXIMATIONS, *BORDERS) if f"`{name}`" not in page] == []
+    page = (DOCS / "http.md").read_text("utf-8")
+    assert [column for column in (*APPROXIMATIONS, *BORDERS) if f"`{column}`" not in page] == []
 
 
 def test_every_formula_states_its_largest_deviation() -> None:
-    for name in closed_forms.__all__:
-        item = getattr(closed_forms, name)
-        if callable(item) and name != "agm":
-            text = item.__doc__.lower()
+    for item in (getattr(closed_forms, entry) for entry in closed_forms.__all__):
+        if callable(item) and item is not closed_forms.agm:
             words = ("off by", "too low", "error", "relative accuracy", "exact", "to o(")
-            assert any(word in text for word in words), name
-
-
-def test_no_page_calls_a_part_of_the_paper_missing() -> None:
-    for page in PAGES:
-        assert "not at hand" not in page.read_text("utf-8").lower()
+            assert any(word in item.__doc__.lower() for word in words), item.__name__

@@ -1,24 +1,39 @@
-"""The examples in the documents run unchanged: Python sessions, commands, and requests to a live service."""
+"""The examples of README, tutorial and how-to pages run unchanged in an environment with the wheel, not with this tree.
 
-import doctest
+README and tutorial have nothing but the wheel and what it requires; the other pages also have the packages of the
+running environment, for extras.  The blocks of a page share one session.
+"""
+
 import os
 import re
 import shutil
+import site
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from comparing import close
+from serving import running
+from test_wheel import Installed, build
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")]
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = sorted((ROOT / "docs").rglob("*.md"))
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+BARE = {"README", "tutorial"}
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e[-+]?\d+)?")
 SERVICE = "http://127.0.0.1:8000"
+SESSION = """
+import doctest, sys
+name = sys.argv[1]
+test = doctest.DocTestParser().get_doctest(open(name, encoding="utf-8").read(), {}, name, name, 0)
+result = doctest.DocTestRunner(verbose=False).run(test)
+sys.exit(0 if result.attempted and not result.failed else 1)
+"""
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -31,30 +46,56 @@ def having(language: str) -> list[Path]:
     return [page for page in PAGES if blocks(page, language)]
 
 
-def name(page: Path) -> str:
-    return page.stem
-
-
-@pytest.mark.parametrize("page", having("pycon"), ids=name)
-def test_python_sessions(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    session = "\n".join(blocks(page, "pycon"))
-    test = doctest.DocTestParser().get_doctest(session, {}, page.stem, str(page), 0)
-    report: list[str] = []
-    failed, tried = doctest.DocTestRunner(verbose=False).run(test, out=report.append)
-    assert failed == 0, "".join(report)
-    assert tried > 0
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("wheel"), "")
 
 
 @pytest.fixture(scope="module")
-def commands(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """An environment in which ``mumacro`` and ``python3`` are those of this tree."""
-    folder = tmp_path_factory.mktemp("bin")
-    for word, module in (("mumacro", "-m mumacro"), ("python3", "")):
-        script = folder / word
-        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" {module} "$@"\n', "utf-8")
-        script.chmod(0o755)
-    return {**os.environ, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of an environment with the wheel and what it requires."""
+    return Installed(tmp_path_factory.mktemp("bare"), wheel).bin
+
+
+@pytest.fixture(scope="module")
+def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of an environment with the wheel and the packages of this one."""
+    folder = tmp_path_factory.mktemp("full") / "venv"
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    pip = (folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "-q", "--no-deps")
+    subprocess.run([*pip, wheel], check=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    # behind the wheel, and without the links to this tree that an installation in place has
+    (packages / "more.pth").write_text("\n".join(site.getsitepackages()), "utf-8")
+    return folder / "bin"
+
+
+@pytest.fixture(scope="module")
+def service(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    log = tmp_path_factory.mktemp("service") / "log.jsonl"
+    with running([str(full / "mumacro"), "serve", "--port", "0"], log, PYTHONPATH="") as server:
+        server.wait_until_ready()
+        yield server.url
+
+
+def environment(programs: Path) -> dict[str, str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
+    return {**kept, "PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
+
+
+def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
+    return request.getfixturevalue("bare" if page.stem in BARE else "full")
+
+
+@pytest.mark.parametrize("page", having("pycon"), ids=lambda page: page.stem)
+def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    programs = programs_for(page, request)
+    (tmp_path / "session.txt").write_text("\n".join(blocks(page, "pycon")), "utf-8")
+    done = subprocess.run(
+        [programs / "python", "-c", SESSION, "session.txt"], cwd=tmp_path, env=environment(programs),
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def parts(text: str) -> tuple[list[str], list[float]]:
@@ -62,20 +103,22 @@ def parts(text: str) -> tuple[list[str], list[float]]:
     return NUMBER.sub("#", text).split(), [float(found) for found in NUMBER.findall(text)]
 
 
-@pytest.mark.parametrize("page", having("console"), ids=name)
-def test_commands(page: Path, commands: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    if os.name == "nt" or (SERVICE in page.read_text("utf-8") and shutil.which("curl") is None):
-        pytest.skip("needs a POSIX shell and curl")
+@pytest.mark.parametrize("page", having("console"), ids=lambda page: page.stem)
+def test_commands(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    programs = programs_for(page, request)
     for block in blocks(page, "console"):
         for entry in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
             command, _, shown = entry.partition("\n")
             if SERVICE in command:
-                command = command.replace(SERVICE, request.getfixturevalue("live_server").url)
+                if shutil.which("curl") is None:
+                    pytest.skip("needs curl")
+                command = command.replace(SERVICE, request.getfixturevalue("service"))
             done = subprocess.run(
-                ["sh", "-c", command], cwd=tmp_path, env=commands, capture_output=True, text=True, check=False
-            )
+                ["sh", "-c", command], cwd=tmp_path, env=environment(programs), capture_output=True, text=True,
+                check=False,
+            )  # fmt: skip
             assert done.returncode == 0, done.stdout + done.stderr
             (words, numbers), (shown_words, shown_numbers) = parts(done.stdout), parts(shown)
-            assert words == shown_words, command
+            assert words == shown_words, f"{command}\n{done.stdout}"
             # the last digits depend on the processor; error bounds are of rounding size
-            assert numbers == close(shown_numbers, rel=1e-9, abs=2e-13), command
+            assert numbers == close(shown_numbers, rel=1e-9, abs=2e-13), f"{command}\n{done.stdout}"

@@ -40,21 +40,6 @@ tables, hostile, faults, answers, strings, strange, limits = map(
 )
 
 
-# --- threats ------------------------------------------------------------------------------------------
-
-
-def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> None:
-    text = (ROOT / "docs" / "threats.md").read_text("utf-8")
-    named = re.findall(r"`(tests/\w+\.py)::(\w+)`", text)
-    assert len(named) >= 30
-    for path, name in named:
-        assert re.search(rf"^def {name}\(", (ROOT / path).read_text("utf-8"), re.MULTILINE), f"{path}::{name}"
-    lines = [line for line in text.splitlines() if line.startswith("| ") and line.count("|") == 5]
-    assert len(lines) >= 30
-    for line in lines:
-        assert "::" in line or line.startswith("| what is "), line
-
-
 # --- untrusted tables --------------------------------------------------------------------------------
 
 #: a table with other numbers and a matching checksum is a different table; any answer is allowed

@@ -58,7 +58,7 @@ class RestReference(SphinxDirective):
 
 def _operations(description: dict[str, Any]) -> Iterator[str]:
     schemas = description["components"]["schemas"]
-    yield "\n## Errors\n\nEvery error of these operations has this form, but for those of UM-Bridge.\n"
+    yield "\n## Errors\n\nEvery error has this form.\n"
     yield from _fields(schemas["Problem"], schemas, "problem")
     for path, methods in description["paths"].items():
         for method, operation in methods.items():
