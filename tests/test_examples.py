@@ -22,7 +22,7 @@ CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
     "least_power.py", "casadi_least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py",
-    "c",
+    "mass_on_belt.py", "c",
 }  # fmt: skip
 
 
@@ -62,6 +62,13 @@ def test_casadi_finds_the_least_power_that_openmdao_finds(repository):
     out = run(repository, sys.executable, repository / "examples" / "casadi_least_power.py")
     assert number(r"y0 = (\S+) um", out) == close(3.6842, rel=1e-4)
     assert number(r"power (\S+) mW", out) == close(47.085, rel=1e-4)
+
+
+def test_the_shaker_ends_the_stick_slip_of_a_mass_on_a_belt(repository):
+    need(None, "mujoco")
+    out = run(repository, sys.executable, repository / "examples" / "mass_on_belt.py")
+    assert number(r"y0 = 0\.0 um: swings by (\S+) mm", out) == close(1.1, rel=0.02)  # as examples/c/mass_on_belt.c
+    assert number(r"y0 = 4\.0 um: swings by (\S+) mm", out) < 1e-3
 
 
 def test_curl(repository, live_server, surrogate):
