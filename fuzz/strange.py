@@ -414,24 +414,25 @@ def wire(request: Request) -> bytes:
 
 def ask_live(server: Server, seed: int, count: int) -> Found:
     """One share of the work over a socket, on one connection as long as the service keeps it."""
-    found, raw = Found(), None
-    for name, request in work(seed, count):
-        status, fault = 0, ""
-        try:
-            raw = raw or socket.create_connection(("127.0.0.1", server.port), timeout=60)
-            raw.sendall(wire(request))
-            reply = HTTPResponse(raw, method=request.method)
-            reply.begin()
-            status, body = reply.status, reply.read()
-            if reply.getheader("content-encoding") == "gzip" and body:
-                body = gzip.decompress(body)
-            fault = fault_of(request, status, (reply.getheader("content-type") or "").encode(), body)
-            if reply.will_close:
-                raw.close()
-                raw = None
-        except (OSError, HTTPException, ValueError) as error:
-            fault, raw = f"{type(error).__name__}: {error}", None
-        found.note(name, request, status, fault, 0.0)
+    found = Found()
+    requests = list(work(seed, count))
+    while requests:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=60) as raw:
+            keeps = True
+            while requests and keeps:
+                name, request = requests.pop()
+                status, keeps = 0, False
+                try:
+                    raw.sendall(wire(request))
+                    reply = HTTPResponse(raw, method=request.method)
+                    reply.begin()
+                    status, body, keeps = reply.status, reply.read(), not reply.will_close
+                    if reply.getheader("content-encoding") == "gzip" and body:
+                        body = gzip.decompress(body)
+                    fault = fault_of(request, status, (reply.getheader("content-type") or "").encode(), body)
+                except (OSError, HTTPException, ValueError) as error:
+                    fault = f"{type(error).__name__}: {error}"
+                found.note(name, request, status, fault, 0.0)
     return found
 
 
