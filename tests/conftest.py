@@ -2,6 +2,8 @@
 
 import csv
 import importlib
+import os
+import re
 import socket
 import subprocess
 import sys
@@ -187,3 +189,36 @@ def run_builder(repository: Path) -> Callable[..., subprocess.CompletedProcess[s
         return subprocess.run(words, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
 
     return run
+
+
+# --- nothing is skipped silently ------------------------------------------------------------------------
+
+#: reasons of skips that a run with CI=true may have: what no package index offers there, other users, other systems
+EXPECTED_SKIPS = (
+    r"'?torch'?", r"rumoca", r"soffice is not installed", r"wine64 is not installed", r"curl [\d.]+ has no --json",
+    r"mounting a small file system", r"only root may run", r"another user cannot run", r"this user may write everywhere",
+    r"Python 3\.\d+ is neither on the PATH nor in pyenv", r"the amplitude is not small compared with the speed",
+)  # fmt: skip
+
+
+def unexpected_skips(config: pytest.Config) -> list[str]:
+    """Reasons of skips that are neither above nor about a program that .ci/run could not install."""
+    if os.environ.get("CI") != "true" or hasattr(config, "workerinput"):
+        return []
+    missing = os.environ.get("CI_MISSING", "").split()
+    expected = re.compile("|".join([*EXPECTED_SKIPS, *map(re.escape, missing)]))
+    reports = config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    reasons = {str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr) for report in reports}
+    return sorted(reason for reason in reasons if not expected.search(reason))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """A skip that nobody expected fails the run."""
+    if unexpected_skips(session.config) and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Such skips at the end of the output."""
+    for reason in unexpected_skips(config):
+        terminalreporter.write_line(f"FAILED: an unexpected skip: {reason}", red=True)
