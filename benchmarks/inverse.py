@@ -13,6 +13,7 @@ from __future__ import annotations
 from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -57,7 +58,9 @@ def inverse(rounds: int, quick: bool) -> str:
         known = {name: value for name, value in CASE.items() if name != unknown}
         for count in COUNTS[:2] if quick else COUNTS:
             targets = middle * np.linspace(0.99, 1.01, count) if count > 1 else np.array([middle])
-            work = {"solve_for": partial(solve_for, surrogate, unknown, targets, known)}
+            work: dict[str, Callable[[], object]] = {
+                "solve_for": partial(solve_for, surrogate, unknown, targets, known)
+            }
             if count < COUNTS[-1]:
                 work["brentq"] = partial(by_scipy, surrogate, unknown, targets, slope=False)
                 work["scipy newton"] = partial(by_scipy, surrogate, unknown, targets, slope=True)

@@ -27,7 +27,7 @@ FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/service.md", "tables/README.md"))
 
 
-def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | Path) -> None:
+def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str) -> None:
     """The command line of a script: run its sections, print them, and with ``--write`` store them.
 
     A section returns Markdown; it receives the ``options``, each with its default, as keywords.  A line about the

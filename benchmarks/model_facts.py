@@ -9,6 +9,7 @@ from benchmarks.measuring import FINEST, main, markdown, progress, quantity  # i
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +113,7 @@ def _turn(kappa: float) -> tuple[float, float]:
     start = math.atan2(far, kappa) + kappa / math.hypot(kappa, far) ** 3
     run = solve_ivp(rates, (-far, far), [start, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
     s = np.linspace(0.0, 4.0, 40_001)
-    theta = run.sol(s)[0]
+    theta = run.sol(s)[0]  # type: ignore[misc]
     return float(run.y[1, -1]), float((kappa * np.cos(theta) - s * np.sin(theta)).min())
 
 
@@ -178,7 +179,7 @@ def contact() -> str:
         k = np.fft.fftfreq(tau.size, 1.0 / tau.size)
         waves = np.fft.fft(lam) / tau.size
 
-        def at(t: float, order: int, k: Array = k, waves: Array = waves) -> float:
+        def at(t: float, order: int, k: Any = k, waves: Any = waves) -> float:
             return float((waves * (1j * k) ** order * np.exp(1j * k * t)).sum().real)
 
         i = int(np.argmin(lam))

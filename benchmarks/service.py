@@ -92,7 +92,7 @@ def batch(server: Server, kind: str, body: bytes) -> None:
         sending.join()
 
 
-def service(**settings: str) -> AbstractContextManager[Server]:
+def service(**settings: Any) -> AbstractContextManager[Server]:
     """This service with its defaults, on the first processor: checked, logged, counted."""
     return serving(FINEST, before=FIRST, **settings)
 
@@ -158,9 +158,8 @@ def body_of(form: str, n: int) -> bytes:
 
 def batches() -> str:
     """Speed of 100,000 cases, and the waits of short requests beside them and beside a million."""
-    roomy = {"MUMACRO_MAX_BODY_BYTES": "1000000000", "MUMACRO_MAX_BATCH": "1000000"}
     rows = []
-    with service(**roomy) as own:
+    with service(MUMACRO_MAX_BODY_BYTES="1000000000", MUMACRO_MAX_BATCH="1000000") as own:
         for form, kind in KINDS.items():
             body = body_of(form, 100_000)
             batch(own, kind, body)
@@ -181,13 +180,13 @@ def longest(server: Server, kind: str, body: bytes, number: int) -> float:
     waits: list[float] = []
     stop = threading.Event()
 
-    def ask() -> None:
+    def asking() -> None:
         while not stop.wait(0.002):
             started = time.perf_counter()
             ask(server, b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n", 1, 1)
             waits.append(time.perf_counter() - started)
 
-    thread = threading.Thread(target=ask)
+    thread = threading.Thread(target=asking)
     thread.start()
     for _ in range(number):
         batch(server, kind, body)

@@ -44,8 +44,8 @@ def fastapi() -> Any:
     app = FastAPI()
 
     @app.post("/v1/mu-macro", response_model=CaseAnswer)
-    async def one(case: Case) -> Any:  # type: ignore[valid-type]
-        found = surrogate.evaluate(**case.model_dump())  # type: ignore[attr-defined]
+    async def one(case: Case) -> Any:
+        found = surrogate.evaluate(**case.model_dump())
         names = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
         return {**{name: getattr(found, name) for name in names}, "table": label, "api_version": "1"}
 

@@ -9,6 +9,7 @@ from benchmarks.measuring import FINEST, main, markdown, quantity  # isort: spli
 
 import math
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def rate() -> str:
     return markdown(("fastest over slowest slip", *(f"change of mu0 = {m} [%]" for m in (0.2, 0.4, 0.8))), rows)
 
 
-def contacts() -> Iterator[tuple[str, Contact, dict[str, float]]]:
+def contacts() -> Iterator[tuple[str, Contact, dict[str, Any]]]:
     """Contacts of the usual kind at 20 kHz, with assumed, not published, numbers: name, contact, the six inputs."""
     for name, force, contact in (
         ("steel ball, R = 5 mm", 1.0, ball_on_flat(5e-3, 1.0, STEEL, STEEL)),

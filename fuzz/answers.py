@@ -194,7 +194,7 @@ def same_bits(table: Surrogate, share: float) -> Count:
     one_thread, two_threads = Surrogate.open(table.path, threads=1), Surrogate.open(table.path, threads=2)
     for n, seed in parts(N, share):
         cases, rng = draw(n, seed), np.random.default_rng(seed)
-        given = list(cases.values())
+        given: Any = list(cases.values())
         expected = table.evaluate(cases)
         rows = np.stack([expected.mu_macro, expected.mu_ratio, expected.error_bound, expected.source_code])
 
@@ -210,7 +210,8 @@ def same_bits(table: Surrogate, share: float) -> Count:
         macro, mu, bound, source = table.evaluate_columns(*given)
         count.add(np.any(rows.view(np.uint64) != np.stack([macro, mu, bound, source]).view(np.uint64), axis=0))
         for i in rng.integers(0, n, max(1, n // 50)).tolist():
-            alone = table.evaluate(**{name: float(values[i]) for name, values in cases.items()})
+            case: dict[str, Any] = {name: float(values[i]) for name, values in cases.items()}
+            alone = table.evaluate(**case)
             said = np.array([alone.mu_macro, alone.mu_ratio, alone.error_bound, alone.source_code], np.float64)
             count.add(np.array([np.any(said.view(np.uint64) != rows[:, i].copy().view(np.uint64))]))
     return count

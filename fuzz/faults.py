@@ -236,9 +236,8 @@ def no_home(folder: Path) -> str:
     (folder / "tmp").mkdir(mode=0o777)
     (folder / "tmp").chmod(0o777)
     closed(folder)
-    variables = dict.fromkeys(("HOME", "XDG_CACHE_HOME"), "")
     for home in ("", "/nonexistent"):
-        said = run(*ASK, nobody=True, **{**variables, "HOME": home, "TMPDIR": str(folder / "tmp")})
+        said = run(*ASK, nobody=True, HOME=home, XDG_CACHE_HOME="", TMPDIR=str(folder / "tmp"))
         assert said == run(*ASK)
     assert left(folder / "tmp") == []
     return "the same answer; no file in a folder of temporary files"

@@ -124,7 +124,7 @@ def open_all(arguments: Sequence[str]) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     files: Any = ((path, Path(path).read_bytes()) for path in arguments)
     if arguments[0] in CHANGES:
-        files = work(*map(int, arguments[1:3]), arguments[0], int(arguments[3]))
+        files = work(int(arguments[1]), int(arguments[2]), arguments[0], int(arguments[3]))
     for name, image in files:
         print(json.dumps(outcome(image, Path(str(name)), before)), flush=True)
 

@@ -18,7 +18,7 @@ from typing import Any
 __all__ = ["CASE", "Server", "serving"]
 
 ROOT = Path(__file__).resolve().parent.parent
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 START_S = 180.0
 
 

@@ -183,6 +183,21 @@ def two(coarse: str) -> tuple[Surrogate, Surrogate]:
     return Surrogate.open(TABLES / f"{coarse}.nc"), Surrogate.open(TABLES / "mumacro-1e-12.nc")
 
 
+@pytest.mark.parametrize("name", QUANTITY_NAMES)
+@pytest.mark.parametrize("coarse", COARSE)
+def test_the_bound_of_a_value_may_not_be_halved(coarse: str, name: str) -> None:
+    ours, fine = two(coarse)
+    worst = 0.0
+    for kind, _, _ in CASES:
+        v, y = draw(kind, 50_000, ours, seed=8)
+        (value, bound, _), (truth, left, _) = (s.quantity(name, v, y) for s in (ours, fine))
+        error = np.abs(value - truth)
+        assert np.all(error <= bound + left), kind
+        share = np.maximum(error - left, 0.0) / np.maximum(bound, 1e-300)
+        worst = max(worst, float(share[bound > 1e-12].max(initial=0.0)))
+    assert 0.45 < worst <= 1.0
+
+
 @pytest.mark.parametrize("coarse", COARSE)
 def test_the_bound_of_the_border_may_not_be_halved(coarse: str) -> None:
     ours, fine = two(coarse)
