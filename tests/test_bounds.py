@@ -3,10 +3,11 @@
 import math
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from mpmath import mp, mpf, workdps
+from mpmath import ellipk, mp, mpf, pi, workdps
 from numpy.typing import NDArray
 
 from builder.differences import differences
@@ -277,15 +278,15 @@ def test_the_gradient_of_rigid_contact_is_that_of_its_closed_form_by_every_input
     for _ in range(40):
         case: dict[str, Any] = dict(zip(("mu0", "Fz", "y0", "omega", "v0"), 10.0 ** rng.uniform(-3, 3, 5), strict=True))
         found = fine.evaluate(**case, k=None, gradient=True)
-        with mpmath.workdps(40):
+        with workdps(40):
 
-            def mu(name: str = "mu0", share: float = 1.0, case: dict[str, Any] = case) -> mpmath.mpf:
-                moved = {key: mpmath.mpf(value) for key, value in case.items()}
+            def mu(name: str = "mu0", share: float = 1.0, case: dict[str, Any] = case) -> mpf:
+                moved = {key: mpf(value) for key, value in case.items()}
                 moved[name] *= share
                 ratio = moved["y0"] * moved["omega"] / moved["v0"]
-                return moved["mu0"] * 2 / mpmath.pi * mpmath.ellipk(-(ratio**2))
+                return moved["mu0"] * 2 / pi * ellipk(-(ratio**2))
 
-            h = mpmath.mpf(10) ** -12
+            h = mpf(10) ** -12
             for name, value in case.items():
                 slope = float((mu(name, 1 + h) - mu(name, 1 - h)) / (2 * h * value))
                 assert abs(found.gradient[name] - slope) <= found.gradient_bound[name] + 1e-20 * abs(slope), name
