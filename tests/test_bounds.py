@@ -19,8 +19,6 @@ from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE
 from mumacro.inputs import FIELDS
 
-pytestmark = pytest.mark.slow
-
 Array = NDArray[np.float64]
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
 KINDS = [name for name, _, _ in CASES]
@@ -149,6 +147,7 @@ def test_bounds_are_never_nan_negative_or_missing_at_the_ends_of_double_precisio
 # --- regime -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_regime_that_is_certain_is_that_of_a_fresh_solve(table: Surrogate, sweep: Sweep, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -189,6 +188,7 @@ def covered(table: Surrogate, sweep: Sweep, name: str, v: Array, y: Array) -> tu
     return error, bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITY_NAMES)
 @pytest.mark.parametrize("case", KINDS)
 def test_slopes_lie_within_their_bounds(table: Surrogate, sweep: Sweep, case: str, name: str) -> None:
@@ -199,6 +199,7 @@ def test_slopes_lie_within_their_bounds(table: Surrogate, sweep: Sweep, case: st
     covered(table, sweep, name, v, y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 def test_slopes_of_mu_lie_within_their_bounds_beside_the_border(
     table: Surrogate, sweep: Sweep, distance: float
@@ -243,6 +244,7 @@ def test_the_gradient_and_its_bound_follow_from_the_slopes(fine: Surrogate) -> N
         assert np.all(found.gradient_bound[name] >= 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS)
 def test_the_gradient_lies_within_its_bound_of_differences_of_the_full_model(
     table: Surrogate, sweep: Sweep, field: str
