@@ -80,11 +80,11 @@ def processor() -> str:
     return name
 
 
-def machine() -> str:
-    """One line: processor, cores, system, Python, packages in use, and the load of the machine."""
+def machine(*packages: str) -> str:
+    """One line: processor, cores, system, Python, packages in use (more may be named), and the load."""
     parts = [processor(), f"{os.cpu_count()} cores", f"{platform.system()} {platform.machine()}"]
     parts.append(f"Python {platform.python_version()}")
-    parts += [f"{name} {version(name)}" for name in PACKAGES if name in sys.modules]
+    parts += [f"{name} {version(name)}" for name in (*PACKAGES, *packages) if name in sys.modules]
     if hasattr(os, "getloadavg"):
         parts.append(f"load average {os.getloadavg()[0]:.1f}")
     return "Machine: " + ", ".join(parts) + "."
