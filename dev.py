@@ -24,7 +24,9 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -172,12 +174,8 @@ def wheels() -> int:
     return run(PYTHON, "deploy/packages.py", "dist", "--all")
 
 
-def lock(*arguments: str) -> int:
-    return run(sys.executable, "requirements/lock.py", *arguments)
-
-
-COMMANDS = {"demo": demo, "test": test, "check": check, "docs": docs, "serve": serve, "wheels": wheels, "page": page,
-            "exec": execute, "lock": lock}  # fmt: skip
+COMMANDS: dict[str, Callable[..., int]] = {"demo": demo, "test": test, "check": check, "docs": docs, "serve": serve, "wheels": wheels, "page": page,
+            "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py")}  # fmt: skip
 
 
 def main(word: str = "", *rest: str) -> int:
