@@ -11,9 +11,8 @@
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 
-Needs Python 3.11 or newer and nothing else.  The rest is installed into ``.venv`` beside this file, with versions and
-hashes from ``requirements/``; that includes zig where no C compiler works.  An environment is used again as long as
-its lock files are unchanged; the kernel, ``mumacro/_kernel.so``, is compiled again when its sources change.
+Needs Python 3.11 or newer and nothing else: the rest is installed into ``.venv`` beside this file, as pinned in
+``requirements/``, and again when these files or the kernel's sources change.
 """
 
 from __future__ import annotations
@@ -174,8 +173,10 @@ def wheels() -> int:
     return run(PYTHON, "deploy/packages.py", "dist", "--all")
 
 
-COMMANDS: dict[str, Callable[..., int]] = {"demo": demo, "test": test, "check": check, "docs": docs, "serve": serve, "wheels": wheels, "page": page,
-            "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py")}  # fmt: skip
+COMMANDS: dict[str, Callable[..., int]] = {
+    **{command.__name__: command for command in (demo, test, check, docs, serve, wheels, page)},
+    "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py"),
+}  # fmt: skip
 
 
 def main(word: str = "", *rest: str) -> int:
