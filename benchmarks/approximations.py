@@ -1,4 +1,4 @@
-"""Accuracy of the closed forms in a response of ``/v1/law``:  python benchmarks/approximations.py [TABLE]
+"""Accuracy of the closed forms in a response of ``/v1/law``:  python benchmarks/approximations.py
 
 Prints the largest relative error of the formulas for the border, with the best parameter of the blend, and the
 largest error of each approximation of mu_macro/mu0 over its range.
@@ -6,9 +6,7 @@ largest error of each approximation of mu_macro/mu0 over its range.
 
 from __future__ import annotations
 
-import sys
-
-from measuring import ROOT, markdown, quantity  # isort: skip
+from benchmarks.measuring import FINEST, main, markdown, quantity  # isort: split
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -16,7 +14,6 @@ from scipy.optimize import minimize_scalar
 from mumacro import Surrogate, closed_forms
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law
 
-TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 RANGES = ((1e-4, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 10.0), (10.0, 1e3), (1e3, 1e6))
 
 
@@ -73,15 +70,16 @@ def ratios(surrogate: Surrogate) -> str:
     return markdown(["approximation", "continuous, off by", "at v~, y~", "stick-slip, off by", "at v~, y~"], rows)
 
 
-def main() -> None:
-    """Print the figures."""
-    surrogate = Surrogate.open(sys.argv[1] if len(sys.argv) > 1 else TABLE)
-    print("Largest relative error of v~crit:\n")
-    print(border(surrogate))
-    print("\nThe blend is best with d = {:.4f}: {:.2%} off at the most\n".format(*best_blend(surrogate)))
-    print("Largest error of mu_macro/mu0, where given, over v~ from 1e-6 to 1e3 and y~ from 0.01 to 1000:\n")
-    print(ratios(surrogate))
+def law() -> str:
+    """The two tables and the best blend."""
+    surrogate = Surrogate.open(FINEST)
+    return (
+        f"Largest relative error of v~crit:\n\n{border(surrogate)}\n\n"
+        "The blend is best with d = {:.4f}: {:.2%} off at the most\n\n".format(*best_blend(surrogate))
+        + "Largest error of mu_macro/mu0, where given, over v~ from 1e-6 to 1e3 and y~ from 0.01 to 1000:\n\n"
+        + ratios(surrogate)
+    )
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"approximations": law})

@@ -1,9 +1,6 @@
-#!/usr/bin/env python3
 """The exported C beside the library: nanoseconds a point, and distance in units of the last place, in one run.
 
-    python benchmarks/c_header.py              print the table of docs/c.md
-    python benchmarks/c_header.py --write      write it into the page
-    python benchmarks/c_header.py --quick      fewer points and rounds
+    python benchmarks/c_header.py [--quick] [--write]
 
 Times: points spread evenly in ln v~ and ln y~ over 1e-3 to 1e3, in random order.  Distances: points over 1e-9 to 1e9,
 half of them around the border of continuous sliding and around the corner; and once more without those within 1e-8 of
@@ -12,7 +9,8 @@ the border, where rounding decides the side.
 
 from __future__ import annotations
 
-import argparse
+from benchmarks.measuring import ROOT, best_of, main, markdown, progress, quantity  # isort: split
+
 import ctypes
 import shutil
 import subprocess
@@ -21,7 +19,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import measuring
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,8 +26,7 @@ from builder.c.source import write_c
 from mumacro import Surrogate
 
 Array = NDArray[np.float64]
-DRIVER = measuring.ROOT / "tests" / "c" / "driver.c"
-PAGE = measuring.ROOT / "docs" / "c.md"
+DRIVER = ROOT / "tests" / "c" / "driver.c"
 OPTIONS = ("-O2", "-O3 -march=native", "-O3 -march=native -ffp-contract=off")
 SIDE = 1e-8  # of v~/v~crit - 1
 
@@ -78,48 +74,40 @@ def rows_of(path: Path, n: int, rounds: int) -> tuple[list[list[str]], str]:
         for compiler in filter(shutil.which, ("gcc", "clang")):
             for options in OPTIONS:
                 row = f"`{compiler} {options}`"
-                measuring.progress(row)
+                progress(row)
                 made = library(folder, compiler, options)
                 work[row] = called(made.ratio_array, v, y, out)
                 work[f"{row}, calls"] = called(made.ratios, v, y, out)
                 called(made.ratio_array, hard_v, hard_y, found)()
                 ulps = np.where(found == expected, 0.0, np.abs(found - expected) / np.spacing(np.abs(expected)))
                 apart[row] = (f"{np.mean(ulps > 0.0):.1e}", f"{np.mean(ulps > 4.0):.1e}", f"{ulps[away].max():.0f}")
-        timed = measuring.best_of(rounds, work, "processor")
+        timed = best_of(rounds, work, "processor")
     rows = []
     for name, distance in apart.items():
         nanoseconds = [1e9 * timed.best[name] / n, 1e9 * timed.best[f"{name}, calls"] / n]
         nanoseconds[1] *= n / len(few) if name == "the library" else 1.0
         cells = [text.replace("0.0e+00", "0") for text in distance]
-        rows.append([name, *map(measuring.quantity, nanoseconds), *cells])
+        rows.append([name, *map(quantity, nanoseconds), *cells])
     return rows, timed.note()
 
 
-def main() -> None:
-    """Print the table, and write it where that is asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true")
-    parser.add_argument("--quick", action="store_true")
-    chosen = parser.parse_args()
-    n, rounds = (20_000, 2) if chosen.quick else (500_000, 7)
-    parts, note = [], ""
-    header = [
+def c_header(quick: bool) -> str:
+    """A table for each of two lookup tables."""
+    n, rounds = (20_000, 2) if quick else (500_000, 7)
+    header = (
         "evaluator",
         "ns/point, arrays",
         "ns/point, calls",
         "other bits",
         "beyond 4 ulp",
         "largest off the border",
-    ]
-    for tolerance in ("1e-7",) if chosen.quick else ("1e-7", "1e-10"):
-        path = measuring.ROOT / "tables" / f"mumacro-{tolerance}.nc"
-        rows, note = rows_of(path, n, rounds)
-        parts.append(f"Table of tolerance {tolerance}:\n\n{measuring.markdown(header, rows)}")
-    page = "\n\n".join([*parts, f"{measuring.machine()} {note}"])
-    print(page)
-    if chosen.write:
-        measuring.write_section("c_header", page, PAGE)
+    )
+    parts, note = [], ""
+    for tolerance in ("1e-7",) if quick else ("1e-7", "1e-10"):
+        rows, note = rows_of(ROOT / "tables" / f"mumacro-{tolerance}.nc", n, rounds)
+        parts.append(f"Table of tolerance {tolerance}:\n\n{markdown(header, rows)}")
+    return "\n\n".join([*parts, note])
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"c_header": c_header}, quick=False)

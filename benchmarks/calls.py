@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
+from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
+
 import timeit
-from time import process_time
+from functools import partial
 
 import numpy as np
-from measuring import machine, markdown, progress, quantity, write_section
 from scipy.special import ellipk
 
 import mumacro
+from tests.serving import CASE
 
-SETUP = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 SCALARS = {
     "scipy.special.ellipk(m), for comparison": "ellipk(0.5)",
     "mu_ratio(v, y)": "s.mu_ratio(0.1, 0.5)",
@@ -37,42 +37,25 @@ ARRAYS = {
 }
 
 
-def main() -> None:
-    """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--points", type=int, default=1_000_000)
-    parser.add_argument("--quick", action="store_true", help="few repetitions")
-    parser.add_argument("--write", action="store_true")
-    options = parser.parse_args()
-    if options.quick and options.write:
-        parser.error("--quick cannot be combined with --write")
+def calls(points: int, quick: bool) -> str:
+    """The two tables."""
     rng = np.random.default_rng(0)
-    n = 10_000 if options.quick else options.points
+    n = 10_000 if quick else points
     v, y = 10.0 ** rng.uniform(-3.0, 3.0, (2, n))
     names = {
         "s": mumacro.open(1e-10, threads=1), "np": np, "ellipk": ellipk, "v": v, "y": y, "m": rng.uniform(0.0, 1.0, n),
-        "case": SETUP, "number": np.float64(0.01), "many": {**SETUP, "v0": 0.4 * v, "y0": 3e-6 * y},
+        "case": CASE, "number": np.float64(0.01), "many": {**CASE, "v0": 0.4 * v, "y0": 3e-6 * y},
     }  # fmt: skip
-    repeat = 2 if options.quick else 15
     tables = []
     for kind, statements, number, scale, unit in (
         ("one call", SCALARS, 2000, 1e6, "us"), (f"{n:,} points, one thread", ARRAYS, 1, 1e9 / n, "ns a point"),
     ):  # fmt: skip
-        best = dict.fromkeys(statements, float("inf"))
-        for _ in range(repeat):  # in turn, so that a slow moment of the machine hits all
-            for name, statement in statements.items():
-                progress(name)
-                best[name] = min(best[name], timeit.timeit(statement, globals=names, number=number, timer=process_time))
+        work = {name: partial(timeit.timeit, text, globals=names, number=number) for name, text in statements.items()}
+        best = best_of(2 if quick else 15, work, "processor").best
         rows = [[name, quantity(time / number * scale)] for name, time in best.items()]
         tables.append(markdown([kind, f"[{unit}]"], rows))
-    text = (
-        f"{machine('scipy')} Table 1e-10, kernel of the level {mumacro.library.kernels[-1].level}.\n\n"
-        + "\n\n".join(tables)
-    )
-    print(text)
-    if options.write:
-        write_section("calls", text)
+    return "\n\n".join([f"Table 1e-10, kernel of the level {mumacro.library.kernels[-1].level}.", *tables])
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"calls": calls}, points=1_000_000, quick=False)

@@ -9,9 +9,9 @@ not from this project's own solver or tables.  docs/accuracy.md describes them.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -92,15 +92,8 @@ def text() -> str:
     return out.getvalue()
 
 
-def main() -> None:
-    """Print the file, or write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="write tests/data/check_values.csv")
-    if parser.parse_args().write:
+if __name__ == "__main__":
+    if "--write" in sys.argv[1:]:
         FILE.write_text(text(), "utf-8", newline="\n")
     else:
         print(text(), end="")
-
-
-if __name__ == "__main__":
-    main()

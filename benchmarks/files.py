@@ -6,7 +6,6 @@
 are processor time, so that other work on the machine has little effect; ratios are more reproducible than rates.
 """
 
-import argparse
 import tempfile
 import time
 from pathlib import Path
@@ -15,12 +14,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from benchmarks.measuring import main, markdown
 from mumacro import Surrogate
-from mumacro.bundled import bundled_tables
 from mumacro.files import answer, evaluate_files
 from mumacro.files.answering import added_fields
+from mumacro.inputs import FIELDS
 
-NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 STEPS = (("parquet", "parquet"), ("csv", "csv"), ("ndjson", "ndjson"), ("csv", "parquet"), ("parquet", "csv"))
 
 
@@ -29,7 +28,7 @@ def cases(n: int) -> pa.Table:
     rng = np.random.default_rng(1)
     low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
     values = 10.0 ** rng.uniform(low, high, (n, 6))
-    return pa.table({**dict(zip(NAMES, values.T, strict=True)), "id": pa.array(np.arange(n), pa.int32())})
+    return pa.table({**dict(zip(FIELDS, values.T, strict=True)), "id": pa.array(np.arange(n), pa.int32())})
 
 
 def floor(source: Path, out: Path) -> None:
@@ -49,37 +48,6 @@ def floor(source: Path, out: Path) -> None:
                 writer.write_batch(pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema))
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", type=int, default=4_000_000)
-    rows = parser.parse_args().rows
-    pa.set_cpu_count(1)
-    pa.set_io_thread_count(1)
-    surrogate = Surrogate.open(next(path for path in bundled_tables() if "1e-10" in path.name))
-    table = cases(rows)
-    answer(table.slice(0, 9).to_batches()[0], surrogate)  # kernels are loaded or compiled before timing
-    print(f"{'from':8} {'to':8} {'M rows/s':>9}")
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder) / "cases.parquet"
-        pq.write_table(table, source)
-        for kind in ("csv", "ndjson"):
-            few = table.slice(0, max(rows // 8, 1))
-            pq.write_table(few, source.with_name("few.parquet"))
-            evaluate_files([source.with_name("few.parquet")], Path(folder) / f"made.{kind}", surrogate, force=True)
-            _drop_answers(Path(folder) / f"made.{kind}", Path(folder) / f"cases.{kind}")
-        started = time.process_time()
-        floor(source, Path(folder) / "floor.parquet")
-        print(f"{'parquet':8} {'floor':8} {rows / (time.process_time() - started) / 1e6:9.2f}")
-        for start, end in STEPS:
-            name = "few.parquet" if (start, end) == ("parquet", "csv") else f"cases.{start}"
-            given = source.with_name(name)
-            started = time.process_time()
-            summary = evaluate_files([given], Path(folder) / f"out.{end}", surrogate, force=True)
-            rate = summary.rows / (time.process_time() - started) / 1e6
-            print(f"{start:8} {end:8} {rate:9.2f}")
-
-
 def _drop_answers(made: Path, cases: Path) -> None:
     with made.open() as source, cases.open("w") as out:
         for line in source:
@@ -89,5 +57,30 @@ def _drop_answers(made: Path, cases: Path) -> None:
                 out.write(line[: line.index(', "mu_macro"')] + "}\n")
 
 
+def files(rows: int) -> str:
+    """Million rows a second."""
+    pa.set_cpu_count(1)
+    pa.set_io_thread_count(1)
+    surrogate = Surrogate.open(1e-10)
+    table = cases(rows)
+    answer(table.slice(0, 9).to_batches()[0], surrogate)  # kernels are loaded before timing
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        pq.write_table(table, folder / "cases.parquet")
+        pq.write_table(table.slice(0, max(rows // 8, 1)), folder / "few.parquet")
+        for kind in ("csv", "ndjson"):
+            evaluate_files([folder / "few.parquet"], folder / f"made.{kind}", surrogate, force=True)
+            _drop_answers(folder / f"made.{kind}", folder / f"cases.{kind}")
+        started = time.process_time()
+        floor(folder / "cases.parquet", folder / "floor.parquet")
+        found = [["parquet", "floor", f"{rows / (time.process_time() - started) / 1e6:.2f}"]]
+        for start, end in STEPS:
+            given = folder / ("few.parquet" if (start, end) == ("parquet", "csv") else f"cases.{start}")
+            started = time.process_time()
+            done = evaluate_files([given], folder / f"out.{end}", surrogate, force=True)
+            found.append([start, end, f"{done.rows / (time.process_time() - started) / 1e6:.2f}"])
+    return markdown(("from", "to", "million rows a second"), found, 2)
+
+
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"files": files}, rows=4_000_000)

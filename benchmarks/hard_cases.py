@@ -1,37 +1,33 @@
-"""Every number of docs/hard-cases.md: errors of straightforward code, and the methods used instead.
+"""Errors of straightforward code where the function is singular, and of the methods used instead.
 
     python benchmarks/hard_cases.py [--write]
 
-Each case computes the naive number too.  ``--write`` replaces the sections between the markers of the page.
+Each case computes the naive number too.
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import FINEST, ROOT, main, markdown, progress, quantity  # isort: split
 
-import argparse
 import csv
 import math
 from collections.abc import Callable
-from fractions import Fraction
 
 import mpmath
 import numpy as np
-from marching import march
-from measuring import ROOT, markdown, progress, quantity
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from benchmarks.marching import march
 from builder.limits import Y_RANGE
-from builder.model import ANGLE, CHART, FALL, MIN_SPEED, NO_SLIP, NO_STICK, OK, SIGMA, STEPS, SUM_UX, slip
-from builder.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, section, stick_slip
+from builder.model import ANGLE, CHART, FALL, MIN_SPEED, OK, SIGMA, STEPS, SUM_UX, slip
+from builder.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, stick_slip
 from builder.steady import border, continuous, solve, workspace
 from builder.stick import stick_excess
 from mumacro import Surrogate, closed_forms
 from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
 
 Array = NDArray[np.float64]
-PAGE = ROOT / "docs" / "hard-cases.md"
 HALF = 0.5 * math.pi
 
 
@@ -319,40 +315,9 @@ def stiffness() -> str:
 # --- the ends of double precision ---------------------------------------------------------------------
 
 
-def overflow() -> str:
-    """The dimensionless groups from legal inputs whose products leave double precision."""
-    cases = [
-        (0.3, 1e200, 1e200, 1e150, 1.0, 1e120),
-        (0.3, 1e-200, 1e-200, 1e-150, 1e-30, 1e-140),
-        (0.5, 5e-324, 1.0, 5e-324, 3.0, 2e-323),
-        (1e-200, 1e-200, 1e-300, 1e-80, 1.0, 1e-90),
-    ]
-    rows, table = [], Surrogate.open()
-    with np.errstate(all="ignore"):
-        for mu0, force, k, y0, omega, v0 in cases:
-            a, b, c, d, e, f = (np.float64(x) for x in (mu0, force, k, y0, omega, v0))
-            naive = (float(f * c / (a * b * e)), float(d * c / (a * b)))
-            found = table.evaluate(mu0=mu0, Fz=force, k=k, y0=y0, omega=omega, v0=v0)
-            ours = found.v_tilde, found.y_tilde
-            x, z = Fraction(mu0) * Fraction(force), Fraction(k)
-            exact = (Fraction(v0) * z / (x * Fraction(omega)), Fraction(y0) * z / x)
-            off = max(abs(Fraction(o) / t - 1) for o, t in zip(ours, exact, strict=True))
-            inputs = ", ".join(f"{value:g}" for value in (mu0, force, k, y0, omega, v0))
-            rows.append(
-                [
-                    inputs,
-                    f"{naive[0]:.4g}, {naive[1]:.4g}",
-                    f"{float(exact[0]):.4g}, {float(exact[1]):.4g}",
-                    g(float(off)),
-                ]
-            )
-    header = ("mu0, Fz, k, y0, omega, v0", "naive v~, y~", "exact v~, y~", "rel error here")
-    return markdown(header, rows, 3)
-
-
 def denormals() -> str:
     """Amplitudes whose square is denormal."""
-    s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    s = Surrogate.open(FINEST)
     rows = []
     w, out, orbit, _ = workspace()
     for y in (1e-6, Y_RANGE[0], 1e-20, 1e-150):
@@ -367,56 +332,7 @@ def denormals() -> str:
     return text + "\n\nThe table `mumacro-1e-12` at denormal inputs:\n\n" + markdown(("v~", "y~", "mu~"), rows, 0)
 
 
-# --- stopping -----------------------------------------------------------------------------------------
-
-
-def _secant(v: float, y: float, kind: int, chart: int, z: float, rule: str, small: float) -> float:
-    """The section's unknown by a plain secant iteration from ``z``; NaN if the iteration leaves the section."""
-    w, out, orbit, _ = workspace()
-    z_old, f_old, before = math.nan, math.inf, math.inf
-    for _ in range(60):
-        f, status = section(kind, v, y, y - 1.0, z, chart, w, out, orbit)
-        if status in (NO_SLIP, NO_STICK) or status != OK or not math.isfinite(f):
-            return math.nan
-        new = z - f * (z - z_old) / (f - f_old) if math.isfinite(f_old) and f != f_old else z * (1.0 - 1e-2)
-        step = abs(new - z) / abs(z)
-        if math.isfinite(f_old):
-            if f == f_old or (rule == "one" and step < small) or (rule == "two" and step * before < 1e-17):
-                return new
-            before = step
-        z_old, f_old, z = z, f, new
-        if not 0.0 < z < HALF:
-            return math.nan
-    return math.nan
-
-
-def stop_rule() -> str:
-    """Where one small step stops the secant method, against the product of the last two."""
-    rng = np.random.default_rng(4)
-    found: dict[str, list[float]] = {"one 1e-6": [], "one 1e-8": [], "two": []}
-    for _ in range(600):
-        y = 10.0 ** rng.uniform(-2, 0.5)
-        v = border(y)[0] * 10.0 ** rng.uniform(-4, -0.05)
-        chart = 0 if y < 0.7 else 1
-        w, out, orbit, _ = workspace()
-        if stick_slip(v, y, y - 1.0, math.nan, w, out, orbit) != OK:
-            continue
-        sine, cosine = orbit[SIN_0], orbit[COS_0]
-        true = math.atan2(sine, cosine) if chart == 0 else math.atan2(cosine, sine)
-        for name in found:
-            rule, _, small = name.partition(" ")
-            z = _secant(v, y, 0, chart, true * (1.0 + 10.0 ** rng.uniform(-6, -2)), rule, float(small or 0.0))
-            if math.isfinite(z):
-                found[name].append(abs(z / true - 1.0))
-    rows = []
-    for name, errors in found.items():
-        e = np.array(errors)
-        label = "product of the last two steps below 1e-17" if name == "two" else f"one step below {name[4:]}"
-        rows.append([label, f"{e.size}", g(float(np.median(e))), g(float(e.max()))])
-    return markdown(("rule", "runs that stayed on the section", "median rel error", "largest"), rows)
-
-
-CASES: dict[str, Callable[[], str]] = {
+SECTIONS: dict[str, Callable[[], str]] = {
     "grazing": grazing,
     "surplus": surplus,
     "double_root": double_root,
@@ -426,26 +342,8 @@ CASES: dict[str, Callable[[], str]] = {
     "small_amplitude": small_amplitude,
     "short_stick": short_stick,
     "stiffness": stiffness,
-    "overflow": overflow,
     "denormals": denormals,
-    "stop_rule": stop_rule,
 }
 
-
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", choices=list(CASES), help="one case")
-    parser.add_argument("--write", action="store_true", help="put the numbers into docs/hard-cases.md")
-    given = parser.parse_args()
-    progress(measuring.machine("scipy"))
-    for name, case in CASES.items():
-        if given.only in (None, name):
-            text = case()
-            print(f"## {name}\n\n{text}\n", flush=True)
-            if given.write:
-                measuring.write_section(name, text, PAGE)
-
-
 if __name__ == "__main__":
-    main()
+    main(__doc__, SECTIONS)

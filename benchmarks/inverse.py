@@ -1,24 +1,20 @@
-"""Cost of the inverse problem:  python benchmarks/inverse.py [TABLE] [--rounds N] [--quick] [--write]
+"""Cost of the inverse problem:  python benchmarks/inverse.py [--rounds N] [--quick] [--write]
 
-The same roots by four methods, all on the same surrogate, in processor time:
+The same roots by three methods, all on the same surrogate, in processor time:
 
 * ``solve_for``: sampled once, then bracketed Newton steps with the gradient, all targets at once; every root with the
   interval that follows from the error bound;
-* bisection of the bits of the input, all targets at once: the earlier method of ``solve_for``, with its intervals;
 * ``scipy.optimize.brentq``, target by target, within one decade on either side of the root; roots only;
 * the same with ``scipy.optimize.newton`` and the gradient, starting one percent from the root.
-
-``--write`` writes the table to docs/benchmarks.md.
 """
 
 from __future__ import annotations
 
-import argparse
-
-from measuring import ROOT, best_of, machine, markdown, quantity, write_section  # isort: skip
+from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 import math
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,28 +22,9 @@ from scipy.optimize import brentq, newton
 
 from mumacro import Surrogate
 from mumacro.inverse import solve_for
-from mumacro.inverse.rootfinding import Sweep, last_double
+from tests.serving import CASE
 
-CASE: dict[str, float] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 COUNTS = (1, 100, 10_000)
-
-
-def by_bits(surrogate: Surrogate, unknown: str, targets: NDArray[np.float64], rising: bool) -> NDArray[np.float64]:
-    """Root, lower and upper end (3, n) by bisection of bits, the old method of ``solve_for`` for v0, y0 and omega."""
-    sweep = Sweep(surrogate, {name: value for name, value in CASE.items() if name != unknown}, unknown)
-    sign = 1.0 if rising else -1.0
-    low, high = np.zeros(targets.size), np.full(targets.size, np.finfo(float).max)
-
-    def reach(level: NDArray[np.float64]) -> NDArray[np.float64]:
-        def below(x: NDArray[np.float64]) -> NDArray[np.bool_]:
-            found: NDArray[np.bool_] = sign * sweep.mu(x) < sign * level[:, None]
-            return found
-
-        return last_double(below, low, high)[1]
-
-    value = reach(targets)
-    bound = sign * np.asarray(sweep.answer(value).error_bound)
-    return np.array([value, reach(targets - bound), reach(targets + bound)])
 
 
 def by_scipy(surrogate: Surrogate, unknown: str, targets: NDArray[np.float64], slope: bool) -> list[float]:
@@ -72,50 +49,34 @@ def by_scipy(surrogate: Surrogate, unknown: str, targets: NDArray[np.float64], s
     return [math.exp(t) for t in found]
 
 
-def rows(surrogate: Surrogate, rounds: int, counts: tuple[int, ...]) -> tuple[list[list[str]], str]:
-    """The rows of the table, and a note on the clock."""
+def inverse(rounds: int, quick: bool) -> str:
+    """Milliseconds of all targets at once, and of scipy one by one."""
+    surrogate = Surrogate.open(1e-10, threads=1)
     written, note = [], ""
     middle = float(surrogate.evaluate(**CASE).mu_macro)
-    for unknown, rising in (("v0", True), ("y0", False), ("k", False)):
+    for unknown in ("v0", "y0", "k"):
         known = {name: value for name, value in CASE.items() if name != unknown}
-        for count in counts:
+        for count in COUNTS[:2] if quick else COUNTS:
             targets = middle * np.linspace(0.99, 1.01, count) if count > 1 else np.array([middle])
-            work = {"newton": lambda u=unknown, t=targets, c=known: solve_for(surrogate, u, t, c)}
-            if unknown != "k":  # mu_macro may fold along k; the old method also sampled it; only the roots are compared
-                work["bits"] = lambda u=unknown, t=targets, r=rising: by_bits(surrogate, u, t, r)
+            work: dict[str, Callable[[], object]] = {
+                "solve_for": partial(solve_for, surrogate, unknown, targets, known)
+            }
             if count < COUNTS[-1]:
-                work["brentq"] = lambda u=unknown, t=targets: by_scipy(surrogate, u, t, slope=False)
-                work["scipy newton"] = lambda u=unknown, t=targets: by_scipy(surrogate, u, t, slope=True)
+                work["brentq"] = partial(by_scipy, surrogate, unknown, targets, slope=False)
+                work["scipy newton"] = partial(by_scipy, surrogate, unknown, targets, slope=True)
             timed = best_of(rounds, work, "processor")
-            note = timed.note()
-            own = timed.best["newton"]
-            others = []
-            for name in ("bits", "brentq", "scipy newton"):
-                seconds = timed.best.get(name)
-                others += ["-", "-"] if seconds is None else [quantity(1e3 * seconds), f"{seconds / own:.1f}"]
+            note, own = timed.note(), timed.best["solve_for"]
+            others = [
+                text
+                for name in ("brentq", "scipy newton")
+                for text in (
+                    [quantity(1e3 * timed.best[name]), f"{timed.best[name] / own:.1f}"] if name in work else "--"
+                )
+            ]
             written.append([unknown, f"{count:,}", quantity(1e3 * own), *others])
-    return written, note
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("table", nargs="?", type=Path, default=ROOT / "tables" / "mumacro-1e-10.nc")
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--quick", action="store_true", help="leave out the many targets")
-    parser.add_argument("--write", action="store_true")
-    chosen = parser.parse_args()
-    surrogate = Surrogate.open(chosen.table, threads=1)
-    found, note = rows(surrogate, chosen.rounds, COUNTS[:2] if chosen.quick else COUNTS)
-    header = [
-        "unknown", "targets", "solve_for [ms]", "bits [ms]", "times", "brentq [ms]", "times", "scipy newton [ms]",
-        "times",
-    ]  # fmt: skip
-    text = f"{markdown(header, found)}\n\n{note} {machine('scipy')}"
-    print(text)
-    if chosen.write:
-        write_section("inverse", text)
+    header = ("unknown", "targets", "solve_for [ms]", "brentq [ms]", "times", "scipy newton [ms]", "times")
+    return f"{markdown(header, written)}\n\n{note}"
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"inverse": inverse}, rounds=5, quick=False)

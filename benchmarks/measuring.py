@@ -1,17 +1,17 @@
-"""Imported first by every script here: one thread for every library, the source tree on the path; clock and tables.
+"""Shared by every script of benchmarks/ and fuzz/: clock, machine, tables, and the command line that stores results.
 
-``import measuring`` must stand before numpy, which reads the thread counts once, when it loads.
+Imported before numpy: it sets one thread for every numerical library, and numpy reads that once, when it loads.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import platform
-import socket
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -19,27 +19,53 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VEC
     os.environ[_name] = "1"
 
 ROOT = Path(__file__).resolve().parent.parent
-if str(ROOT) not in sys.path:
-    sys.path.insert(0, str(ROOT))
-
-__all__ = [
-    "CLOCKS",
-    "IMAGES",
-    "PAGE",
-    "ROOT",
-    "Timed",
-    "best_of",
-    "free_port",
-    "machine",
-    "markdown",
-    "progress",
-    "quantity",
-    "read_section",
-    "write_section",
-]
-
-PAGE = ROOT / "docs" / "benchmarks.md"
+RESULTS = ROOT / "build" / "results"
 IMAGES = ROOT / "docs" / "img"
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")
+FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
+#: the documents that hold results, each between a begin and an end marker with the name of its section
+PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/service.md", "tables/README.md"))
+
+
+def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str) -> None:
+    """The command line of a script: run its sections, print them, and with ``--write`` store them.
+
+    A section returns Markdown; it receives the ``options``, each with its default, as keywords.  A line about the
+    machine is added.  ``--write`` stores it as build/results/SCRIPT-SECTION.md, and between its markers where a
+    document of :data:`PAGES` has them.
+    """
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", choices=list(sections), help="one section")
+    parser.add_argument("--write", action="store_true", help="store the results in build/results, and in documents")
+    for name, default in options.items():
+        if isinstance(default, bool):
+            parser.add_argument(f"--{name}", action="store_true")
+        else:
+            parser.add_argument(f"--{name}", type=type(default), default=default, help=f"default: {default}")
+    given = parser.parse_args()
+    if given.write and (getattr(given, "quick", False) or getattr(given, "share", 1.0) < 1.0):
+        parser.error("--write stores full runs only")
+    for name, section in sections.items():
+        if given.only in (None, name):
+            progress(f"{name} ...")
+            started = perf_counter()
+            found = section(**{option: getattr(given, option) for option in options})
+            found += f"\n\nTook {(perf_counter() - started) / 60.0:.1f} min. {machine()}"
+            print(f"## {name}\n\n{found}\n", flush=True)
+            if given.write:
+                write(Path(sys.argv[0]).stem, name, found)
+
+
+def write(script: str, section: str, text: str) -> None:
+    """Store a section's result."""
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    (RESULTS / f"{'-'.join(dict.fromkeys((script, section)))}.md").write_text(f"{text}\n", "utf-8")
+    for path in PAGES:
+        page = path.read_text("utf-8")
+        begin, end = f"<!-- begin {section} -->\n", f"<!-- end {section} -->"
+        if begin in page:
+            before, _, rest = page.partition(begin)
+            path.write_text(f"{before}{begin}\n{text}\n\n{end}{rest.partition(end)[2]}", "utf-8")
 
 
 def processor() -> str:
@@ -54,18 +80,11 @@ def processor() -> str:
     return name
 
 
-def _version(package: str) -> str | None:
-    try:
-        return f"{package} {version(package)}"
-    except PackageNotFoundError:
-        return None
-
-
 def machine(*packages: str) -> str:
-    """One line: processor, cores, system, Python, the relevant versions, and the load of the machine."""
+    """One line: processor, cores, system, Python, packages in use (more may be named), and the load."""
     parts = [processor(), f"{os.cpu_count()} cores", f"{platform.system()} {platform.machine()}"]
     parts.append(f"Python {platform.python_version()}")
-    parts += [text for text in map(_version, ("numpy", "numba", *packages)) if text]
+    parts += [f"{name} {version(name)}" for name in (*PACKAGES, *packages) if name in sys.modules]
     if hasattr(os, "getloadavg"):
         parts.append(f"load average {os.getloadavg()[0]:.1f}")
     return "Machine: " + ", ".join(parts) + "."
@@ -113,13 +132,6 @@ def best_of(rounds: int, work: Mapping[str, Callable[[], object]], clock: str = 
     return Timed(best, own / wall, clock)
 
 
-def free_port() -> int:
-    """An unused port."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 def quantity(value: float, digits: int = 2) -> str:
     """``value`` with ``digits`` significant digits: plain between 0.01 and 1e5, else as a power of ten."""
     if value == 0.0:
@@ -143,32 +155,3 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns:
 
     rule = ["-" * w if i < text_columns else "-" * (w - 1) + ":" for i, w in enumerate(widths)]
     return "\n".join([line(header), line(rule), *map(line, rows)])
-
-
-def _parts(name: str, path: Path) -> tuple[str, str, str]:
-    """The text before, between and after the markers of ``name``; the markers are in the outer parts."""
-    page = path.read_text(encoding="utf-8")
-    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
-    if page.count(begin) != 1 or page.count(end) != 1:
-        raise ValueError(f"{path} must hold {begin!r} and {end!r} once each")
-    before, _, rest = page.partition(begin)
-    between, _, after = rest.partition(end)
-    return before + begin, between, end + after
-
-
-def read_section(name: str, path: Path = PAGE) -> str:
-    """The text between the markers of ``name`` on a page, by default docs/benchmarks.md.
-
-    Raises
-    ------
-    ValueError
-        When the page lacks one of the markers.
-    """
-    return _parts(name, path)[1]
-
-
-def write_section(name: str, text: str, path: Path = PAGE) -> None:
-    """Replace what :func:`read_section` reads; raises the same."""
-    before, _, after = _parts(name, path)
-    lines = text.strip("\n")  # newlines only: a first line may be indented
-    path.write_text(f"{before}\n{lines}\n\n{after}", encoding="utf-8")

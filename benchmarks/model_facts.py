@@ -1,25 +1,22 @@
-"""The numbers of docs/model.md: convergence of each chart, and range of each limit.
+"""Convergence of each chart, and range of each limit.
 
-    python benchmarks/model_facts.py [--write]
-
-``--write`` replaces the sections between the markers of the page.
+python benchmarks/model_facts.py [--write]
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import FINEST, main, markdown, progress, quantity  # isort: split
 
-import argparse
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from measuring import ROOT, markdown, progress, quantity
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
-from validation import orbit
 
+from benchmarks.validation import orbit
 from builder.blocks import tabulated
 from builder.steady import REGIME, STICK_SLIP, border, solve, solve_raw, workspace
 from builder.sweep import Sweep
@@ -29,7 +26,6 @@ from mumacro.charts import CHARTS, NAMES, SOURCES
 from mumacro.settling import settling
 
 Array = NDArray[np.float64]
-PAGE = ROOT / "docs" / "model.md"
 SIZES = (8, 16, 24, 32, 48)
 POINTS = 1000
 
@@ -65,7 +61,7 @@ def _block_errors(index: int, s: Surrogate, sweep: Sweep) -> list[float]:
 
 def blocks() -> str:
     """Error of every block's interpolant by the number of nodes."""
-    s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    s = Surrogate.open(FINEST)
     rows = []
     with Sweep(1) as sweep:
         for index, name in enumerate(NAMES):
@@ -92,7 +88,7 @@ def limits() -> str:
 
 def outer() -> str:
     """Eq. (35) alone, with the second term, and resummed, at large v~."""
-    s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    s = Surrogate.open(FINEST)
     rows = []
     for v, y in ((100.0, 0.1), (100.0, 2.0), (100.0, 3.0), (1000.0, 30.0), (1000.0, 300.0), (1e4, 1e4), (1e5, 1e6)):
         mu = solve(v, y).mu_ratio
@@ -117,7 +113,7 @@ def _turn(kappa: float) -> tuple[float, float]:
     start = math.atan2(far, kappa) + kappa / math.hypot(kappa, far) ** 3
     run = solve_ivp(rates, (-far, far), [start, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
     s = np.linspace(0.0, 4.0, 40_001)
-    theta = run.sol(s)[0]
+    theta = run.sol(s)[0]  # type: ignore[misc]
     return float(run.y[1, -1]), float((kappa * np.cos(theta) - s * np.sin(theta)).min())
 
 
@@ -183,7 +179,7 @@ def contact() -> str:
         k = np.fft.fftfreq(tau.size, 1.0 / tau.size)
         waves = np.fft.fft(lam) / tau.size
 
-        def at(t: float, order: int, k: Array = k, waves: Array = waves) -> float:
+        def at(t: float, order: int, k: Any = k, waves: Any = waves) -> float:
             return float((waves * (1j * k) ** order * np.exp(1j * k * t)).sum().real)
 
         i = int(np.argmin(lam))
@@ -239,7 +235,7 @@ def _period(u: Array, ahead: float, across: Array) -> Array:
 
 def settle() -> str:
     """Periods to 1 % by the table and by marching 40 random starts."""
-    s = Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    s = Surrogate.open(FINEST)
     rng = np.random.default_rng(1)
     angle, radius = rng.uniform(0.0, 2.0 * math.pi, 40), np.sqrt(rng.uniform(0.0, 1.0, 40))
     starts = radius * np.array([np.cos(angle), np.sin(angle)])
@@ -276,7 +272,7 @@ def corner() -> str:
     return markdown(("2 psi/pi", "(mu~/phi - 1)/R^2 at R = 0.3", "0.1", "0.03"), rows, 0)
 
 
-CASES: dict[str, Callable[[], str]] = {
+SECTIONS: dict[str, Callable[[], str]] = {
     "blocks": blocks,
     "limits": limits,
     "outer": outer,
@@ -288,21 +284,5 @@ CASES: dict[str, Callable[[], str]] = {
     "settle": settle,
 }
 
-
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", choices=list(CASES), help="one section")
-    parser.add_argument("--write", action="store_true", help="put the numbers into docs/model.md")
-    given = parser.parse_args()
-    progress(measuring.machine())
-    for name, case in CASES.items():
-        if given.only in (None, name):
-            text = case()
-            print(f"## {name}\n\n{text}\n", flush=True)
-            if given.write:
-                measuring.write_section(name, text, PAGE)
-
-
 if __name__ == "__main__":
-    main()
+    main(__doc__, SECTIONS)

@@ -6,51 +6,17 @@ widths, in the light and dark schemes.  Needs Chromium with its ChromeDriver and
 
 import argparse
 import base64
-import re
-import subprocess
-import sys
 import tempfile
 import time
-import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
-PICTURE = ROOT / "docs" / "img" / "page.png"
+from benchmarks.measuring import IMAGES
+from tests import browser as driven
+from tests.serving import serving
+
 SHOWN = "#approximations=1&family=y0&curves=1um;3um&mu0.std=0.01&y0.std=5%25"
 SIZES = {1440: 900, 1024: 768, 390: 844}
-READY_S = 300.0
-
-
-@contextmanager
-def serving() -> Iterator[str]:
-    """The address of a separate service."""
-    command = [sys.executable, "-m", "service", "--port", "0"]
-    with tempfile.TemporaryFile("w+") as log:
-        process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)
-        try:
-            yield _when_ready(process, log)
-        finally:
-            process.terminate()
-            process.wait()
-
-
-def _when_ready(process: subprocess.Popen[bytes], log: Any) -> str:
-    deadline = time.monotonic() + READY_S
-    while time.monotonic() < deadline and process.poll() is None:
-        log.seek(0)
-        found = re.search(r"running on (http://[^ ]+:\d+) ", log.read())
-        try:
-            if found:
-                with urllib.request.urlopen(f"{found[1]}/readyz", timeout=10):
-                    return found[1]
-        except OSError:
-            pass
-        time.sleep(0.1)
-    log.seek(0)
-    raise SystemExit(f"the service does not start:\n{log.read()}")
 
 
 def picture(page: Any) -> bytes:
@@ -83,17 +49,14 @@ def main() -> None:
     options = parser.parse_args()
     if not (options.write or options.all):
         parser.error("give --write or --all DIR")
-    sys.path.insert(0, str(ROOT / "tests"))  # tests/ is not a package
-    import browser as driven
-
-    with serving() as url, tempfile.TemporaryDirectory() as profile:
+    with serving() as server, tempfile.TemporaryDirectory() as profile:
         browser = driven.start(profile)
         try:
-            opened = driven.Opened(browser, url)
+            opened = driven.Opened(browser, server.url)
             if options.write:
                 page = opened(SHOWN, width=1440, height=900)
                 time.sleep(0.5)
-                PICTURE.write_bytes(picture(page))
+                (IMAGES / "page.png").write_bytes(picture(page))
             if options.all:
                 everything(opened, options.all)
         finally:

@@ -2,40 +2,30 @@
 
     python benchmarks/scale.py [--largest 1e8] [--write]
 
-Every chunk of cases is generated, evaluated and reduced (mean, extremes, a histogram); no case is stored.  The last
-table builds one lookup table with threads and with two worker processes, for docs/decisions/0019.  Starting a worker is
-not counted; its kernels are loaded before.  Processor time is the sum over all processes: other work on the machine
-has little effect on it.
+Every chunk of cases is generated, evaluated and reduced (mean, extremes, a histogram); no case is stored.  Starting a
+worker is not counted; its kernels are loaded before.  Processor time is the sum over all processes: other work on the
+machine has little effect on it.
 """
 
 from __future__ import annotations
 
-import measuring  # isort: skip  (before numpy: one thread a library)
+from benchmarks.measuring import main, markdown, progress, quantity  # isort: split
 
-import argparse
-import hashlib
 import resource
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from time import process_time
 from typing import Any
 
 import dask
 import numpy as np
 import xarray as xr
-from measuring import machine, markdown, progress, quantity, write_section
 from scipy.stats import qmc
 
-from builder.assemble import build_table
-from builder.sweep import CHUNK, COLUMNS, Sweep, solve_chunk
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from mumacro.processors import processors
 
-PAGE = measuring.ROOT / "docs" / "scale.md"
-PACKAGES = ("dask", "distributed", "xarray")
 PLAN = 1e12  # cases of the worked plan
 CORES = 64  # of the plan's cluster
 Reduced = tuple[float, float, float, int]
@@ -114,50 +104,14 @@ def _load(surrogate: Surrogate) -> None:
         lazy(surrogate, 1000)
 
 
-def _compile() -> None:
-    for kind in ("full", "continuous", "border"):
-        solve_chunk(kind, np.array([[1.0, 1.0, 0.0]]))
-
-
-class DaskSweep(Sweep):
-    """A sweep whose chunks are solved by workers of Dask: as needed for models with longer solves."""
-
-    def __init__(self, client: Any) -> None:
-        super().__init__()
-        self.client = client
-
-    def _run(self, kind: str, points: Any) -> Any:
-        chunks = [points[i : i + CHUNK] for i in range(0, points.shape[0], CHUNK)]
-        done = self.client.gather(self.client.map(solve_chunk, [kind] * len(chunks), chunks, pure=False))
-        return np.concatenate([np.empty((0, len(COLUMNS))), *done])
-
-
 def processor_time(client: Any = None) -> float:
     """Processor seconds so far of this process and of the client's workers."""
     return process_time() + (0.0 if client is None else sum(client.run(process_time).values()))
 
 
-def built(sweep: Sweep, tolerance: float, client: Any = None) -> tuple[float, int, str]:
-    """Processor seconds of a build, its solves, and the digest of the table's data."""
-    _compile()
-    if client is not None:
-        client.run(_compile)
-    with tempfile.TemporaryDirectory() as folder, sweep:
-        started = processor_time(client)
-        table = build_table(Path(folder) / "table.nc", tolerance, sweep)
-        spent = processor_time(client) - started
-        return spent, sweep.n_solves, hashlib.sha256(table.checksum.encode()).hexdigest()[:12]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--largest", type=float, default=1e8, help="cases of the largest run")
-    parser.add_argument("--quick", action="store_true", help="few cases, not a measurement")
-    parser.add_argument("--write", action="store_true", help="write the tables to docs/scale.md")
-    given = parser.parse_args()
-    if given.quick and given.write:
-        parser.error("--quick cannot be combined with --write")
-    sizes = [10**e for e in range(6, 12) if 10**e <= given.largest] if not given.quick else [10_000, 100_000]
+def scale(largest: float, quick: bool) -> str:
+    """Every run at every size, and the two builds."""
+    sizes = [10**e for e in range(6, 12) if 10**e <= largest] if not quick else [10_000, 100_000]
     surrogate = Surrogate.open(1e-10)
     _load(surrogate)
     busy: dict[str, dict[int, float]] = {}
@@ -177,29 +131,20 @@ def main() -> None:
 
     with dask.config.set(scheduler="synchronous"):
         measure("one thread, no scheduler")
-        parts = stages(surrogate, sizes[-1] if given.quick else 10**6)
+        parts = stages(surrogate, sizes[-1] if quick else 10**6)
     with dask.config.set(scheduler="threads", num_workers=processors()):
         measure(f"{processors()} threads")
-    tolerance = 1e-3 if given.quick else 1e-10
-    builds = {}
     for n in (1, 2):
         with workers(n, surrogate) as client:
             measure(f"{n} worker process{'es' * (n > 1)}", client)
-            if n == 2:
-                builds["2 worker processes"] = built(DaskSweep(client), tolerance, client)
-    builds[f"{processors()} threads"] = built(Sweep(processors()), tolerance)
     if any(len(answers) != 1 for answers in found.values()):
         raise SystemExit(f"error: results differ: {found}")
-    text = report(sizes, busy, memory, parts, builds, tolerance)
-    print(text)
-    if given.write:
-        write_section("scale", text, PAGE)
+    return report(sizes, busy, memory, parts)
 
 
 def report(
-    sizes: list[int], busy: dict[str, dict[int, float]], memory: dict[str, float], parts: dict[str, float],
-    builds: dict[str, tuple[float, int, str]], tolerance: float,
-) -> str:  # fmt: skip
+    sizes: list[int], busy: dict[str, dict[int, float]], memory: dict[str, float], parts: dict[str, float]
+) -> str:
     """The section of docs/scale.md."""
     n = sizes[-1]
     rows = [[name, quantity(1e9 * times[n] / n), quantity(memory[name])] for name, times in busy.items()]
@@ -212,11 +157,8 @@ def report(
         ["mu_macro alone, if it were stored as doubles", f"{quantity(stored)} TB"],
         ["the six inputs beside it", f"{quantity(6 * stored)} TB"],
     ]
-    same = len({digest for _, _, digest in builds.values()}) == 1
-    built_rows = [[name, quantity(spent), f"{solves:,}", digest] for name, (spent, solves, digest) in builds.items()]
     return "\n\n".join(
         [
-            machine(*PACKAGES),
             f"{n:.0e} Sobol cases of six varying inputs, made, answered by mumacro-1e-10 and reduced to mean, extremes "
             "and a histogram in one pass, in chunks of 2^20. Processor time is that of all processes; memory is that "
             "of the largest process so far.",
@@ -228,8 +170,6 @@ def report(
             f"{quantity(parts['answer'])} ns; the rest is the reductions and Dask.",
             f"For {PLAN:.0e} cases the model gives:",
             markdown(["what", "how much"], plan, 1),
-            f"A table of {tolerance:.0e} built through Dask and by threads, {'the same' if same else 'OTHER'} data:",
-            markdown(["run", "processor seconds", "solves", "digest"], built_rows, 1),
         ]
     )
 
@@ -244,4 +184,4 @@ def fit(sizes: list[int], times: dict[int, float]) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"scale": scale}, largest=1e8, quick=False)

@@ -3,23 +3,21 @@
     python benchmarks/solver.py [--points 20000] [--quick] [--write]
 
 One thread.  Points are log-uniform over v~, y~ in [1e-3, 1e3]; errors are against tests/data/points.csv, which was
-solved in quadruple precision.  ``--write`` puts the tables into docs/benchmarks.md.
+solved in quadruple precision.
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import CLOCKS, ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
-import argparse
 import csv
 from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from marching import march
-from measuring import best_of, markdown, progress, quantity
 from numpy.typing import NDArray
 
+from benchmarks.marching import march
 from builder.steady import REGIMES
 from builder.sweep import COLUMNS, solve_chunk
 
@@ -58,7 +56,7 @@ def by_regime(n: int, rounds: int, clock: str) -> tuple[str, str]:
     timed = best_of(rounds, work, clock)
     rows = []
     for name, part in parts.items():
-        alone = [_alone(part[i : i + 1], measuring.CLOCKS[clock]) for i in range(min(len(part), ALONE))]
+        alone = [_alone(part[i : i + 1], CLOCKS[clock]) for i in range(min(len(part), ALONE))]
         typical, slow = np.quantile(alone, (0.5, 0.99))
         mean = timed.best[name] / len(part)
         rows.append([name.replace("_", "-"), f"{len(part):,}", *(quantity(s * 1e6) for s in (mean, typical, slow))])
@@ -68,7 +66,7 @@ def by_regime(n: int, rounds: int, clock: str) -> tuple[str, str]:
 
 def accuracy() -> str:
     """Error of the compiled solver on the quadruple-precision points, by kind of point."""
-    with open(measuring.ROOT / "tests" / "data" / "points.csv", newline="") as stream:
+    with open(ROOT / "tests" / "data" / "points.csv", newline="") as stream:
         cases = list(csv.DictReader(stream))
     v, y, truth = (np.array([float(c[name]) for c in cases]) for name in ("v", "y", "mu_ratio"))
     solved = dict(zip(COLUMNS, solve_chunk("full", np.stack([v, y, y - 1.0], axis=1)).T, strict=True))
@@ -135,45 +133,29 @@ def slowing(speeds: tuple[float, ...], now: Callable[[], float]) -> str:
     return markdown(header, rows)
 
 
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--points", type=int, help="points of the compiled solver (20,000; quick: 500)")
-    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds, the best counts")
-    parser.add_argument("--clock", choices=measuring.CLOCKS, default="wall", help="processor: on a busy machine")
-    parser.add_argument("--quick", action="store_true", help="few points: a smoke test, no measurement")
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
-    given = parser.parse_args()
-    if given.quick and given.write:
-        parser.error("--quick cannot be combined with --write")
-    n = given.points or (500 if given.quick else 20_000)
-    if n < 100:
-        parser.error(f"--points must be at least 100, got {n}")
-    now = measuring.CLOCKS[given.clock]
-    progress("compiled solver")
-    regimes, note = by_regime(n, given.rounds, given.clock)
+def solver(points: int, rounds: int, quick: bool, clock: str) -> str:
+    """Time by regime, error, and marching beside it."""
+    n = min(points, 500) if quick else points
+    now = CLOCKS[clock]
+    regimes, note = by_regime(n, rounds, clock)
     progress("marching")
     crit = solve_chunk("border", np.array([[1.0, SLOWING_Y, SLOWING_Y - 1.0]]))[0, 1]
-    text = "\n\n".join(
+    return "\n\n".join(
         [
-            measuring.machine("scipy"),
-            f"{n:,} log-uniform random points over v~, y~ in [1e-3, 1e3], one thread, best of {given.rounds} rounds; "
+            f"{n:,} log-uniform random points over v~, y~ in [1e-3, 1e3], one thread, best of {rounds} rounds; "
             f"median and 99 % are of solves called one by one. {note}",
             regimes,
             "Error against quadruple precision:",
             accuracy(),
             "Beside marching with scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and "
             f"of slip, until two cycles agree to 1e-9), at points with v~ >= {PEER_LOW:g}:",
-            against_marching(3 if given.quick else 40, now),
+            against_marching(3 if quick else 40, now),
             f"Marching costs more as v~ falls, and agreement of two cycles to 1e-9 means less; here "
             f"y~ = {SLOWING_Y:g}, where v~crit = {quantity(float(crit))}:",
-            slowing(SLOWING[:2] if given.quick else SLOWING, now),
+            slowing(SLOWING[:2] if quick else SLOWING, now),
         ]
     )
-    print(text)
-    if given.write:
-        measuring.write_section("solver", text)
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"solver": solver}, points=20_000, rounds=5, quick=False, clock="wall")

@@ -3,31 +3,28 @@
     python benchmarks/speed_against_error.py [--points 1000000] [--quick] [--write]
 
 Points are log-uniform over v~, y~ in [1e-3, 1e3].  Times are of one thread, best of interleaved rounds; errors are
-against fresh solves.  ``--write`` puts the tables and the plot into docs/.
+against fresh solves.  A full run draws build/results/speed_against_error.png.
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
-import argparse
-import csv
 import math
 import os
 import timeit
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numba
 import numpy as np
-import peers
-from marching import march
-from measuring import best_of, markdown, progress, quantity
 from numpy.typing import NDArray
-from peers import Contender
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
+from benchmarks import peers
+from benchmarks.peers import Contender
 from builder.differences import differences
 from builder.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
@@ -39,7 +36,6 @@ CORES = os.cpu_count() or 1
 TRIAL = 2000  # points of the trial that determines the points of one round
 BUDGET = 2.0  # seconds allowed for one round of one contender; slower ones are timed on fewer points
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
-FULL_TREES, QUICK_TREES = ((6, 1e-3), (8, 1e-4), (8, 1e-5), (8, 1e-6), (8, 1e-7), (12, 1e-8)), ((6, 1e-2),)
 HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
 
 
@@ -74,33 +70,13 @@ def draw(n: int, seed: int, low: float = peers.SQUARE[0]) -> tuple[Array, Array]
 
 def tables(threads: int = 1) -> list[Surrogate]:
     """The committed tables, coarse to fine."""
-    opened = [Surrogate.open(path, threads) for path in (measuring.ROOT / "tables").glob("*.nc")]
+    opened = [Surrogate.open(path, threads) for path in (ROOT / "tables").glob("*.nc")]
     return sorted(opened, key=lambda s: -s.tolerance)
 
 
 def spread(error: Array, truth: Array) -> tuple[float, float, float]:
     """Largest and 99 % absolute error and largest relative error."""
     return float(error.max()), float(np.quantile(error, 0.99)), float((error / truth).max())
-
-
-def reference_error() -> tuple[float, float, float]:
-    """Largest and 99 % absolute and largest relative error of a direct solve on the quadruple-precision points."""
-    with open(measuring.ROOT / "tests" / "data" / "points.csv", newline="") as stream:
-        cases = [(float(r["v"]), float(r["y"]), float(r["mu_ratio"])) for r in csv.DictReader(stream)]
-    low, high = peers.SQUARE
-    v, y, truth = np.array([c for c in cases if low <= c[0] <= high and low <= c[1] <= high]).T
-    error = np.abs(solve_chunk("full", np.stack([v, y, y - 1.0], axis=1))[:, 0] - truth)
-    return spread(error, truth)
-
-
-def marching_row(points: int) -> Row:
-    """solve_ivp on a few points, v~ >= 0.01 so that marching ends."""
-    v, y = draw(points, seed=4, low=0.01)
-    got: list[float] = []
-    seconds = timeit.timeit(lambda: got.extend(march(a, b).mu_ratio for a, b in zip(v, y, strict=True)), number=1)
-    truth = solve_chunk("full", np.stack([v, y, y - 1.0], axis=1))[:, 0]
-    errors = spread(np.abs(np.array(got) - truth), truth)
-    return Row(EXACT, "scipy solve_ivp, marched", f"{points} points, v~ >= 0.01", seconds / points * 1e9, *errors)
 
 
 def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
@@ -112,11 +88,6 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
     for n in QUICK_GRIDS if quick else FULL_GRIDS:
         progress(f"grid {n} x {n}")
         found += [(PEER, c) for c in peers.on_grid(peers.solve_grid(sweep, n))]
-    for order, tolerance in QUICK_TREES if quick else FULL_TREES:
-        progress(f"baobzi order {order}, tolerance {tolerance:g}")
-        tree = peers.adaptive(order, tolerance)
-        if tree is not None:
-            found.append((PEER, tree))
     found.append((PEER, Contender("eq. (35), rigid contact", "formula", lambda v, y: closed_forms.outer(y / v), 0, 0)))
     return found
 
@@ -160,13 +131,7 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     ns = timed.best["logs"] / points * 1e9
     rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))
     ns = timed.best["direct"] / len(direct) * 1e9
-    rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns, *reference_error()))
-    progress("solve_ivp")
-    rows.append(marching_row(2 if quick else 40))
-    progress("yardstick")
-    rod = peers.yardstick(20_000 if quick else points, rounds, build=not quick)
-    if rod is not None:
-        rows.append(Row("other", rod.name, "200 x 200", rod.ns, max_rel=rod.max_rel, bytes=rod.bytes))
+    rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns))
     return rows, timed.note()
 
 
@@ -191,32 +156,6 @@ def one_at_a_time(surrogate: Surrogate, number: int) -> str:
         best = min(timeit.repeat(call, number=number, repeat=5)) / number
         rows.append([name, quantity(best * 1e6)])
     return markdown(("one case a call", "microseconds"), rows)
-
-
-def six_columns(points: int, rounds: int, clock: str) -> str:
-    """ns a point of ``evaluate`` on six columns, and with four of them scalars."""
-    v, y = draw(points, seed=3)
-    rng = np.random.default_rng(6)
-    mu0, Fz = rng.uniform(0.1, 0.8, points), 10.0 ** rng.uniform(-1.0, 3.0, points)
-    k, omega = 10.0 ** rng.uniform(4.0, 8.0, points), 10.0 ** rng.uniform(2.0, 6.0, points)
-    length = mu0 * Fz / k
-    y0, v0 = y * length, v * length * omega
-    scale = 0.3 * 10.0 / 1e6
-    y0_fixed, v0_fixed = y * scale, v * scale * 1.3e5
-    columns = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}
-    fixed = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": y0_fixed, "omega": 1.3e5, "v0": v0_fixed}
-    best = {}
-    for threads in (1, CORES):
-        calls: dict[str, Callable[[], object]] = {}
-        for s in tables(threads)[-2:]:
-            six, two = f"**{s.id}** `s.evaluate`, six columns", f"**{s.id}** `s.evaluate`, two columns, four scalars"
-            calls[six] = partial(s.evaluate, **columns)
-            calls[f"{six}, with v~, y~ and l0"] = partial(s.evaluate, **columns, groups=True)
-            calls[two] = partial(s.evaluate, **fixed)
-        found = best_of(rounds, calls, clock if threads == 1 else "wall").best
-        best |= {f"{name}, {threads} thread{'s' * (threads > 1)}": seconds for name, seconds in found.items()}
-    rows = [[name, quantity(s / points * 1e9)] for name, s in best.items()]
-    return markdown(("dimensional batch", "ns/point"), rows)
 
 
 def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
@@ -262,104 +201,59 @@ def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
 
 
 def verdict(rows: list[Row]) -> str:
-    """The peers that beat the tables; one thread against one thread."""
-    ours = [r for r in rows if r.kind == OURS and "threads" not in r.size]
-    theirs = [r for r in rows if r.kind == PEER]
-
-    def listed(found: list[Row], error: Callable[[Row], float]) -> str:
-        found = sorted(found, key=error)
-        text = "; ".join(f"{p.name} {p.size} ({quantity(p.ns)} ns, {quantity(error(p))})" for p in found[:5])
-        return (text + (f"; and {len(found) - 5} with larger errors" if len(found) > 5 else "")) or "none"
-
-    def largest(row: Row) -> float:
-        return row.max_abs
-
-    def usual(row: Row) -> float:
-        return row.p99_abs
-
+    """The peers that beat a table, one thread against one thread: faster, at its largest error or less."""
+    theirs = [row for row in rows if row.kind == PEER]
+    ours = [row for row in rows if row.kind == OURS and "threads" not in row.size]
     lines = []
     for table in ours:
-        for word, error in (("largest", largest), ("99 %", usual)):
-            better = [p for p in theirs if p.ns < table.ns and error(p) <= error(table)]
-            own = f"{quantity(table.ns)} ns, {quantity(error(table))}"
-            lines.append(f"- Faster than {table.name} ({own}) at its {word} error or less: {listed(better, error)}.")
-    quickest = min(ours, key=lambda r: r.ns)
-    faster = [p for p in theirs if p.ns < quickest.ns]
-    lines.append(f"- Faster than the fastest, {quickest.name}, whatever the error: {listed(faster, largest)}.")
+        better = sorted((p for p in theirs if p.ns < table.ns and p.max_abs <= table.max_abs), key=lambda p: p.max_abs)
+        names = "; ".join(f"{p.name} {p.size} ({quantity(p.ns)} ns, {quantity(p.max_abs)})" for p in better)
+        lines.append(f"- Faster than {table.name} ({quantity(table.ns)} ns) at its largest error: {names or 'none'}.")
     beaten = [p for p in theirs if any(t.ns <= p.ns and t.max_abs <= p.max_abs for t in ours)]
     lines.append(f"- One of the tables is both faster and closer than {len(beaten)} of the {len(theirs)} peers.")
     return "\n".join(lines)
 
 
-def headline(rows: list[Row], points: int) -> str:
-    """The section of the README: the tables, each above the fastest peer with no larger error, or the closest peer."""
-    lines = []
-    for table in (r for r in rows if r.kind == OURS and "threads" not in r.size):
-        theirs = [p for p in rows if p.kind == PEER]
-        as_good = [p for p in theirs if p.max_abs <= table.max_abs]
-        peer = min(as_good, key=lambda p: p.ns) if as_good else min(theirs, key=lambda p: p.max_abs)
-        lines.append([f"**{table.name}**", quantity(table.ns), quantity(table.max_abs), f"{table.solves:,}"])
-        word = "fastest peer as close" if as_good else "closest peer"
-        lines.append(
-            [f"{word}: {peer.name}, {peer.size}", quantity(peer.ns), quantity(peer.max_abs), f"{peer.solves:,}"]
-        )
+def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> str:
+    """All methods, where a peer wins, one case a call, the other quantities; and the picture."""
+    points = 20_000 if quick else points
+    numba.set_num_threads(1)
+    rows, note = compare(points, quick, rounds, clock)
+    if not quick:
+        plot(rows, RESULTS / "speed_against_error.png")
     return "\n\n".join(
         [
-            f"{points:,} random points over v~, y~ in [1e-3, 1e3] on one thread; {measuring.processor()}:",
-            markdown(("method", "ns/point", "max abs error of mu~", "solves to build"), lines),
-        ]
-    )
-
-
-def report(rows: list[Row], note: str, extra: list[str], points: int, rounds: int) -> str:
-    """The section of docs/benchmarks.md."""
-    missing = [f"- {name}: {reason}" for name, reason in sorted(peers.MISSING.items())]
-    return "\n\n".join(
-        [
-            measuring.machine("scipy", "xarray", "baobzi", "CoolProp", "interpolation"),
             f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread unless the row states more; "
-            f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves, those of the direct "
-            "solve against quadruple precision. Bytes are those of the data in memory.",
+            f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves. Bytes are "
+            "those of the data in memory.",
             markdown(HEADER, [r.cells() for r in rows], 2),
             "Where a peer wins, and by how much (ns a point and error in brackets):",
             verdict(rows),
-            *extra,
-            *(["Not in this run:", "\n".join(missing)] if missing else []),
+            one_at_a_time(tables()[-1], 200 if quick else 20_000),
+            other_quantities(points, rounds, clock, quick),
         ]
     )
 
 
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--points", type=int, help="points that are timed (1,000,000; quick: 20,000)")
-    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds, the best counts")
-    parser.add_argument("--clock", choices=measuring.CLOCKS, default="wall", help="processor: on a busy machine")
-    parser.add_argument("--quick", action="store_true", help="small grids and few points: a smoke test, no measurement")
-    parser.add_argument("--write", action="store_true", help="put tables and plot into docs/")
-    given = parser.parse_args()
-    if given.quick and given.write:
-        parser.error("--quick cannot be combined with --write")
-    points = given.points or (20_000 if given.quick else 1_000_000)
-    if points < 10_000:
-        parser.error(f"--points must be at least 10,000, got {points}")
-    numba.set_num_threads(1)
-    rows, note = compare(points, given.quick, given.rounds, given.clock)
-    finest = tables()[-1]
-    extra = [
-        one_at_a_time(finest, 200 if given.quick else 20_000),
-        six_columns(points, given.rounds, given.clock),
-        other_quantities(points, given.rounds, given.clock, given.quick),
-    ]
-    text = report(rows, note, extra, points, given.rounds)
-    print(text)
-    if given.write:
-        from plot_speed import plot
+def plot(rows: list[Row], path: Path) -> None:
+    """The picture of all rows: ns a point against the largest error, one line a method."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
-        measuring.write_section("speed_against_error", text)
-        measuring.write_section("headline", headline(rows, points), measuring.ROOT / "README.md")
-        plot(rows, measuring.IMAGES / "speed_against_error.png")
+    figure = Figure(figsize=(9.5, 6.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(xscale="log", yscale="log", ylabel="ns per point, one thread")
+    axes.set_xlabel(r"largest error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000")
+    shown = [row for row in rows if row.max_abs == row.max_abs and "threads" not in row.size]
+    for name in dict.fromkeys("our tables" if row.kind == OURS else row.name for row in shown):
+        line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.name)]
+        own = {"color": "#c1272d", "lw": 2.2} if line[0].kind == OURS else {"lw": 1.0}
+        axes.plot([row.max_abs for row in line], [row.ns for row in line], "o-", label=name, **own)
+    axes.grid(color="#e4e4e4")
+    axes.legend(fontsize=8, ncols=2)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=100, metadata={"Software": None})
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"speed_against_error": speed_against_error}, points=1_000_000, rounds=5, quick=False, clock="wall")

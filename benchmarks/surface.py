@@ -1,18 +1,17 @@
 """The picture of the tabulated function: mu~ over speed and amplitude, with the border of continuous sliding.
 
-python benchmarks/surface.py [--table tables/mumacro-1e-10.nc] [--out docs/img/surface.png]
+python benchmarks/surface.py [OUT]      (default: docs/img/surface.png)
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
-
-import argparse
+import sys
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 
+from benchmarks.measuring import IMAGES
 from mumacro import Surrogate
 
 matplotlib.use("Agg")
@@ -67,15 +66,5 @@ def draw(surrogate: Surrogate, out: Path) -> None:
     plt.close(figure)
 
 
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--table", type=Path, default=measuring.ROOT / "tables" / "mumacro-1e-10.nc")
-    parser.add_argument("--out", type=Path, default=measuring.IMAGES / "surface.png")
-    given = parser.parse_args()
-    draw(Surrogate.open(given.table), given.out)
-    print(given.out)
-
-
 if __name__ == "__main__":
-    main()
+    draw(Surrogate.open(1e-10), Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES / "surface.png")

@@ -9,9 +9,8 @@ from the page, as long as they were measured for the committed table.
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity  # isort: split
 
-import argparse
 import json
 import os
 import re
@@ -19,15 +18,11 @@ import resource
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from measuring import ROOT, markdown, progress, quantity
-
 from mumacro import Surrogate
 
-PAGE = ROOT / "tables" / "README.md"
 HEADER = (
     "table",
     "tolerance",
@@ -43,22 +38,13 @@ COMPANIONS = ("verified_max_stick_error", "verified_max_rel_power_error")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
 
-@dataclass(frozen=True)
-class Built:
-    """Cost of a build from scratch, as text, and whether it gave the committed numbers."""
-
-    seconds: str = "-"
-    processor: str = "-"
-    same: str = "-"
-
-
 def command(tolerance: float, out: str, workers: int | None = None) -> list[str]:
     """Arguments of the interpreter that build a table."""
     words = ["-m", "builder", "build", "--tolerance", f"{tolerance:.0e}".replace("e-0", "e-"), "--out", out]
     return words + ([] if workers is None else ["--workers", str(workers)])
 
 
-def build(table: Surrogate, workers: int) -> Built:
+def rebuilt(table: Surrogate, workers: int) -> list[str]:
     """Build ``table`` again, with the user's command, and delete it."""
     progress(f"building {table.id}")
     with tempfile.TemporaryDirectory() as folder:
@@ -70,23 +56,18 @@ def build(table: Surrogate, workers: int) -> Built:
         seconds, after = perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     own = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     same = json.loads(done.stdout)["content_sha256"] == table.checksum
-    return Built(quantity(seconds, 2), quantity(own, 2), "yes" if same else "no")
+    return [quantity(seconds, 2), quantity(own, 2), "yes" if same else "no"]
 
 
-def kept(page: str, checksum: str) -> Built:
+def kept(page: str, checksum: str) -> list[str]:
     """The measured columns of the row with that checksum, if there is one."""
     found = re.search(rf"^\|[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|\s*`{checksum}`\s*\|$", page, re.MULTILINE)
-    return Built(*(cell.strip() for cell in found.groups())) if found else Built()
+    return [cell.strip() for cell in found.groups()] if found else ["-", "-", "-"]
 
 
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", action="store_true", help="build every table anew and time it")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="threads that solve")
-    parser.add_argument("--write", action="store_true", help="put the table into tables/README.md")
-    given = parser.parse_args()
-    old = measuring.read_section("tables", PAGE)
+def tables(build: bool, workers: int) -> str:
+    """Contents and cost of every committed table."""
+    old = PAGES[-1].read_text("utf-8")
     opened = sorted((Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")), key=lambda s: -s.tolerance)
     rows, builds = [], []
     for s in opened:
@@ -97,22 +78,17 @@ def main() -> None:
                 *(f"{float(str(s.attributes[name])):.2e}" for name in COMPANIONS),
             ]
         )  # fmt: skip
-        b = build(s, given.workers) if given.build else kept(old, s.checksum)
-        builds.append([f"`{s.path.name}`", b.seconds, b.processor, b.same, f"`{s.checksum}`"])
+        cost = rebuilt(s, workers) if build else kept(old, s.checksum)
+        builds.append([f"`{s.path.name}`", *cost, f"`{s.checksum}`"])
     commands = "\n".join(f"    python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened)
     note = re.search(r"^Built anew .*\n.*$", old, re.MULTILINE)
-    if given.build:
-        said = f"Built anew on {given.workers} threads with the program that this page was written with.\n"
-        said += measuring.machine()
-    else:
-        said = note.group() if note else "Not built anew yet."
+    said = note.group() if note else "Not built anew yet."
+    if build:
+        said = f"Built anew on {workers} threads with the program that this page was written with.\n{machine()}"
     points = {int(str(s.attributes["verified_points"])) for s in opened}
     verified = f"Errors are the largest on {' or '.join(f'{n:,}' for n in sorted(points))} fresh solves, off the nodes."
-    text = "\n\n".join([commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)])
-    print(text)
-    if given.write:
-        measuring.write_section("tables", text, PAGE)
+    return "\n\n".join([commands, verified, markdown(HEADER, rows), said, markdown(BUILD_HEADER, builds, 1)])
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"tables": tables}, build=False, workers=os.cpu_count() or 1)

@@ -1,16 +1,13 @@
-"""The numbers of docs/validation.md: every equation of the paper against the full model.
+"""Every equation of the paper against the full model.
 
-    python benchmarks/validation.py [--only SECTION] [--write]
-
-``--write`` replaces the sections between the markers of the page.  A deviation is formula/exact - 1 unless the section
+    python benchmarks/validation.py [--only SECTION] [--write]  A deviation is formula/exact - 1 unless the section
 states otherwise; exact is the solver, or the 1e-12 table where thousands of points are needed.
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import FINEST, ROOT, main, markdown, quantity  # isort: split
 
-import argparse
 import csv
 import math
 from collections.abc import Callable
@@ -18,16 +15,14 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from marching import march
-from measuring import ROOT, markdown, progress, quantity
 from numpy.typing import NDArray
 
+from benchmarks.marching import march
 from builder.steady import border, solve
 from mumacro import Surrogate, closed_forms
 
 Array = NDArray[np.float64]
 Formula = Callable[[Array], Array]
-PAGE = ROOT / "docs" / "validation.md"
 LEVELS = (0.01, 0.05, 0.10)
 WITHIN = ("within 1 %", "5 %", "10 %")
 AMPLITUDES = np.geomspace(1e-3, 1e6, 18_001)
@@ -36,7 +31,7 @@ AMPLITUDES = np.geomspace(1e-3, 1e6, 18_001)
 @cache
 def table() -> Surrogate:
     """The tightest committed table."""
-    return Surrogate.open(ROOT / "tables" / "mumacro-1e-12.nc")
+    return Surrogate.open(FINEST)
 
 
 def percent(x: float) -> str:
@@ -380,21 +375,5 @@ SECTIONS: dict[str, Callable[[], str]] = {
     "summary": summary,
 }
 
-
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", choices=list(SECTIONS), help="one section")
-    parser.add_argument("--write", action="store_true", help="put the numbers into docs/validation.md")
-    given = parser.parse_args()
-    for name, section in SECTIONS.items():
-        if given.only in (None, name):
-            progress(name)
-            text = section()
-            print(f"## {name}\n\n{text}\n", flush=True)
-            if given.write:
-                measuring.write_section(name, text, PAGE)
-
-
 if __name__ == "__main__":
-    main()
+    main(__doc__, SECTIONS)

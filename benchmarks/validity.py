@@ -1,33 +1,29 @@
-"""The numbers of docs/validity.md: effects of neglected partial slip, inertia and rate; typical contacts on the map.
+"""Effects of neglected partial slip, inertia and rate; typical contacts on the map.
 
 python benchmarks/validity.py [--write]
 """
 
 from __future__ import annotations
 
-import measuring  # isort: split
+from benchmarks.measuring import FINEST, main, markdown, quantity  # isort: split
 
-import argparse
 import math
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from measuring import ROOT, markdown, quantity
 
 from mumacro import Surrogate
 from mumacro.settling import settling
 from mumacro.stiffness import Contact, Material, ball_on_flat, flat_punch
 
-PAGE = ROOT / "docs" / "validity.md"
-TABLE = ROOT / "tables" / "mumacro-1e-12.nc"
 STEEL = Material(E=210e9, nu=0.3)
 RANGES = ((0.01, 0.1), (0.1, 0.3), (0.3, 0.67), (0.67, 1.6), (1.6, 5.0), (5.0, 20.0), (20.0, 1000.0))
 
 
 def partial_slip() -> str:
     """Largest change of mu~ between k and 2/3 k, by amplitude and regime."""
-    s = Surrogate.open(TABLE)
+    s = Surrogate.open(FINEST)
     rows = []
     for low, high in RANGES:
         y = np.geomspace(low, high, 121)
@@ -52,7 +48,7 @@ def rate() -> str:
     return markdown(("fastest over slowest slip", *(f"change of mu0 = {m} [%]" for m in (0.2, 0.4, 0.8))), rows)
 
 
-def contacts() -> Iterator[tuple[str, Contact, dict[str, float]]]:
+def contacts() -> Iterator[tuple[str, Contact, dict[str, Any]]]:
     """Contacts of the usual kind at 20 kHz, with assumed, not published, numbers: name, contact, the six inputs."""
     for name, force, contact in (
         ("steel ball, R = 5 mm", 1.0, ball_on_flat(5e-3, 1.0, STEEL, STEEL)),
@@ -67,7 +63,7 @@ def contacts() -> Iterator[tuple[str, Contact, dict[str, float]]]:
 
 def rigs() -> str:
     """The positions of these contacts on the map."""
-    s = Surrogate.open(TABLE)
+    s = Surrogate.open(FINEST)
     rows = []
     for name, contact, case in contacts():
         force, y0, v0 = case["Fz"], case["y0"], case["v0"]
@@ -83,34 +79,6 @@ def rigs() -> str:
     return markdown(header, rows)
 
 
-def draw(out: Path) -> None:
-    """The map with these contacts on it, 800 x 560 pixels: mu~ as isolines, one mark a contact, one shape a load."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    s = Surrogate.open(TABLE)
-    v, y = np.geomspace(0.02, 200.0, 241), np.geomspace(0.05, 200.0, 241)
-    figure = Figure(figsize=(8.0, 5.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    axes.set(xscale="log", yscale="log", xlim=(v[0], v[-1]), ylim=(y[0], y[-1]))
-    mu = s.mu_ratio(v[None, :], y[:, None])
-    lines = axes.contour(v, y, mu, levels=(0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99), colors="#8c959f", linewidths=0.8)
-    axes.clabel(lines, fmt="%g", fontsize=9)
-    axes.plot(s.v_tilde_crit(y), y, color="#c1272d", lw=2.4, label="border of continuous sliding")
-    labels: dict[str, str] = {}
-    shapes = iter("osD^")
-    for name, _, case in contacts():
-        label = f"{name}, {case['Fz']:g} N"
-        first = label not in labels
-        shape = labels.setdefault(label, next(shapes) if first else "")
-        answer = s.evaluate(**case)
-        axes.plot(answer.v_tilde, answer.y_tilde, shape, color="#1f6fb4", ms=8, label=label if first else None)
-    axes.set(xlabel=r"$\tilde v = v_0 k/(\mu_0 F_z \omega)$", ylabel=r"$\tilde y = y_0 k/(\mu_0 F_z)$")
-    axes.legend(loc="lower right", fontsize=9)
-    figure.savefig(out, dpi=100, metadata={"Software": None})
-
-
 SECTIONS: dict[str, Callable[[], str]] = {
     "partial_slip": partial_slip,
     "inertia": inertia,
@@ -118,20 +86,5 @@ SECTIONS: dict[str, Callable[[], str]] = {
     "rigs": rigs,
 }
 
-
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="put the numbers into docs/validity.md")
-    given = parser.parse_args()
-    for name, section in SECTIONS.items():
-        text = section()
-        print(f"## {name}\n\n{text}\n", flush=True)
-        if given.write:
-            measuring.write_section(name, text, PAGE)
-    if given.write:
-        draw(measuring.IMAGES / "contacts.png")
-
-
 if __name__ == "__main__":
-    main()
+    main(__doc__, SECTIONS)

@@ -9,15 +9,14 @@ y~ in the range of the table; and a share of inputs at the ends of the double ra
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-import reporting
-from measuring import markdown, quantity
 from numpy.typing import NDArray
 
+from benchmarks.measuring import main, markdown, quantity
 from builder.limits import V_RANGE, Y_RANGE
 from builder.measure import SEAMS
 from builder.sweep import Sweep
@@ -120,30 +119,26 @@ def monotone(table: Surrogate, share: float) -> Count:
     return count
 
 
-def scale_invariant(table: Surrogate, share: float) -> tuple[Count, Count]:
+def scaled(table: Surrogate, share: float, by_twos: bool) -> Count:
     """(Fz, k) and (v0, omega) by one power of two: the same bits; by any factor: within both bounds."""
-    bits, near = Count(), Count()
+    count = Count()
     for n, seed in parts(N // 2, share):
         cases, rng = draw(n, seed), np.random.default_rng(seed + 2000)
-        one = table.evaluate(cases)
         for pair in (("Fz", "k"), ("v0", "omega")):
-            for factor, count in ((2.0 ** rng.integers(-60, 60, n), bits), (10.0 ** rng.uniform(-20, 20, n), near)):
-                with np.errstate(all="ignore"):
-                    moved = {name: cases[name] * factor for name in pair}
-                # outside the normal range the scaled input itself is rounded
-                kept = np.ones(n, np.bool_)
-                for name in pair:
-                    normal = (moved[name] >= 1e-305) & (moved[name] < 1e305) & (cases[name] >= 1e-305)
-                    kept &= normal | ((cases[name] == 0.0) | np.isinf(cases[name]))
-                given = {name: values[kept] for name, values in {**cases, **moved}.items()}
-                other = table.evaluate(given)
-                change = np.abs(one.mu_macro[kept] - other.mu_macro)
-                if count is bits:
-                    count.add(change != 0.0)
-                else:
-                    first = table.evaluate({name: values[kept] for name, values in cases.items()})
-                    count.add(*excess(first, other, change))
-    return bits, near
+            factor = 2.0 ** rng.integers(-60, 60, n) if by_twos else 10.0 ** rng.uniform(-20, 20, n)
+            with np.errstate(all="ignore"):
+                moved = {name: cases[name] * factor for name in pair}
+            kept = np.ones(n, np.bool_)  # outside the normal range the scaled input itself is rounded
+            for name in pair:
+                normal = (moved[name] >= 1e-305) & (moved[name] < 1e305) & (cases[name] >= 1e-305)
+                kept &= normal | (cases[name] == 0.0) | np.isinf(cases[name])
+            one, other = (
+                table.evaluate({name: values[kept] for name, values in {**cases, **change}.items()})
+                for change in ({}, moved)
+            )
+            change = np.abs(one.mu_macro - other.mu_macro)
+            count.add(*((change != 0.0,) if by_twos else excess(one, other, change)))
+    return count
 
 
 def neighbours(table: Surrogate, share: float) -> Count:
@@ -199,7 +194,7 @@ def same_bits(table: Surrogate, share: float) -> Count:
     one_thread, two_threads = Surrogate.open(table.path, threads=1), Surrogate.open(table.path, threads=2)
     for n, seed in parts(N, share):
         cases, rng = draw(n, seed), np.random.default_rng(seed)
-        given = list(cases.values())
+        given: Any = list(cases.values())
         expected = table.evaluate(cases)
         rows = np.stack([expected.mu_macro, expected.mu_ratio, expected.error_bound, expected.source_code])
 
@@ -215,41 +210,36 @@ def same_bits(table: Surrogate, share: float) -> Count:
         macro, mu, bound, source = table.evaluate_columns(*given)
         count.add(np.any(rows.view(np.uint64) != np.stack([macro, mu, bound, source]).view(np.uint64), axis=0))
         for i in rng.integers(0, n, max(1, n // 50)).tolist():
-            alone = table.evaluate(**{name: float(values[i]) for name, values in cases.items()})
+            case: dict[str, Any] = {name: float(values[i]) for name, values in cases.items()}
+            alone = table.evaluate(**case)
             said = np.array([alone.mu_macro, alone.mu_ratio, alone.error_bound, alone.source_code], np.float64)
             count.add(np.array([np.any(said.view(np.uint64) != rows[:, i].copy().view(np.uint64))]))
     return count
 
 
+PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
+    "finite, in [0, mu0], with a finite bound": finite,
+    "rises with v0, falls with y0 and omega": monotone,
+    "(Fz, k) or (v0, omega) by a power of two: the same bits": partial(scaled, by_twos=True),
+    "(Fz, k) or (v0, omega) by any factor": partial(scaled, by_twos=False),
+    "one input to the next double": neighbours,
+    "on both sides of every seam": seams,
+    "the bound covers a fresh solve, in the solver's range": fresh_solves,
+    "the same bits alone, in any order, as columns, with 1 and 2 threads": same_bits,
+}
+
+
 def promises(share: float) -> str:
     """Every property, for the coarsest and the finest table."""
-    started = time.perf_counter()
     rows = []
     for tolerance in (1e-4, 1e-12):
         table = Surrogate.open(tolerance)
-        scaled: dict[str, tuple[Count, ...]] = {}
-
-        def scales(table: Surrogate, share: float, i: int, scaled: dict[str, tuple[Count, ...]] = scaled) -> Count:
-            if not scaled:
-                scaled["both"] = scale_invariant(table, share)
-            return scaled["both"][i]
-
-        checks: dict[str, Callable[[Surrogate, float], Count]] = {
-            "finite, in [0, mu0], with a finite bound": finite,
-            "rises with v0, falls with y0 and omega": monotone,
-            "(Fz, k) or (v0, omega) by a power of two: the same bits": lambda t, s: scales(t, s, 0),
-            "(Fz, k) or (v0, omega) by any factor": lambda t, s: scales(t, s, 1),
-            "one input to the next double": neighbours,
-            "on both sides of every seam": seams,
-            "the bound covers a fresh solve, in the solver's range": fresh_solves,
-            "the same bits alone, in any order, as columns, with 1 and 2 threads": same_bits,
-        }
-        for name, check in checks.items():
+        for name, check in PROMISES.items():
             found = check(table, share)
             worst = quantity(found.worst) if found.worst else ""
             rows.append([name, f"{tolerance:g}", f"{found.tried:,}", f"{found.broken:,}", worst])
     head = ("property", "table", "tried", "broken", "largest change or error, bound = 1")
-    return f"{markdown(head, rows)}\n\n{reporting.took(started)}"
+    return markdown(head, rows)
 
 
 # --- another processor --------------------------------------------------------------------------------
@@ -268,7 +258,6 @@ def across_processors(n: int, tolerance: float) -> tuple[Array, Array]:
 
 def processors(share: float) -> str:
     """The same cases with and without AVX and fused multiply-add."""
-    started = time.perf_counter()
     rows = []
     for tolerance in (1e-4, 1e-12):
         n = max(1000, int(N * share))
@@ -284,10 +273,10 @@ def processors(share: float) -> str:
                      quantity(float(units)), quantity(float(relative)), f"{sources:,}"])  # fmt: skip
     head = ("table", "cases", "other bits", "outside both bounds", "largest difference, both bounds = 1",
             "largest, relative", "another source")  # fmt: skip
-    return f"{markdown(head, rows)}\n\n{reporting.took(started)}"
+    return markdown(head, rows)
 
 
 SECTIONS = {"promises": promises, "processors": processors}
 
 if __name__ == "__main__":
-    reporting.report(__doc__ or "", SECTIONS)
+    main(__doc__, SECTIONS, share=1.0)

@@ -9,6 +9,7 @@ process, and the longest of these waits.
 from __future__ import annotations
 
 import json
+import resource
 import socket
 import threading
 import time
@@ -17,9 +18,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from http.client import HTTPException
 from typing import Any
 
-import reporting
-from measuring import markdown
-from serving import CASE, Server, open_files, serving
+from benchmarks.measuring import main, markdown
+from tests.serving import CASE, Server, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
 BATCH = "/v1/mu-macro/batch"
@@ -139,7 +139,7 @@ def idle_streams(server: Server, share: float) -> None:
         for _ in range(round(CONNECTIONS * share)):
             stack.enter_context(connect(server)).sendall(text)
         given = {name: value for name, value in CASE.items() if name != "v0"}
-        status, _ = server.ask("POST", "/v1/law", json.dumps({**given, "start": 1e-4, "stop": 1.0}))
+        status, _, _ = server.ask("POST", "/v1/law", json.dumps({**given, "start": 1e-4, "stop": 1.0}))
         assert status == 200, f"/v1/law: {status}"
 
 
@@ -195,7 +195,8 @@ def asking(server: Server, waits: list[float]) -> Iterator[None]:
 def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float, float]:
     """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve afterwards."""
     waits: list[float] = []
-    open_files(8192)
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
     with serving() as server:
         with asking(server, waits):
             attack(server, share)
@@ -206,15 +207,14 @@ def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float,
 
 def attacks(share: float) -> str:
     """All of them."""
-    rows, started = [], time.perf_counter()
+    rows = []
     for attack in ATTACKS:
         memory, wait = tried(attack, share)
         rows.append((str(attack.__doc__).rstrip("."), f"{memory:.0f}", f"{1e3 * wait:.0f}"))
-    table = markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
-    return f"{table}\n\n{reporting.took(started)}"
+    return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
 
 
 SECTIONS = {"attacks": attacks}
 
 if __name__ == "__main__":
-    reporting.report(__doc__ or "", SECTIONS)
+    main(__doc__, SECTIONS, share=1.0)

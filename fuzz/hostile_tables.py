@@ -10,13 +10,13 @@ from typing import Any
 
 import h5py
 import numpy as np
-import reporting
 
+from benchmarks.measuring import ROOT
 from mumacro.cells import nodes
 from mumacro.charts import BORDER_PIECES, CHARTS
 from mumacro.table import Table, read_table, write_table
 
-SMALLEST = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
+SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 Make = Callable[[Path], None]
 
 

@@ -12,17 +12,15 @@ import json
 import math
 import random
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from decimal import Decimal, getcontext
 from pathlib import Path
 from struct import pack, unpack
 
 import numpy as np
-import reporting
-from measuring import markdown
 from numpy.typing import NDArray
 
+from benchmarks.measuring import main, markdown
 from mumacro.files.answering import numbers
 from mumacro.files.columns import find_columns
 from mumacro.files.reading import CsvSource, NdjsonSource, Place
@@ -126,7 +124,6 @@ def compare(texts: list[str], kind: str, folder: Path) -> tuple[int, int, int]:
 
 def number_strings(share: float) -> str:
     """Every kind through both readers."""
-    started = time.perf_counter()
     rows, piece = [], 200_000
     with tempfile.TemporaryDirectory() as folder:
         for name, part in zip(KINDS, SHARES, strict=True):
@@ -137,10 +134,10 @@ def number_strings(share: float) -> str:
                     sums += compare(drawn(min(piece, total - low), low + len(kind), name), kind, Path(folder))
                 rows.append([name, title, f"{sums.sum():,}", *(f"{n:,}" for n in sums)])
     head = ("strings", "reader", "tried", "bits of Python's float", "refused", "another value")
-    return f"{markdown(head, rows, 2)}\n\n{reporting.took(started, 'pyarrow')}"
+    return markdown(head, rows, 2)
 
 
 SECTIONS = {"number_strings": number_strings}
 
 if __name__ == "__main__":
-    reporting.report(__doc__ or "", SECTIONS)
+    main(__doc__, SECTIONS, share=1.0)

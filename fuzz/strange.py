@@ -3,8 +3,8 @@
     python fuzz/strange.py [--only strange_requests] [--share 0.001] [--write]
 
 Most go directly to the application, in separate processes; one in twenty goes over a socket to a running service.
-The seed of a share of the work is its number, so that a failure can be reproduced:
-``python fuzz/strange.py again NUMBER`` runs one share and prints the failing requests.
+The seed of a share of the work is its number, so that a failure can be reproduced: ``--again NUMBER`` runs one share
+and prints the failing requests.
 """
 
 from __future__ import annotations
@@ -15,21 +15,23 @@ import json
 import os
 import random
 import resource
+import socket
 import struct
-import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from http.client import HTTPException, HTTPResponse
+from multiprocessing import get_context
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import orjson
-import reporting
-from measuring import markdown, progress
-from serving import CASE, FAULT, Caller, case, serving
 
-TABLE = reporting.ROOT / "tables" / "mumacro-1e-4.nc"
+from benchmarks.measuring import ROOT, main, markdown, progress
+from tests.serving import CASE, Server, serving
+
+TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
 TOTAL, PART, LIVE = 1_000_000, 10_000, 20  # requests; in a share of work; one of this many over a socket
 HANG_S = 1.0
 FINE = frozenset({200, 206, 304, 400, 401, 404, 405, 408, 413, 415, 416, 422})
@@ -49,6 +51,13 @@ class Request(NamedTuple):
 
 
 # --- valid requests -----------------------------------------------------------------------------------
+
+
+def case(chance: random.Random) -> dict[str, float]:
+    """A random case inside the table's range or near it."""
+    spans = {"mu0": (-1, 0), "Fz": (0, 3), "k": (4, 8), "y0": (-8, -4), "omega": (3, 6), "v0": (-5, 1)}
+    return {name: 10.0 ** chance.uniform(*span) for name, span in spans.items()}
+
 
 INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", "regime_certain", "border")
 
@@ -356,6 +365,13 @@ class Found:
         if fault:
             self.bad.append((fault, repr(request)[:4000]))
 
+    def add(self, other: Found) -> None:
+        """The results of another share."""
+        self.counts += other.counts
+        self.statuses += other.statuses
+        self.slowest, self.memory = max(self.slowest, other.slowest), max(self.memory, other.memory)
+        self.bad += other.bad
+
 
 def resident() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
@@ -377,30 +393,15 @@ async def ask_part(seed: int, count: int) -> Found:
                 status, kind, body = await asyncio.wait_for(ask_app(app, request), 600.0)
                 fault = fault_of(request, status, kind, body)
             except Exception as error:  # any exception is a failure
-                status, fault = 0, f"{type(error).__name__}: {error}"
+                status, fault = 0, f"seed {seed}: {type(error).__name__}: {error}"
             found.note(name, request, status, fault, time.process_time() - started)
     found.memory = resident() - before
     return found
 
 
-def part(seed: int, count: int) -> None:
-    """The same in a separate process, which prints its results."""
-    found = asyncio.run(ask_part(seed, count))
-    print(json.dumps([found.counts, found.statuses, found.slowest, found.memory, found.bad]))
-
-
-def in_other_process(seed: int, count: int, found: Found) -> None:
-    """Run one share of the work in another process, and add its results."""
-    command = [sys.executable, __file__, "part", str(seed), str(count)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=36_000, check=False)
-    if done.returncode:
-        found.bad.append((f"exit code {done.returncode}", f"seed {seed}: {done.stderr[-2000:]}"))
-        return
-    counts, statuses, slowest, memory, bad = json.loads(done.stdout.splitlines()[-1])
-    found.counts.update(counts)
-    found.statuses.update({int(status): count for status, count in statuses.items()})
-    found.slowest, found.memory = max(found.slowest, slowest), max(found.memory, memory)
-    found.bad += [(fault, f"seed {seed}: {text}") for fault, text in bad]
+def part(seed: int, count: int) -> Found:
+    """The same in a process of its own, which may die."""
+    return asyncio.run(ask_part(seed, count))
 
 
 def wire(request: Request) -> bytes:
@@ -411,40 +412,46 @@ def wire(request: Request) -> bytes:
     return b"\r\n".join([*lines, b"content-length: %d" % len(request.body), b"", b""]) + request.body
 
 
-async def ask_live(port: int, seed: int, count: int, found: Found) -> None:
-    """One share of the work over a socket."""
-    caller = Caller(port)
-    for name, request in work(seed, count):
-        if request.method == "HEAD":
-            continue  # HEAD has no body, whatever the header says
-        try:
-            reply = await asyncio.wait_for(caller.ask(wire(request)), 60.0)
-            status, body = reply.status, reply.body
-            if reply.headers.get(b"content-encoding") == b"gzip":
-                body = gzip.decompress(body)
-            fault = fault_of(request, status, reply.headers.get(b"content-type", b""), body)
-        except (*FAULT, TimeoutError) as error:
-            status, fault = 0, f"{type(error).__name__}: {error}"
-        found.note(name, request, status, fault, 0.0)
-    caller.close()
+def ask_live(server: Server, seed: int, count: int) -> Found:
+    """One share of the work over a socket, on one connection as long as the service keeps it."""
+    found = Found()
+    requests = list(work(seed, count))
+    while requests:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=60) as raw:
+            keeps = True
+            while requests and keeps:
+                name, request = requests.pop()
+                status, keeps = 0, False
+                try:
+                    raw.sendall(wire(request))
+                    reply = HTTPResponse(raw, method=request.method)
+                    reply.begin()
+                    status, body, keeps = reply.status, reply.read(), not reply.will_close
+                    if reply.getheader("content-encoding") == "gzip" and body:
+                        body = gzip.decompress(body)
+                    fault = fault_of(request, status, (reply.getheader("content-type") or "").encode(), body)
+                except (OSError, HTTPException, ValueError) as error:
+                    fault = f"{type(error).__name__}: {error}"
+                found.note(name, request, status, fault, 0.0)
+    return found
 
 
-def strange_requests(share: float) -> str:
-    """All kinds, in the application and over a socket."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    started = time.perf_counter()
+def strange_requests(share: float, again: int = 0) -> str:
+    """All kinds, in the application and over a socket; or one share ``again``."""
+    if again:
+        return "\n".join(f"{fault}: {text}" for fault, text in part(again, PART).bad)
     total = max(200, round(TOTAL * share))
     straight = total - total // LIVE
     size = min(PART, -(-straight // (os.cpu_count() or 1)))
+    starts = range(0, straight, size)
     found, live = Found(), Found()
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        starts = range(0, straight, size)
-        list(pool.map(lambda i: in_other_process(i // size + 1, min(size, straight - i), found), starts))
-    with serving("--port", "0", "--tables", str(TABLE)) as server:
+    with ProcessPoolExecutor(mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
+        counts = [min(size, straight - start) for start in starts]
+        for one in pool.map(part, range(1, len(starts) + 1), counts):
+            found.add(one)
+    with serving(TABLE) as server:
         while sum(live.counts.values()) < total // LIVE:
-            seed = 10_000_000 + sum(live.counts.values())
-            asyncio.run(ask_live(server.port, seed, min(1000, total // LIVE), live))
+            live.add(ask_live(server, 10_000_000 + sum(live.counts.values()), min(1000, total // LIVE)))
             if sum(live.counts.values()) <= 1000:
                 before = server.memory()
         grown = server.memory() - before
@@ -454,30 +461,21 @@ def strange_requests(share: float) -> str:
     for fault, text in (found.bad + live.bad)[:50]:
         progress(f"{fault}: {text}")
     rows = [[name, f"{found.counts[name]:,}", f"{live.counts[name]:,}"] for name in KINDS]
-    rows.append(["all", f"{sum(found.counts.values()):,}", f"{sum(live.counts.values()):,}"])
-    statuses = found.statuses + live.statuses
-    told = ", ".join(f"{status}: {count:,}" for status, count in sorted(statuses.items()))
+    told = ", ".join(f"{status}: {count:,}" for status, count in sorted((found.statuses + live.statuses).items()))
     bad = Counter(fault for fault, _ in found.bad + live.bad)
-    text = "" if share == 1.0 else f"{share:.1%} of the full run of {TOTAL:,} requests. "
-    text += (
-        f"Statuses: {told}. Wrong responses, crashes and responses that took more than {HANG_S:.0f} s: "
-        f"{sum(bad.values())}. Slowest {found.slowest:.2f} s of processor time. A process of {size:,} requests took at "
-        f"most {found.memory:.0f} MB more than after its first tenth, the running service {grown:.0f} MB more than "
-        f"after its first thousand; {len(errors)} unexpected errors in its log, exit code {code}."
+    text = (
+        f"{total:,} requests. Statuses: {told}. Wrong responses, crashes and responses that took more than "
+        f"{HANG_S:.0f} s: {sum(bad.values())}. Slowest {found.slowest:.2f} s of processor time. A process of {size:,} "
+        f"requests took at most {found.memory:.0f} MB more than after its first tenth, the running service "
+        f"{grown:.0f} MB more than after its first thousand; {len(errors)} unexpected errors in its log, exit code "
+        f"{code}."
     )
     if bad or errors or code:
         text += f" FAILED: {dict(bad)}"
-    head = ("what is changed", "without a socket", "over a socket")
-    return f"{markdown(head, rows)}\n\n{text}\n\n{reporting.took(started)}"
+    return f"{markdown(('what is changed', 'without a socket', 'over a socket'), rows)}\n\n{text}"
 
 
 SECTIONS = {"strange_requests": strange_requests}
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["part"]:
-        part(int(sys.argv[2]), int(sys.argv[3]))
-    elif sys.argv[1:2] == ["again"]:
-        for fault, text in asyncio.run(ask_part(int(sys.argv[2]), PART)).bad:
-            print(f"{fault}: {text}")
-    else:
-        reporting.report(__doc__ or "", SECTIONS)
+    main(__doc__, SECTIONS, share=1.0, again=0)

@@ -23,11 +23,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import reporting
-from hostile_tables import HOSTILE
-from measuring import markdown, progress
+from benchmarks.measuring import ROOT, main, markdown, progress
+from fuzz.hostile_tables import HOSTILE, SMALLEST
 
-SMALLEST = min((reporting.ROOT / "tables").glob("*.nc"), key=lambda path: path.stat().st_size)
 STEP = 256  # bytes between truncations
 MORE = 256 * 2**20  # bytes of memory allowed for opening a file
 PATIENCE = 3600.0  # seconds for one share of work
@@ -65,8 +63,8 @@ def work(start: int, count: int, change: str, stride: int = 1) -> Iterator[tuple
 
 def in_other_process(*arguments: str, timeout: float = PATIENCE) -> tuple[list[Outcome], int]:
     """Results of the other process, one a line, and its exit code."""
-    command = [sys.executable, __file__, "open", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+    command = [sys.executable, "-m", "fuzz.tables", "open", *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False)
     if done.returncode:
         progress(done.stderr)
     return [Outcome(*json.loads(line)) for line in done.stdout.splitlines()], done.returncode
@@ -126,7 +124,7 @@ def open_all(arguments: Sequence[str]) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     files: Any = ((path, Path(path).read_bytes()) for path in arguments)
     if arguments[0] in CHANGES:
-        files = work(*map(int, arguments[1:3]), arguments[0], int(arguments[3]))
+        files = work(int(arguments[1]), int(arguments[2]), arguments[0], int(arguments[3]))
     for name, image in files:
         print(json.dumps(outcome(image, Path(str(name)), before)), flush=True)
 
@@ -157,15 +155,13 @@ def row(name: str, found: Sequence[Outcome]) -> list[str]:
 
 def damaged_tables(share: float) -> str:
     """Truncations and flipped bytes."""
-    started = time.perf_counter()
     rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
     left_out = "" if share == 1.0 else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
-    return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time. {reporting.took(started, 'h5py')}"
+    return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time."
 
 
-def hostile_tables(_share: float) -> str:
+def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
     """Crafted files, opened by another process; after a crash, a new process continues with the next file."""
-    started = time.perf_counter()
     found: list[Outcome] = []
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{i}.nc" for i in range(len(HOSTILE))]
@@ -182,7 +178,7 @@ def hostile_tables(_share: float) -> str:
         for name, one, size in zip(HOSTILE, found, sizes, strict=True)
     ]
     head = ("content of the file", "result", "reason", "size [kB]", "seconds", "memory so far [MB]")
-    return f"{markdown(head, rows, 3)}\n\n{reporting.took(started, 'h5py')}"
+    return markdown(head, rows, 3)
 
 
 SECTIONS = {"damaged_tables": damaged_tables, "hostile_tables": hostile_tables}
@@ -191,4 +187,4 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["open"]:
         open_all(sys.argv[2:])
     else:
-        reporting.report(__doc__ or "", SECTIONS)
+        main(__doc__, SECTIONS, share=1.0)

@@ -1,22 +1,16 @@
 """Shared by the tests: the committed tables, a service with its client, reference values, solvers, the builder."""
 
 import csv
-import http.client
 import importlib
 import os
 import re
-import signal
 import socket
 import subprocess
 import sys
-import threading
-import time
-import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, Queue
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -26,13 +20,14 @@ from numpy.typing import NDArray
 
 from builder.sweep import Sweep
 from mumacro import Surrogate
+from tests import serving as servers
+from tests.serving import Server
 
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from starlette.testclient import TestClient
 
     from service.app import Application
 
-START_S = 180
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
@@ -96,176 +91,33 @@ def problem() -> Callable[..., dict[str, Any]]:
     return check
 
 
-@dataclass(frozen=True)
-class LiveServer:
-    """A service process on a loopback port."""
-
-    url: str
-    log: Path
-
-
 @pytest.fixture(scope="session")
-def live_server(
-    surrogate: Surrogate, repository: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[LiveServer]:
+def live_server(surrogate: Surrogate) -> Iterator[Server]:
     """One service on the committed tables for all tests that use a real socket and do not stop it."""
-    log = tmp_path_factory.mktemp("live") / "log.jsonl"
-    variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
-    command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path.parent)]
-    with log.open("wb") as sink:
-        process = subprocess.Popen(command, cwd=repository, env=variables, stdout=sink, stderr=subprocess.STDOUT)
-    try:
-        deadline = time.monotonic() + START_S
-        while (found := re.search(r"running on (http://[^ ]+:\d+) ", log.read_text("utf-8"))) is None:
-            assert process.poll() is None, log.read_text("utf-8")
-            assert time.monotonic() < deadline, log.read_text("utf-8")
-            time.sleep(0.05)
-        wait_until_ready(found[1])
-        yield LiveServer(found[1], log)
-    finally:
-        process.terminate()
-        process.wait(timeout=60)
-
-
-def wait_until_ready(url: str) -> None:
-    """Wait until the service at the URL reports that it is ready; it listens earlier."""
-    deadline = time.monotonic() + START_S
-    while True:
-        try:
-            with urllib.request.urlopen(f"{url}/readyz", timeout=60):
-                return
-        except OSError:
-            if time.monotonic() > deadline:
-                raise
-            time.sleep(0.05)
+    with servers.serving(surrogate.path.parent) as server:
+        yield server
 
 
 @pytest.fixture(scope="session")
-def bridge(repository: Path) -> Iterator[str]:
+def serving() -> Callable[..., AbstractContextManager[Server]]:
+    """A separate service process, until the context ends."""
+    return servers.serving
+
+
+@pytest.fixture(scope="session")
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of the example server for UM-Bridge."""
     pytest.importorskip("umbridge", reason="the PyPI package umbridge is not installed")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    process = subprocess.Popen([sys.executable, "examples/umbridge_server.py", str(port)], cwd=repository,
-                               env={**os.environ, "PYTHONPATH": str(repository)}, stdout=-3, stderr=-3)  # fmt: skip
-    try:
-        deadline = time.monotonic() + 60
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", port), timeout=1).close()
-                break
-            except OSError:
-                assert process.poll() is None
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
-        yield f"http://127.0.0.1:{port}"
-    finally:
-        process.terminate()
-        process.wait(timeout=30)
-
-
-class Server:
-    """A service process for one test, and its log."""
-
-    def __init__(self, repository, tables, arguments, environment):
-        command = [sys.executable, "-m", "service", "--port", "0", "--tables", str(tables), *arguments]
-        variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
-        self.process = subprocess.Popen(
-            command,
-            cwd=repository,
-            env={**variables, **environment},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.lines = []
-        self._ports = Queue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-        try:
-            self.port = self._ports.get(timeout=START_S)
-        except Empty:
-            self.port = None
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line)
-            found = re.search(r"running on http://[^ ]+:(\d+) ", line)
-            if found:
-                self._ports.put(int(found[1]))
-        self._ports.put(None)
-
-    def ask(self, method, path, body=None, headers=None, **options):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
-        try:
-            connection.request(method, path, body, headers or {}, **options)
-            response = connection.getresponse()
-            return response.status, dict(response.getheaders()), response.read()
-        finally:
-            connection.close()
-
-    def wait_for_workers(self):
-        """Wait until the port is open: with several workers it is known earlier."""
-        deadline = time.monotonic() + START_S
-        while True:
-            try:
-                return self.ask("GET", "/livez")
-            except ConnectionRefusedError:
-                assert time.monotonic() < deadline, "".join(self.lines)
-                time.sleep(0.1)
-
-    def wait_until_ready(self):
-        """Wait until requests are answered, or refused permanently because of the tables."""
-        deadline = time.monotonic() + START_S
-        while True:
-            self.wait_for_workers()
-            status, _, body = self.ask("GET", "/readyz")
-            if status == 200 or b"not loaded yet" not in body:
-                return
-            assert time.monotonic() < deadline, "".join(self.lines)
-            time.sleep(0.05)
-
-    def wait_for_tables(self, workers):
-        """Wait until this number of workers have logged that their tables are loaded."""
-        deadline = time.monotonic() + START_S
-        while sum("tables are loaded" in line for line in list(self.lines)) < workers:
-            assert time.monotonic() < deadline, "".join(self.lines)
-            time.sleep(0.05)
-        self.wait_until_ready()
-
-    def stop(self, number=signal.SIGTERM):
-        self.process.send_signal(number)
-        return self.wait()
-
-    def wait(self):
-        code = self.process.wait(timeout=60)
-        self._reader.join(timeout=60)
-        self.process.stdout.close()
-        return code
+    command = [sys.executable, "examples/umbridge_server.py", str(port)]
+    with servers.running(command, tmp_path_factory.mktemp("bridge") / "log") as server:
+        yield server.url
 
 
 @pytest.fixture(scope="session")
-def serving(repository: Path) -> Callable[..., AbstractContextManager[Server]]:
-    """A separate service process, until the context ends."""
-
-    @contextmanager
-    def serve(tables: Path, *arguments: str, ready: bool = True, **environment: str) -> Iterator[Server]:
-        server = Server(repository, tables, arguments, environment)
-        try:
-            assert server.port, "".join(server.lines)
-            if ready:
-                server.wait_until_ready()
-            yield server
-        finally:
-            if server.process.poll() is None:
-                server.stop(signal.SIGKILL)
-
-    return serve
-
-
-@pytest.fixture(scope="session")
-def open_page(live_server: LiveServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
+def open_page(live_server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
     """Opens the page in a headless Chromium (tests/browser.py), if installed."""
     module = importlib.import_module("browser")
     try:
@@ -337,3 +189,37 @@ def run_builder(repository: Path) -> Callable[..., subprocess.CompletedProcess[s
         return subprocess.run(words, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
 
     return run
+
+
+# --- nothing is skipped silently ------------------------------------------------------------------------
+
+#: reasons of skips that a run with CI=true may have: what no package index offers there, other users, other systems
+EXPECTED_SKIPS = (
+    r"'?torch'?", r"rumoca", r"soffice is not installed", r"wine64 is not installed", r"curl [\d.]+ has no --json",
+    r"mounting a small file system", r"only root may run", r"another user cannot run",
+    r"this user may write everywhere", r"Python 3\.\d+ is neither on the PATH nor in pyenv",
+    r"the amplitude is not small compared with the speed",
+)  # fmt: skip
+
+
+def unexpected_skips(config: pytest.Config) -> list[str]:
+    """Reasons of skips that are neither above nor about a program that .ci/run could not install."""
+    if os.environ.get("CI") != "true" or hasattr(config, "workerinput"):
+        return []
+    missing = os.environ.get("CI_MISSING", "").split()
+    expected = re.compile("|".join([*EXPECTED_SKIPS, *map(re.escape, missing)]))
+    reports = config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    reasons = {str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr) for report in reports}
+    return sorted(reason for reason in reasons if not expected.search(reason))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """A skip that nobody expected fails the run."""
+    if unexpected_skips(session.config) and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Such skips at the end of the output."""
+    for reason in unexpected_skips(config):
+        terminalreporter.write_line(f"FAILED: an unexpected skip: {reason}", red=True)

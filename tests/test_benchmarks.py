@@ -1,5 +1,6 @@
-"""The scripts behind docs/benchmarks.md: they run, their tables are right, and the page contains them."""
+"""The scripts of benchmarks/: each runs, its tables are right, and results are stored where they belong."""
 
+import importlib
 import re
 import subprocess
 import sys
@@ -7,17 +8,11 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.slow
+from benchmarks import measuring
+from builder.steady import border, solve
+from comparing import close
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "benchmarks.md"
-PAGES = {
-    "solver": PAGE,
-    "speed_against_error": PAGE,
-    "build_cost": PAGE,
-    "cold_start": PAGE,
-    "scale": ROOT / "docs" / "scale.md",
-}
 Row = dict[str, str]
 
 
@@ -47,85 +42,98 @@ def number(cell: str) -> float:
     return float(cell.replace(",", ""))
 
 
+# --- results ------------------------------------------------------------------------------------------
+
+
+def test_a_result_is_stored_and_put_between_its_markers(tmp_path: Path, monkeypatch, capsys) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")
+    monkeypatch.setattr(measuring, "PAGES", (page,))
+    monkeypatch.setattr(measuring, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(sys, "argv", ["benchmarks/trial.py", "--write", "--points", "7"])
+    sections = {"times": lambda points: f"{points} points", "other": lambda points: "elsewhere"}  # noqa: ARG005
+    measuring.main(None, sections, points=5)
+    stored = (tmp_path / "results" / "trial-times.md").read_text("utf-8")
+    assert stored.startswith("7 points\n\nTook 0.0 min. Machine: ")
+    assert page.read_text("utf-8") == f"before\n<!-- begin times -->\n\n{stored}\n<!-- end times -->\nafter\n"
+    assert (tmp_path / "results" / "trial-other.md").exists()
+    assert "## other\n\nelsewhere" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("short", ["--quick", "--share=0.5"])
+def test_short_runs_are_never_stored(short: str, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["trial.py", "--write", short])
+    with pytest.raises(SystemExit):
+        measuring.main(None, {}, quick=False, share=1.0)
+    assert "--write stores full runs only" in capsys.readouterr().err
+
+
+# --- the model ----------------------------------------------------------------------------------------
+
+SLOW = {"model", "angles", "slow_angle", "stiffness", "blocks", "layer", "settle", "cusp", "creep"}
+SECTIONS = [
+    pytest.param(script, name, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
+    for script in ("validation", "validity", "model_facts", "hard_cases")
+    for name in importlib.import_module(f"benchmarks.{script}").SECTIONS
+]
+
+
+@pytest.mark.parametrize(("script", "section"), SECTIONS)
+def test_a_section_is_a_table_of_finite_numbers(script: str, section: str) -> None:
+    found = tables(importlib.import_module(f"benchmarks.{script}").SECTIONS[section]())
+    assert found
+    assert all(found)
+    assert not {"nan", "inf", "-inf"} & {cell for table in found for row in table for cell in row.values()}
+
+
+def test_the_solver_beats_every_naive_number() -> None:
+    hard = importlib.import_module("benchmarks.hard_cases")
+    (roots,) = tables(hard.double_root())
+    assert number(roots[-1]["its rel error"]) > 0.1  # 1 - 1 shortly after the onset
+    assert max(number(row["rel error, root divided out"]) for row in roots) < 1e-13
+    (ends,) = tables(hard.surplus())
+    assert number(ends[1]["max rel error"]) < 1e-14 < number(ends[0]["max rel error"])
+    (rounded,) = tables(hard.exact_eta())
+    assert number(rounded[-1]["rel change of mu~ by rounding y~"]) > 1e-8
+
+
+def test_the_loss_halves_at_the_second_step() -> None:
+    # mu~ approaches 1 around v~ = 1
+    assert solve(1.0, 0.1).deficit / (1.0 - border(0.1)[1]) == close(0.5, abs=0.002)
+
+
+# --- speed --------------------------------------------------------------------------------------------
+
+
 @pytest.fixture(scope="module")
-def printed() -> str:
-    """The output of a quick comparison."""
+def speed() -> list[list[Row]]:
+    """The tables that a quick comparison prints."""
     done = run("speed_against_error", "--quick", "--rounds", "1")
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return tables(done.stdout)
 
 
-@pytest.fixture(scope="module")
-def speed(printed: str) -> list[list[Row]]:
-    """The tables that a quick comparison prints."""
-    return tables(printed)
-
-
-def test_comparison_has_a_row_for_every_method(speed: list[list[Row]]) -> None:
-    names = [row["method"] for row in speed[0]]
-    for path in (ROOT / "tables").glob("*.nc"):
-        assert names.count(f"**{path.stem}**") == 2, "one thread and all cores"
-    for peer in (
-        "scipy RegularGridInterpolator linear",
-        "scipy RegularGridInterpolator cubic, spsolve",
-        "scipy NdBSpline k=5",
-        "scipy RectBivariateSpline.ev k=3",
-        "scipy map_coordinates order 5",
-        "scipy interpn linear",
-        "xarray interp linear",
-    ):
-        assert names.count(peer) == 2, f"{peer}: one row for each of the two grids"
-    assert names.count("eq. (35), rigid contact") == 1
-    assert names.count("direct solve of the full model") == 1
-    assert names.count("scipy solve_ivp, marched") == 1
-
-
+@pytest.mark.slow
 def test_tables_keep_their_tolerance_where_plain_grids_do_not(speed: list[list[Row]]) -> None:
-    for row in speed[0]:
+    comparison, single, quantities = speed
+    assert len(single) == 4
+    for row in comparison:
         name = row["method"].strip("*")
+        assert number(row["ns/point"]) > 0.0
         if name.startswith("mumacro-"):
             tolerance = float(name.removeprefix("mumacro-"))
             assert 0.0 < number(row["max abs error"]) <= tolerance
             assert number(row["max rel error"]) <= 10.0 * tolerance
-        elif " x " in row["data"] and name.startswith(("scipy", "xarray")):
+        elif " x " in row["data"]:
             assert number(row["max abs error"]) > 1e-3, "24 and 48 nodes a side cannot follow the border"
-    by_name = {row["method"]: row for row in speed[0]}
-    assert number(by_name["direct solve of the full model"]["max abs error"]) < 1e-15
-    assert 0.5 < number(by_name["eq. (35), rigid contact"]["max abs error"]) <= 1.0
-
-
-def test_comparison_times_every_row(speed: list[list[Row]]) -> None:
-    comparison, single, batch, quantities = speed
-    assert all(number(row["ns/point"]) > 0.0 for row in comparison + batch)
-    assert all(number(row["microseconds"]) > 0.0 for row in single)
-    assert len(single) == 4
-    assert len(batch) == 12  # two tables, three kinds of columns, one thread and all cores
-    assert len(quantities) == 4 * 4  # four tables: gradient, power, stick fraction, inverse question
-
-
-def test_errors_of_the_other_quantities_lie_below_their_largest_bound(speed: list[list[Row]]) -> None:
-    for row in speed[3]:
-        assert number(row["ns/point"]) > 0.0
+    for path in (ROOT / "tables").glob("*.nc"):
+        names = [row["method"] for row in comparison]
+        assert names.count(f"**{path.stem}**") == 2, "one thread and all cores"
+    for row in quantities:
         assert row["max bound"] == "-" or number(row["max error"]) <= number(row["max bound"])
 
 
-def test_a_peer_that_is_not_installed_is_named(printed: str, speed: list[list[Row]]) -> None:
-    names = [row["method"] for row in speed[0]]
-    for package in ("CoolProp", "baobzi", "interpolation"):
-        answered = any(name.startswith(package) for name in names)
-        assert answered != (f"\n- {package}: " in printed), "either a row or a reason"
-
-
-def test_verdict_follows_from_the_rows(printed: str, speed: list[list[Row]]) -> None:
-    found = re.search(r"both faster and closer than (\d+) of the (\d+) peers", printed)
-    assert found
-    beaten, peers = map(int, found.groups())
-    assert peers == sum(
-        " x " in r["data"] or r["data"].startswith("tol") or r["data"] == "formula" for r in speed[0]
-    ) - ("CoolProp BICUBIC, its own function" in printed)
-    assert 0 <= beaten <= peers
-
-
+@pytest.mark.slow
 def test_linear_peers_agree_with_each_other(speed: list[list[Row]]) -> None:
     linear = ("RegularGridInterpolator linear", "map_coordinates order 1", "interpn linear", "xarray interp linear")
     for size in ("24 x 24", "48 x 48"):
@@ -137,14 +145,14 @@ def test_linear_peers_agree_with_each_other(speed: list[list[Row]]) -> None:
         assert len(errors) == 1, "the same grid, the same interpolant"
 
 
+@pytest.mark.slow
 def test_solver_script_prints_its_tables() -> None:
-    done = run("solver", "--quick", "--points", "200", "--rounds", "1")
+    done = run("solver", "--quick", "--rounds", "1")
     assert done.returncode == 0, done.stderr
     regimes, accuracy, marching, slowing = tables(done.stdout)
     assert [row["regime"] for row in regimes] == ["all", "continuous", "stick-slip"]
-    assert sum(number(row["points"]) for row in regimes) == 2 * 200
+    assert sum(number(row["points"]) for row in regimes) == 2 * 500
     total = accuracy[-1]
-    assert total["kind of point"] == "all"
     assert number(total["points"]) == 496
     assert number(total["max abs error"]) < 1e-15
     assert number(total["failed"]) == 0
@@ -152,60 +160,29 @@ def test_solver_script_prints_its_tables() -> None:
     assert number(slowing[1]["cycles"]) > number(slowing[0]["cycles"])
 
 
-def test_build_cost_script_prints_its_tables() -> None:
-    done = run("build_cost", "--quick", "--workers", "1")
+@pytest.mark.slow
+@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "cold_start --quick", "files --rows 20000"])
+def test_a_script_prints_positive_times(script: str) -> None:
+    done = run(*script.split())
     assert done.returncode == 0, done.stderr
-    (built,), plain = tables(done.stdout)
-    assert built["tolerance"] == "1e-03"
-    assert number(built["verified max abs error"]) <= 1e-3
-    assert number(built["solves, nodes"]) < number(built["solves, all"])
-    assert [row["plain grid"] for row in plain] == ["24 x 24", "48 x 48"]
-    assert number(plain[0]["max abs error"]) > number(plain[1]["max abs error"])
+    for table in tables(done.stdout):
+        for row in table:
+            assert number(list(row.values())[-1 if "files" in script else 1]) > 0.0
 
 
-def test_cold_start_script_prints_its_table() -> None:
-    done = run("cold_start", "--quick")
-    assert done.returncode == 0, done.stderr
-    ((row,),) = tables(done.stdout)
-    assert number(row["time [s]"]) > 0.0
-    assert number(row["processor time [s]"]) > 0.0
-    assert 10.0 < number(row["memory [MB]"]) < 1000.0
-
-
+@pytest.mark.slow
 def test_picture_of_the_surface_is_drawn(tmp_path: Path) -> None:
-    out = tmp_path / "surface.png"
-    done = run("surface", "--out", str(out))
+    done = run("surface", str(tmp_path / "surface.png"))
     assert done.returncode == 0, done.stderr
-    assert out.read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "surface.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("script", PAGES)
-def test_quick_runs_are_never_written_down(script: str) -> None:
-    before = PAGES[script].read_bytes()
-    done = run(script, "--quick", "--write")
-    assert done.returncode == 2
-    assert "--quick cannot be combined with --write" in done.stderr
-    assert PAGES[script].read_bytes() == before
+# --- tables/README.md ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("script", PAGES)
-def test_page_holds_a_full_section_of_each_script(script: str) -> None:
-    page = PAGES[script].read_text(encoding="utf-8")
-    section = page.split(f"<!-- begin {script} -->")[1].split(f"<!-- end {script} -->")[0]
-    assert section.strip().startswith("Machine: "), "what is timed says where"
-    found = tables(section)
-    assert found
-    assert all(found)
+def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
+    from benchmarks.tables_readme import tables as printed
 
-
-def test_page_links_pictures_that_exist() -> None:
-    links = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", PAGE.read_text(encoding="utf-8"))
-    assert links
-    for link in links:
-        assert (PAGE.parent / link).read_bytes().startswith(b"\x89PNG"), link
-
-
-def test_sections_on_the_page_name_the_committed_tables() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    for path in (ROOT / "tables").glob("*.nc"):
-        assert f"**{path.stem}**" in page
+    page = (ROOT / "tables" / "README.md").read_text("utf-8")
+    section = page.split("<!-- begin tables -->")[1].split("<!-- end tables -->")[0]
+    assert printed(build=False, workers=2).strip() in section

@@ -3,10 +3,11 @@
 import math
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from mpmath import mp, mpf, workdps
+from mpmath import ellipk, mp, mpf, pi, workdps
 from numpy.typing import NDArray
 
 from builder.differences import differences
@@ -17,8 +18,6 @@ from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE
 from mumacro.inputs import FIELDS
-
-pytestmark = pytest.mark.slow
 
 Array = NDArray[np.float64]
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
@@ -148,6 +147,7 @@ def test_bounds_are_never_nan_negative_or_missing_at_the_ends_of_double_precisio
 # --- regime -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_regime_that_is_certain_is_that_of_a_fresh_solve(table: Surrogate, sweep: Sweep, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -188,6 +188,7 @@ def covered(table: Surrogate, sweep: Sweep, name: str, v: Array, y: Array) -> tu
     return error, bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITY_NAMES)
 @pytest.mark.parametrize("case", KINDS)
 def test_slopes_lie_within_their_bounds(table: Surrogate, sweep: Sweep, case: str, name: str) -> None:
@@ -198,6 +199,7 @@ def test_slopes_lie_within_their_bounds(table: Surrogate, sweep: Sweep, case: st
     covered(table, sweep, name, v, y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 def test_slopes_of_mu_lie_within_their_bounds_beside_the_border(
     table: Surrogate, sweep: Sweep, distance: float
@@ -242,6 +244,7 @@ def test_the_gradient_and_its_bound_follow_from_the_slopes(fine: Surrogate) -> N
         assert np.all(found.gradient_bound[name] >= 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS)
 def test_the_gradient_lies_within_its_bound_of_differences_of_the_full_model(
     table: Surrogate, sweep: Sweep, field: str
@@ -269,6 +272,28 @@ def test_the_gradient_lies_within_its_bound_of_differences_of_the_full_model(
     scale = columns[field][keep]
     error = np.abs(found.gradient[field][keep] * scale - slope)
     assert np.all(error <= found.gradient_bound[field][keep] * scale + noise)
+
+
+def test_the_gradient_of_rigid_contact_is_that_of_its_closed_form_by_every_input(fine: Surrogate) -> None:
+    """mu_macro = mu0 (2/pi) K(i r), r = y0 omega/v0: differences of 40 digits, input by input."""
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        case: dict[str, Any] = dict(zip(("mu0", "Fz", "y0", "omega", "v0"), 10.0 ** rng.uniform(-3, 3, 5), strict=True))
+        found = fine.evaluate(**case, k=None, gradient=True)
+        with workdps(40):
+
+            def mu(name: str = "mu0", share: float = 1.0, case: dict[str, Any] = case) -> mpf:
+                moved = {key: mpf(value) for key, value in case.items()}
+                moved[name] *= share
+                ratio = moved["y0"] * moved["omega"] / moved["v0"]
+                return moved["mu0"] * 2 / pi * ellipk(-(ratio**2))
+
+            h = mpf(10) ** -12
+            for name, value in case.items():
+                slope = float((mu(name, 1 + h) - mu(name, 1 - h)) / (2 * h * value))
+                assert abs(found.gradient[name] - slope) <= found.gradient_bound[name] + 1e-20 * abs(slope), name
+                assert found.gradient_bound[name] * value <= 1e-13 * found.mu_macro, name
+        assert found.gradient["k"] == 0.0
 
 
 def test_the_gradient_is_that_of_the_answer(fine: Surrogate) -> None:

@@ -2,7 +2,6 @@
 
 import csv
 import importlib
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +30,7 @@ def rows(*quantities: str) -> list[dict[str, Any]]:
 
 def test_the_file_is_the_scripts() -> None:
     pytest.importorskip("mpmath")
-    sys.path.insert(0, str(ROOT / "benchmarks"))
-    try:
-        script = importlib.import_module("check_values")
-    finally:
-        sys.path.remove(str(ROOT / "benchmarks"))
+    script = importlib.import_module("benchmarks.check_values")
     assert FILE.read_text("utf-8") == script.text()
 
 

@@ -26,8 +26,6 @@ from mumacro.charts import (
 from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
 from mumacro.table import read_table
 
-pytestmark = pytest.mark.slow
-
 TOLERANCES = ("1e-4", "1e-7", "1e-10", "1e-12")
 
 
@@ -58,6 +56,7 @@ def test_reference_points_lie_within_tolerance_and_bound(table, reference):
     assert np.all(distance[wrong] <= table.border.max_rel_error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [name for name, _, _ in CASES])
 def test_fresh_solves_lie_within_tolerance_and_bound(table, sweep, case):
     v, y = draw(case, 3000, table, seed=77)
@@ -69,6 +68,7 @@ def test_fresh_solves_lie_within_tolerance_and_bound(table, sweep, case):
     assert np.all(error <= bound + SOLVER_NOISE * truth)
 
 
+@pytest.mark.slow
 def test_bounds_are_not_excessive(table, sweep):
     """In each block the bound is within a factor of 30 of the largest error there."""
     v, y = draw("random", 30_000, table, seed=5)
@@ -127,6 +127,7 @@ def test_one_digit_on_either_side_of_every_region_line(table):
             assert max(mu) - min(mu) <= 2.0 * ABS_TO_REL * table.tolerance * max(mu) + 1e-14
 
 
+@pytest.mark.slow
 def test_slopes_agree_with_differences_of_the_full_model(fine, sweep):
     v, y = draw("random", 2000, fine, seed=9)
     keep = np.abs(np.log(v / fine.v_tilde_crit(y))) > 2e-3  # the stencil must not straddle the border's kink
@@ -178,6 +179,7 @@ def test_gradient_at_the_edges(fine):
     assert still == {"mu0": 1.0, "Fz": 0.0, "k": 0.0, "y0": 0.0, "omega": 0.0, "v0": 0.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["random", "creep", "corner", "seams"])
 def test_power_and_stick_fraction(fine, sweep, case):
     v, y = draw(case, 2000, fine, seed=3)
@@ -199,6 +201,7 @@ def inside(table, sweep, v, y):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [name for name, _, _ in CASES])
 def test_fresh_solves_lie_within_the_bounds_of_power_and_stick_fraction(table, sweep, case):
     v, y = draw(case, 4000, table, seed=78)
@@ -206,6 +209,7 @@ def test_fresh_solves_lie_within_the_bounds_of_power_and_stick_fraction(table, s
     inside(table, sweep, v[at], y[at])
 
 
+@pytest.mark.slow
 def test_bounds_of_power_and_stick_fraction_hold_on_the_border(table, sweep):
     y = np.geomspace(1e-4, 1e12, 120)
     crit = table.v_tilde_crit(y)
@@ -217,6 +221,7 @@ def test_bounds_of_power_and_stick_fraction_hold_on_the_border(table, sweep):
     assert table.stick_fraction_with_bound(2.0 * crit, y)[1].max() == 0.0
 
 
+@pytest.mark.slow
 def test_bounds_of_power_and_stick_fraction_hold_in_the_corner_and_at_creeping_speeds(table, sweep):
     v = np.geomspace(1e-12, 1e-2, 60)[:, None]
     gaps = np.concatenate([-np.geomspace(1e-12, 0.2, 25), [0.0], np.geomspace(1e-12, 0.4, 25)])
@@ -230,6 +235,7 @@ def test_stick_fraction_of_the_reference_lies_within_its_bound(table, reference)
     assert np.all(np.abs(stick - reference.stick_fraction) <= bound + STICK_NOISE)
 
 
+@pytest.mark.slow
 def test_bounds_of_power_and_stick_fraction_are_not_excessive(table, sweep):
     v, y = draw("random", 30_000, table, seed=6)
     solved = sweep.solve("full", v, y)
@@ -250,6 +256,7 @@ def test_bounds_of_power_and_stick_fraction_are_not_excessive(table, sweep):
     assert np.median(of_both["stick"]) <= 30.0
 
 
+@pytest.mark.slow
 def test_known_answers_agree_with_the_model(sweep):
     solved = sweep.solve("full", np.array([0.1, 2.0]), np.array([0.5, 1.0]))["mu_ratio"]
     assert solved[0] == close(KNOWN_STICK_SLIP, abs=2e-16)

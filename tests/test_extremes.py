@@ -18,8 +18,6 @@ from comparing import close
 from mumacro import Surrogate
 from mumacro.closed_forms import outer, second_order
 
-pytestmark = pytest.mark.slow
-
 Array = NDArray[np.float64]
 
 
@@ -170,6 +168,7 @@ def test_the_smallest_slip_speed_is_seen_in_stiff_steps() -> None:
 # --- monotony -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("y", [1e-15, 1e-12, 0.5, 1.0, 1.3, 1e5, 1e14])
 def test_mu_rises_with_speed_over_the_whole_range(y: float, sweep: Sweep) -> None:
     v = np.geomspace(*V_RANGE, 3000)
@@ -178,6 +177,7 @@ def test_mu_rises_with_speed_over_the_whole_range(y: float, sweep: Sweep) -> Non
     assert np.all(np.diff(solved["deficit"]) <= RELATIVE_ERROR * solved["deficit"][1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("v", [1e-60, 1e-40, 1e-18, 1e-3, 1.0, 1e5, 1e10])
 def test_mu_falls_with_amplitude_over_the_whole_range(v: float, sweep: Sweep) -> None:
     y = np.geomspace(*Y_RANGE, 3000)
@@ -228,6 +228,7 @@ def test_error_estimate_covers_the_other_section() -> None:
     assert both > 900
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", [(-3.0, 3.0), (-12.0, 8.0), (-59.9, -12.0), (-59.9, 9.9)])
 def test_error_estimate_covers_neighbouring_doubles(limits: tuple[float, float], sweep: Sweep) -> None:
     rng = np.random.default_rng(8)

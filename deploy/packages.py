@@ -1,0 +1,43 @@
+"""Build the source distribution and wheels into a folder, and check them.
+
+    python deploy/packages.py FOLDER [--all]
+
+One wheel, of this machine; with ``--all`` one of every platform in pyproject.toml, by zig.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def run(*words: str | Path, platform: str = "") -> None:
+    """One command, which must succeed."""
+    print("---", *words, platform, flush=True)
+    subprocess.run(words, cwd=ROOT, env={**os.environ, "MUMACRO_BUILD_PLATFORM": platform}, check=True)  # noqa: S603
+
+
+def build(folder: Path, platforms: Iterable[str]) -> None:
+    """Everything in the folder is new."""
+    shutil.rmtree(folder, ignore_errors=True)
+    run("hatchling", "build", "-t", "sdist", "-d", folder)
+    for platform in platforms:
+        run("hatchling", "build", "-t", "wheel", "-d", folder, platform=platform)
+    run("twine", "check", "--strict", *folder.iterdir())
+    run("check-wheel-contents", *folder.glob("*.whl"))
+    for wheel in folder.glob("*linux*.whl") if sys.platform == "linux" else ():
+        # a folder without libraries: those of this machine must not count
+        run("auditwheel", "show", "--ldpaths", folder, wheel)
+
+
+if __name__ == "__main__":
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
+    try:
+        build(ROOT / sys.argv[1], table["wheels"] if "--all" in sys.argv else [""])
+    except subprocess.CalledProcessError as error:
+        raise SystemExit(f"FAILED: {error}") from None

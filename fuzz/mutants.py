@@ -1,0 +1,189 @@
+"""Faults made by hand: each must make a named test fail.
+
+    python fuzz/mutants.py [--only NAME] [--jobs 2]
+
+A copy of the working tree gets one fault at a time; a fault in C compiles the kernel again; its tests must fail.  First
+the tests of every row run without a fault, and must pass.  Exit code 1 if a fault survives, or its text is not found
+exactly once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import Queue
+from typing import NamedTuple
+
+from benchmarks.measuring import ROOT, markdown, progress
+
+C = "mumacro/kernel/"
+TIGHT = "tests/test_tight_bounds.py"
+
+
+class Fault(NamedTuple):
+    """What is written in place of what, and the pytest arguments of the tests that must fail."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+# fmt: off
+FAULTS = [Fault(*row) for row in (
+    # bounds: half of what they are
+    (C + "closed_forms.c", "*bound = MU_FAST_ROUNDING * first", "*bound = 0.5 * MU_FAST_ROUNDING * first", f"{TIGHT} -k large_speed -m ''"),
+    (C + "closed_forms.c", "#define MU_NEXT_ORDER 1.25", "#define MU_NEXT_ORDER 0.6", f"{TIGHT} -k every_block -m ''"),
+    (C + "closed_forms.c", "#define MU_RIGID_ROUNDING 1e-15 ", "#define MU_RIGID_ROUNDING 0.5e-15 ", f"{TIGHT} -k six_inputs"),
+    (C + "closed_forms.c", "#define MU_STATIC_ROUNDING 4.5e-16", "#define MU_STATIC_ROUNDING 2.2e-16", f"{TIGHT} -k six_inputs"),
+    (C + "records.c", "#define MU_EDGE_LOW 0.7", "#define MU_EDGE_LOW 0.35", f"{TIGHT} -k what_the_border_does"),
+    (C + "records.c", "#define MU_EDGE_HIGH 0.96", "#define MU_EDGE_HIGH 0.48", f"{TIGHT} -k what_the_border_does"),
+    (C + "records.c", "return mu_limit(0.0, cusp, MU_STATIC_LIMIT)", "return mu_limit(0.0, 0.0, MU_STATIC_LIMIT)", "tests/test_bounds.py -k last_digit -m ''"),
+    (C + "points.c", "out.bound = fabs(factor) * errors[0] + errors[1]", "out.bound = 0.5 * fabs(factor) * errors[0] + errors[1]", f"{TIGHT} -k bound_of_a_value"),
+    (C + "passes.c", "bound[i] = fabs(c.factor[i]) * error[0] + error[1]", "bound[i] = 0.5 * fabs(c.factor[i]) * error[0] + error[1]", f"{TIGHT} -k bound_of_a_value"),
+    (C + "dimensional.c", "bound[i] = fabs(c.factor[i]) * error[0] + error[1]", "bound[i] = 0.5 * fabs(c.factor[i]) * error[0] + error[1]", f"{TIGHT} tests/test_surrogate.py -k 'enclosure_holds or bit_for_bit or settling'"),
+    (C + "points.c", "errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b)", "0.5 * (errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b))", f"{TIGHT} -k slopes"),
+    (C + "points.c", "1.0 / (1.0 + 7.0 * (1.0 - u * u))", "0.2 / (1.0 + 7.0 * (1.0 - u * u))", f"{TIGHT} -k slopes"),
+    (C + "points.c", "fabs(factor * q_b) * off / (inside - off)", "0.1 * fabs(factor * q_b) * off / (inside - off)", f"{TIGHT} -k slopes"),
+    (C + "points.c", "*bound = found.bound / v;", "*bound = 0.5 * found.bound;", "tests/test_bounds.py -k 'gradient or slope' -m ''"),
+    (C + "border.c", "data->pieces[MU_PIECE_ERROR] + MU_ROUNDING", "0.5 * data->pieces[MU_PIECE_ERROR] + MU_ROUNDING", f"{TIGHT} -k 'border or regime'"),
+    ("mumacro/inverse/solve.py", "sign * curve.sign * bound", "0.5 * sign * curve.sign * bound", f"{TIGHT} -k enclosure"),
+    ("mumacro/inverse/solve.py", "< 0.97 * beyond.error_bound", "< 0.0 * beyond.error_bound", f"{TIGHT} -k enclosure"),
+    ("mumacro/settling.py", "v * answer.error_bound / friction + power_bound", "0.5 * (v * answer.error_bound / friction + power_bound)", f"{TIGHT} -k settling"),
+    ("mumacro/settling.py", "periods * off / (1.0 - off)", "periods * off", f"{TIGHT} -k settling"),
+    # values
+    (C + "dimensional.c", "slope[4] = mu0 * along / in->omega", "slope[4] = 1e11 * mu0 * along / in->omega", "tests/test_bounds.py -k gradient_of_rigid"),
+    (C + "dimensional.c", "slope[3] = mu0 * along / in->y0", "slope[3] = -mu0 * along / in->y0", "tests/test_bounds.py -k gradient_of_rigid"),
+    (C + "dimensional.c", "slope[5] = -mu0 * along / in->v0", "slope[5] = mu0 * along / in->v0", "tests/test_bounds.py -k gradient_of_rigid"),
+    (C + "dimensional.c", "slope[1] = -mu0 * both / in->Fz", "slope[1] = mu0 * both / in->Fz", "tests/test_bounds.py -k gradient"),
+    (C + "dimensional.c", "slope[0] = found->mu - ", "slope[0] = found->mu + ", "tests/test_bounds.py -k gradient"),
+    (C + "dimensional.c", "const double unit = (in->k / in->Fz) / in->omega", "const double unit = (in->k / in->Fz)", "tests/test_bounds.py -k 'gradient or slope' -m ''"),
+    (C + "dimensional.c", "if (y == 0.0 && in->v0 > 0.0) return mu_case_of(1.0, MU_ROUNDING", "if (y == 0.0 && in->v0 > 0.0) return mu_case_of(0.5, MU_ROUNDING", "tests/test_dimensional.py"),
+    (C + "dimensional.c", "== HUGE_VAL) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT", "== HUGE_VAL) return mu_case_of(1.0, 0.0, MU_STATIC_LIMIT", "tests/test_dimensional.py -k rigid"),
+    (C + "dimensional.c", "if (!(in->y0 >= 0.0 &&", "if (!(in->y0 >= -1.0 &&", "tests/test_dimensional.py -k illegal"),
+    (C + "arithmetic.c", "return mu_scale(above / below, i + j - k - l - m)", "return mu_scale(above / below, i + j - k - l + m)", "tests/test_dimensional.py -k groups"),
+    (C + "closed_forms.c", "if (r < 0.2) {", "if (r < 2.0) {", "tests/test_extremes.py tests/test_surrogate.py -k power"),
+    (C + "closed_forms.c", "out.first = k * q;", "out.first = k * q * (1.0 + 1e-13);", "tests/test_dimensional.py tests/test_tight_bounds.py -k 'rigid or six_inputs'"),
+    (C + "charts.c", "for (int i = 0; i < 3; ++i) {\n        const double slope = 3.0", "for (int i = 0; i < 1; ++i) {\n        const double slope = 3.0", "tests/test_charts.py tests/test_bounds.py -k 'place or corner or inverse'"),
+    (C + "charts.c", "root = sqrt(y), rho = v / at.crit", "root = y, rho = v / at.crit", "tests/test_border.py tests/test_passes.py tests/test_charts.py"),
+    (C + "border.c", "return piece == MU_BORDER_LOW ? 0.5 * y * y : sqrt(y);", "return piece == MU_BORDER_LOW ? y * y : sqrt(y);", "tests/test_charts.py tests/test_border.py tests/test_committed_tables.py"),
+    (C + "passes.c", "few[0][j] = j < rest ? v[i + j] : 1.0;", "few[0][j] = v[i];", "tests/test_passes.py"),
+    (C + "passes.c", "value[i] = mu_min(mu_max(value[i], 0.0), 1.0)", "value[i] = mu_min(mu_max(value[i], 0.0), 0.999999)", "tests/test_surrogate.py tests/test_passes.py"),
+    (C + "passes.c", "left |= MU_WHERE(block >= mu_all_whole(MU_FAST)) | MU_WHERE", "left |= MU_WHERE", "tests/test_passes.py"),
+    (C + "cells.c", "out.w = 2.0 * (z - j) - 1.0", "out.w = 2.0 * (z - j) - 0.9999999", "tests/test_cells.py tests/test_passes.py"),
+    (C + "quantities.c", "return v * (v / y);", "return v / y;", f"{TIGHT} -k 'every_block and power' -m ''"),
+    (C + "quantities.c", "if (factor < 1e-100) return", "if (factor < 1e-300) return", "tests/test_reliability.py -k 'layers or monotone or finite'"),
+    (C + "records.c", "if (v > 0.0 || y > 1.0) return common;\n    return mu_limit(1.0", "if (v > 0.0 || y > 1.0) return common;\n    return mu_limit(0.0", "tests/test_surrogate.py -k companions"),
+    ("mumacro/surrogate.py", "self.border.max_rel_error + 4.0 * charts.ROUNDING", "0.5 * self.border.max_rel_error + 4.0 * charts.ROUNDING", f"{TIGHT} -k regime"),
+    ("mumacro/settling.py", "2.0 * periods, time", "periods, time", "tests/test_settling.py"),
+    ("mumacro/inverse/solve.py", "_Y_CLOSEST = 1.290791", "_Y_CLOSEST = 2.290791", "tests/test_inverse.py"),
+    ("mumacro/inverse/rootfinding.py", "2.0 * np.abs(step) <= np.abs(last[i])", "True", "tests/test_inverse.py tests/test_rootfinding.py"),
+    ("mumacro/law.py", "_CORNER_REACH, _CORNER_TOP = 0.5, 0.7", "_CORNER_REACH, _CORNER_TOP = 0.9, 0.7", "tests/test_law.py tests/test_closed_forms.py"),
+    ("mumacro/closed_forms.py", "1 - q / 20", "1 - q / 21", "tests/test_closed_forms.py -m ''"),
+    ("mumacro/jax.py", "return sum(slope * tangent for", "return -sum(slope * tangent for", "tests/test_derivatives.py -k jax -m ''"),
+    # the builder
+    ("builder/verify.py", "low, high = 1 - 1e-13, 1 + 1e-13", "low, high = 1 + 1e-13, 1 + 1e-13", "tests/test_verify.py -m ''"),
+    # the service
+    ("service/quantities.py", "ENOUGH = 0.1 ", "ENOUGH = 0.2 ", f"{TIGHT} -k standard"),
+    ("service/quantities.py", "SAMPLES = 256", "SAMPLES = 16", f"{TIGHT} -k standard"),
+    ("service/quantities.py", "Part(\"std_bound\"", "Part(\"std_bund\"", f"{TIGHT} -k standard"),
+    ("service/static/page/inputs.js", "(value / 100) * valueOf", "value * valueOf", "tests/test_page_input.py -m ''"),
+)]
+# fmt: on
+
+
+def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    """A command in the copy, with the copy first on the path."""
+    variables = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
+
+
+def tested(folder: Path, tests: str) -> int:
+    """Exit code of pytest: 0 all passed, 1 some failed."""
+    options = ("-q", "-x", "-p", "no:cacheprovider", "-n", "0")
+    return run(folder, sys.executable, "-m", "pytest", *options, *shlex.split(tests)).returncode
+
+
+def tried(folder: Path, fault: Fault) -> str:
+    """What became of a fault in the copy: killed, survived, or why it cannot be tried."""
+    path = folder / fault.file
+    text = path.read_text("utf-8")
+    if (found := text.count(fault.old)) != 1:
+        return f"its text is there {found} times"
+    path.write_text(text.replace(fault.old, fault.new), "utf-8")
+    compiled = path.suffix in (".c", ".h")
+    try:
+        if compiled and run(folder, sys.executable, "hatch_build.py").returncode:
+            return "does not compile"
+        code = tested(folder, fault.tests)
+        return {0: "SURVIVED", 1: "killed"}.get(code, f"pytest ended with {code}")
+    finally:
+        path.write_text(text, "utf-8")
+        if compiled:
+            shutil.copy2(ROOT / "mumacro" / "_kernel.so", folder / "mumacro")
+
+
+def copied(folder: Path) -> Path:
+    """The files of the working tree and the compiled kernel in a folder."""
+    names = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    for name in [
+        *names.stdout.splitlines(),
+        *(f"mumacro/{path.name}" for path in (ROOT / "mumacro").glob("_kernel.*")),
+    ]:
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+    return folder
+
+
+def main() -> int:
+    """Try all faults, or those with a text in file or fault; prints a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", help="faults whose file or text holds this")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--at-once", action="store_true", help="without the run that has no fault")
+    given = parser.parse_args()
+    chosen = [fault for fault in FAULTS if given.only in f"{fault.file} {fault.new}"]
+    with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(given.jobs) as pool:
+        folders: Queue[Path] = Queue()
+        for i in range(given.jobs):
+            folders.put(copied(Path(name) / str(i)))
+
+        def in_a_copy(work: Callable[[Path], str]) -> str:
+            folder = folders.get()
+            try:
+                return work(folder)
+            finally:
+                folders.put(folder)
+
+        def sound(tests: str) -> str:
+            return in_a_copy(lambda folder: "" if tested(folder, tests) == 0 else "its tests fail without it")
+
+        def one(fault: Fault) -> list[str]:
+            what = broken[fault.tests] or in_a_copy(lambda folder: tried(folder, fault))
+            row = [fault.file, fault.new.splitlines()[0], what]
+            progress(" | ".join(row))
+            return row
+
+        suites = list(dict.fromkeys(fault.tests for fault in chosen))
+        results = [""] * len(suites) if given.at_once else pool.map(sound, suites)
+        broken = dict(zip(suites, results, strict=True))
+        rows = list(pool.map(one, chosen))
+    print(markdown(("file", "fault", "result"), rows, 3))
+    killed = sum(row[2] == "killed" for row in rows)
+    print(f"\n{killed} of {len(rows)} killed.")
+    return killed < len(rows)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
