@@ -22,7 +22,7 @@ from scipy.sparse.linalg import spsolve
 import builder
 from builder.sweep import Sweep
 
-__all__ = ["SQUARE", "Contender", "cache", "grid_axis", "on_grid", "solve_grid"]
+__all__ = ["SQUARE", "Contender", "cache", "fitted_to_the_border", "grid_axis", "on_grid", "solve_grid"]
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
@@ -144,3 +144,37 @@ def on_grid(values: Array) -> Iterator[Contender]:
         return np.asarray(labelled.interp(at, assume_sorted=True).values)
 
     yield entry("xarray interp linear", through_xarray)
+
+
+def fitted_to_the_border(sweep: Sweep, n: int) -> Contender:
+    """What an engineer would build who knows of the border: one quintic patch on each side, ``n`` x ``n`` nodes each.
+
+    Along ln y~, and along ln v~ as the share of the way to the border, which is a quintic spline of 4 n nodes.  The
+    corner v~ -> 0, y~ = 1, where three scales meet, gets no coordinate of its own.
+    """
+    low, high = SQUARE
+    fine = np.geomspace(low, high, 4 * n)
+    border = make_interp_spline(np.log(fine), np.log(sweep.solve("border", np.ones_like(fine), fine)["deficit"]), k=5)
+    first = float(np.interp(low, np.exp(border(np.log(fine))), fine))  # the amplitude whose border is at the least v~
+    share = np.linspace(0.0, 1.0, n)
+
+    def patch(axis: Array, end: float, kind: str) -> RectBivariateSpline:
+        crit = border(axis)
+        v = np.exp(crit + np.outer(share, np.log(end) - crit))
+        values = sweep.solve(kind, v, np.broadcast_to(np.exp(axis), v.shape))["mu_ratio"]
+        return RectBivariateSpline(axis, share, values.T, kx=5, ky=5)
+
+    ends = 0.25 * low, 2.0 * high  # beyond the square, so that the shares have no singular end
+    stick = patch(np.linspace(np.log(first), np.log(high), n), ends[0], "full")
+    slide = patch(np.linspace(np.log(low), np.log(high), n), ends[1], "continuous")
+
+    def evaluate(v: Array, y: Array) -> Array:
+        x, at = np.log(y), np.log(v)
+        crit, out = border(x), np.empty(v.size)
+        for spline, end, inside in ((stick, ends[0], at < crit), (slide, ends[1], at >= crit)):
+            way = (at[inside] - crit[inside]) / (np.log(end) - crit[inside])
+            out[inside] = spline.ev(x[inside], way)
+        return out
+
+    size = 2 * n * n + 4 * n
+    return Contender("two quintic patches fitted to the border", f"2 x {n} x {n}", evaluate, 8 * size, size)

@@ -88,6 +88,7 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
     for n in QUICK_GRIDS if quick else FULL_GRIDS:
         progress(f"grid {n} x {n}")
         found += [(PEER, c) for c in peers.on_grid(peers.solve_grid(sweep, n))]
+        found.append((PEER, peers.fitted_to_the_border(sweep, n // 2)))
     found.append((PEER, Contender("eq. (35), rigid contact", "formula", lambda v, y: closed_forms.outer(y / v), 0, 0)))
     return found
 
