@@ -26,8 +26,8 @@ from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
 
 __all__ = [
-    "NO_NULL", "OPTIONS", "Case", "CaseColumns", "CaseQuery", "CaseRequest", "NotNegative", "Options", "OptionsQuery",
-    "Positive", "bounded", "example", "input_fields", "kind_in", "options_of", "query_of", "read_form",
+    "NO_NULL", "OPTIONS", "Case", "CaseColumns", "CaseQuery", "CaseRequest", "Choice", "NotNegative", "Options",
+    "OptionsQuery", "Positive", "bounded", "example", "input_fields", "kind_in", "options_of", "query_of", "read_form",
     "relation", "split_names",
 ]  # fmt: skip
 
@@ -58,7 +58,8 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 _STRICT = ConfigDict(strict=True, extra="forbid")
 NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
-Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model", bound="Choice")
+Asking = TypeVar("Asking", bound="Options")
 
 
 def relation(name: str, reason: str) -> PydanticCustomError:
@@ -131,14 +132,11 @@ class InputStd(_InputStd):
         return given
 
 
-class Options(BaseModel):
-    """The options of a request: everything but its cases."""
+class Choice(BaseModel):
+    """Which contact and which table."""
 
     model_config = _STRICT
 
-    include: Annotated[list[Include], Field(max_length=2 + 2 * len(INCLUDES))] | None = bounded(
-        _INCLUDED, INCLUDE, None
-    )
     contact: ContactName = bounded(f"one of {', '.join(CONTACTS)}", "One spring, or a ball on a flat (Hertz)", "spring")
     direction: DirectionName = bounded(
         f"one of {', '.join(DIRECTIONS)}", "Direction of the oscillation, to that of sliding", "across"
@@ -146,24 +144,36 @@ class Options(BaseModel):
     tolerance: Positive | None = bounded(
         "finite and > 0", "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers", None
     )
-    std: InputStd | None = bounded("an object of numbers", "Standard deviations of the inputs, for include=std", None)
 
     @model_validator(mode="after")
-    def _std_where_asked(self) -> Self:
-        check_std(self)
+    def _together(self) -> Self:
         try:
-            kind = self.kind
+            kind_of(self.contact, self.direction)
         except InputError as error:
             raise relation(error.field, f"must be {error.bound}") from None
-        wrong = "y0" if kind.normal else AMPLITUDE
-        if self.deviations().get(wrong):
-            raise relation("std", f"has {wrong}, which direction {self.direction} does not have")
         return self
 
     @property
     def kind(self) -> Kind:
         """Contact and direction."""
         return kind_of(self.contact, self.direction)
+
+
+class Options(Choice):
+    """The options of a request: everything but its cases."""
+
+    include: Annotated[list[Include], Field(max_length=2 + 2 * len(INCLUDES))] | None = bounded(
+        _INCLUDED, INCLUDE, None
+    )
+    std: InputStd | None = bounded("an object of numbers", "Standard deviations of the inputs, for include=std", None)
+
+    @model_validator(mode="after")
+    def _std_where_asked(self) -> Self:
+        check_std(self)
+        wrong = "y0" if self.kind.normal else AMPLITUDE
+        if self.deviations().get(wrong):
+            raise relation("std", f"has {wrong}, which direction {self.direction} does not have")
+        return self
 
     def check(self, asked: Asked, one: bool = False) -> None:
         """Refuse what ``include`` asks for and such cases do not have; ``model`` is for ``one`` case."""
@@ -239,9 +249,9 @@ def _known(model: type[BaseModel]) -> tuple[str, ...]:
 
 
 def read_form(
-    model: type[Model], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True,
+    model: type[Asking], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True,
     one: bool = False,
-) -> tuple[Model, dict[str, Any], Asked]:  # fmt: skip
+) -> tuple[Asking, dict[str, Any], Asked]:  # fmt: skip
     """The options and the case of a request, and what it is; ``left_out`` are the inputs that it asks for."""
     known = _known(model)
     form, rest, faults = options_of(model, given, known)

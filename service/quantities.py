@@ -227,10 +227,10 @@ def _power(cases: Cases) -> Sequence[Array]:
         Part("settling_bound.periods", "-", "Bound of the absolute error of periods; null also: not known"),
     ),
     cost=5,
-    **dict.fromkeys(("ball", "along", "normal"), "the decay of a disturbance is known for one spring, across"),
+    **dict.fromkeys(("along", "normal"), "how a disturbance decays is derived for across only"),
 )
 def _settling(cases: Cases) -> Sequence[Array]:
-    found = settling(cases.surrogate, **dict(cases.columns))
+    found = settling(cases.surrogate, **{name: cases.columns[name] for name in FIELDS}, **cases.kind.names)
     return found.periods, found.periods_any, found.time, found.slip_path, found.error_bound
 
 

@@ -17,9 +17,9 @@ from mumacro.fitted import Fit, quantile
 from mumacro.inputs import RIGID, is_rigid, number_hint
 from mumacro.measured import STD, UNKNOWNS
 
-from ..case import INPUTS
+from ..case import INPUTS, Asked, stranger
 from ..models import Answered
-from ..options import Options, Positive, bounded, input_fields, options_of
+from ..options import Choice, Positive, bounded, input_fields, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
@@ -33,7 +33,7 @@ _MEASURED = ("mu_macro", STD)
 _COLUMNS = (*INPUTS, AMPLITUDE, *_MEASURED)
 
 
-class FitOptions(Options):
+class FitOptions(Choice):
     """What is asked beside the points."""
 
     unknowns: Annotated[list[Literal["k", "mu0"]], Field(min_length=1, max_length=2)] = bounded(
@@ -45,15 +45,17 @@ async def post_fit(request: Request) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word rigid."""
     given = await given_in_body(request)
     form, points, faults = options_of(FitOptions, given, (*_COLUMNS, *FitOptions.model_fields))
-    faults += [FieldFault.of(name, f"has no effect: {why}") for name, why in _NOT if given.get(name) is not None]
     columns = {name: _column(name, value, faults) for name, value in points.items() if value is not None}
+    if form is not None:
+        asked = Asked(form.kind)
+        twice = [name for name in form.unknowns if name in columns]
+        faults += [FieldFault.of(name, "must be left out: it is among the unknowns") for name in twice]
+        wrong = "y0" if form.kind.normal else AMPLITUDE
+        faults += [FieldFault.of(wrong, stranger(wrong, asked, ()))] if wrong in columns else []
     if form is None or faults:
         refuse(faults)
     table = request.app.state.tables.pick(form.tolerance)
     return await in_thread(request, lambda: reply(dump(_answer(table, form, columns))))
-
-
-_NOT = (("include", "a fit has one answer"),)
 
 
 def _column(name: str, value: Any, faults: list[FieldFault]) -> Any:

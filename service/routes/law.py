@@ -121,7 +121,8 @@ def _answer(table: LoadedTable, form: LawOptions, case: dict[str, float], asked:
 
 def _curve(table: LoadedTable, form: LawOptions, values: Any, case: dict[str, float], asked: Asked) -> dict[str, Any]:
     along = in_si(form.along)
-    law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
+    names: Any = asked.kind.names
+    law = friction_law(table.surrogate, along, values, case, **names)
     include = form.names()
     six = [values if name == along else np.array([case[name]]) for name in asked.fields]
     found, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations(), asked)

@@ -29,6 +29,7 @@ NAMES = (*INPUTS, AMPLITUDE)
 Name: Any = Literal[NAMES]
 FIVE_QUERY: Any = input_fields(optional=INPUTS, null=False, shown=["k"], query=True)
 FIVE: Any = create_model("_Five", **input_fields(optional=INPUTS, shown=[name for name in example if name != "v0"]))
+Regime: Any = Literal[tuple(dict.fromkeys(REGIME_NAMES))]
 Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
 _listed = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
 
@@ -76,10 +77,11 @@ def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -
     per = per_value(form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    names = form.kind.names
+    names: Any = form.kind.names
+    given: Any = case
     if "k_low" in case:  # which is refused, by the name that the user gave
-        case = {**case, "k_range": (case["k_low"], case["k_high"])}
-    solution = solve_for(table.surrogate, in_si(form.unknown), [x * unit for x in form.target], case, within, **names)
+        given = {**case, "k_range": (case["k_low"], case["k_high"])}
+    solution = solve_for(table.surrogate, in_si(form.unknown), [x * unit for x in form.target], given, within, **names)
     more = _included(table, form, solution, case)
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
@@ -151,7 +153,7 @@ class _Root(BaseModel):
     low: float = Field(description="From low ...")
     high: float = Field(description="... to high, mu_macro is the target within the table's error bound")
     mu_macro: float = Field(description="Value of the table there [-]")
-    regime: Literal[tuple(dict.fromkeys(REGIME_NAMES))]
+    regime: Regime
 
 
 Root: Any = create_model("Root", __base__=_Root, __doc__=_Root.__doc__, **included(False))

@@ -13,6 +13,7 @@ from mumacro.geometries import ARGUMENTS, GEOMETRIES, contact_of
 from mumacro.inputs import RIGID, is_rigid, number_hint
 
 from .. import API_VERSION
+from ..options import Positive
 from ..problems import FieldFault, refuse
 from ..wire.json import dump
 from . import Endpoint, given_in_body, reply
@@ -63,13 +64,13 @@ def _finite(value: float) -> bool:
 
 _made: Any = create_model
 _MEANINGS = "; ".join(f"{name}: {about.meaning}" for name, about in GEOMETRIES.items())
-_EXAMPLE = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3}
+_EXAMPLE: dict[str, Any] = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3}
 
 
 def _kind(name: str) -> Any:
     about = ARGUMENTS[name]
-    kind: Any = Literal[about.choices] if about.choices else float
-    kind = float | Annotated[str, Field(pattern=RIGID)] if name in _MODULI else kind
+    kind: Any = Literal[about.choices] if about.choices else float if name.startswith("nu") else Positive
+    kind = Positive | Annotated[str, Field(pattern=RIGID)] if name in _MODULI else kind
     of = [geometry for geometry, known in GEOMETRIES.items() if name in known.arguments]
     told = f"{about.meaning}{f' [{about.unit}]' if about.unit else ''}{f'; of: {chr(44).join(of)}' if of else ''}"
     return (kind, Field(description=told)) if name in ("E", "nu") else (kind | None, Field(None, description=told))
