@@ -245,7 +245,8 @@ def answer_columns(
     if asked == PLAIN:
         macro, ratio, bound, source = surrogate.evaluate_columns(six[0], six[1], six[2], six[3], six[4], six[5], n)
     else:
-        whole = surrogate.evaluate(**dict(zip(asked.fields, six, strict=True)), **names)
+        named: dict[str, Any] = dict(zip(asked.fields, six, strict=True))
+        whole: Any = surrogate.evaluate(**named, **names)
         macro, ratio, bound, source = whole.mu_macro, whole.mu_ratio, whole.error_bound, whole.source_code
         ends = {part.path: getattr(whole, part.path) for part in INTERVAL} if asked.interval else {}
     parts = parts_of(include, asked)[len(DEFAULT) + len(ends) :]

@@ -227,7 +227,8 @@ def _power(cases: Cases) -> Sequence[Array]:
         Part("settling_bound.periods", "-", "Bound of the absolute error of periods; null also: not known"),
     ),
     cost=5,
-    **dict.fromkeys(("along", "normal"), "how a disturbance decays is derived for across only"),
+    along="how a disturbance decays is derived for across only",
+    normal="how a disturbance decays is derived for across only",
 )
 def _settling(cases: Cases) -> Sequence[Array]:
     found = settling(cases.surrogate, **{name: cases.columns[name] for name in FIELDS}, **cases.kind.names)

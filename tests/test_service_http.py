@@ -19,6 +19,8 @@ PATHS = {
     "/v1/mu-macro.txt": "GET, HEAD",
     "/v1/law": "POST",
     "/v1/law.csv": "GET, HEAD",
+    "/v1/stiffness": "POST",
+    "/v1/fit": "POST",
     "/v1/table": "GET, HEAD",
     "/v1/table.nc": "GET, HEAD",
     "/livez": "GET, HEAD",
@@ -211,8 +213,20 @@ def test_the_description_is_whole(client):
     schemas = document["components"]["schemas"]
     found = set(references(document))
     assert {reference.removeprefix("#/components/schemas/") for reference in found} <= set(schemas)
-    assert set(schemas["Case"]["properties"]) == {"mu0", "Fz", "k", "y0", "omega", "f", "v0"}
-    assert set(schemas["Case"]["required"]) == {"mu0", "Fz", "k", "y0", "v0"}
+    assert set(schemas["Case"]["properties"]) == {
+        "mu0",
+        "Fz",
+        "k",
+        "y0",
+        "omega",
+        "f",
+        "v0",
+        "Fz_amplitude",
+        "k_low",
+        "k_high",
+        "k_range",
+    }
+    assert set(schemas["Case"]["required"]) == {"mu0", "Fz", "v0"}
     assert set(schemas["CaseColumns"]["properties"]) == set(schemas["CaseRequest"]["properties"])
     for name, unit in {"mu0": "[-]", "Fz": "[N]", "k": "[N/m]", "y0": "[m]", "omega": "[rad/s]", "v0": "[m/s]"}.items():
         assert unit in schemas["Case"]["properties"][name]["description"]
