@@ -294,7 +294,7 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
             kind = reduce(or_, [*(one for one in kinds if one is not NoneType), NO_NULL])
         fields[key] = (kind, info)
         if key in ("contact", "direction"):  # without a default, which clients would send beside that of a body
-            told = bounded(str(info.json_schema_extra["bound"]), "", None)  # type: ignore[index, call-overload]
+            told = bounded(str(info.json_schema_extra["bound"]), "", None)  # type: ignore[index]
             fields[key] = (kind | NO_NULL, told)
     for key in ("std", "family"):  # objects
         fields.pop(key, None)

@@ -232,9 +232,9 @@ def test_the_description_is_whole(client):
         assert unit in schemas["Case"]["properties"][name]["description"]
     parameters = document["paths"]["/v1/mu-macro"]["get"]["parameters"]
     assert {parameter["name"]: parameter["required"] for parameter in parameters} == {
-        "mu0": True, "Fz": True, "k": True, "y0": True, "omega": False, "f": False, "v0": True, "include": False,
-        "tolerance": False,
-        **{f"std_{name}": False for name in ("mu0", "Fz", "k", "y0", "omega", "f", "v0")},
+        "mu0": True, "Fz": True, "k": False, "y0": False, "omega": False, "f": False, "v0": True, "include": False,
+        "tolerance": False, "contact": False, "direction": False, "Fz_amplitude": False, "k_low": False, "k_high": False,
+        **{f"std_{name}": False for name in ("mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude")},
     }  # fmt: skip
 
 
