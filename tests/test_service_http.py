@@ -233,7 +233,8 @@ def test_the_description_is_whole(client):
     parameters = document["paths"]["/v1/mu-macro"]["get"]["parameters"]
     assert {parameter["name"]: parameter["required"] for parameter in parameters} == {
         "mu0": True, "Fz": True, "k": False, "y0": False, "omega": False, "f": False, "v0": True, "include": False,
-        "tolerance": False, "contact": False, "direction": False, "Fz_amplitude": False, "k_low": False, "k_high": False,
+        "tolerance": False, "contact": False, "direction": False, "Fz_amplitude": False, "k_low": False,
+        "k_high": False,
         **{f"std_{name}": False for name in ("mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude")},
     }  # fmt: skip
 
