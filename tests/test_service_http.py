@@ -19,6 +19,8 @@ PATHS = {
     "/v1/mu-macro.txt": "GET, HEAD",
     "/v1/law": "POST",
     "/v1/law.csv": "GET, HEAD",
+    "/v1/stiffness": "POST",
+    "/v1/fit": "POST",
     "/v1/table": "GET, HEAD",
     "/v1/table.nc": "GET, HEAD",
     "/livez": "GET, HEAD",
@@ -211,16 +213,29 @@ def test_the_description_is_whole(client):
     schemas = document["components"]["schemas"]
     found = set(references(document))
     assert {reference.removeprefix("#/components/schemas/") for reference in found} <= set(schemas)
-    assert set(schemas["Case"]["properties"]) == {"mu0", "Fz", "k", "y0", "omega", "f", "v0"}
-    assert set(schemas["Case"]["required"]) == {"mu0", "Fz", "k", "y0", "v0"}
+    assert set(schemas["Case"]["properties"]) == {
+        "mu0",
+        "Fz",
+        "k",
+        "y0",
+        "omega",
+        "f",
+        "v0",
+        "Fz_amplitude",
+        "k_low",
+        "k_high",
+        "k_range",
+    }
+    assert set(schemas["Case"]["required"]) == {"mu0", "Fz", "v0"}
     assert set(schemas["CaseColumns"]["properties"]) == set(schemas["CaseRequest"]["properties"])
     for name, unit in {"mu0": "[-]", "Fz": "[N]", "k": "[N/m]", "y0": "[m]", "omega": "[rad/s]", "v0": "[m/s]"}.items():
         assert unit in schemas["Case"]["properties"][name]["description"]
     parameters = document["paths"]["/v1/mu-macro"]["get"]["parameters"]
     assert {parameter["name"]: parameter["required"] for parameter in parameters} == {
-        "mu0": True, "Fz": True, "k": True, "y0": True, "omega": False, "f": False, "v0": True, "include": False,
-        "tolerance": False,
-        **{f"std_{name}": False for name in ("mu0", "Fz", "k", "y0", "omega", "f", "v0")},
+        "mu0": True, "Fz": True, "k": False, "y0": False, "omega": False, "f": False, "v0": True, "include": False,
+        "tolerance": False, "contact": False, "direction": False, "Fz_amplitude": False, "k_low": False,
+        "k_high": False,
+        **{f"std_{name}": False for name in ("mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude")},
     }  # fmt: skip
 
 
