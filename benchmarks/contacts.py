@@ -46,9 +46,9 @@ def costs() -> None:
         spring = 0.0
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
-            args = [(np.full(256, a), np.full(256, b)) for a, b in zip(v, amplitude, strict=True)]
+            args = [(np.full(32, a), np.full(32, b)) for a, b in zip(v, amplitude, strict=True)]
             ask = functools.partial(batch.values, 0, s._data, threads=1, kind=kind)
-            each = [best(functools.partial(ask, *pair), 3) / 256 for pair in args]
+            each = [best(functools.partial(ask, *pair), 9) / 32 for pair in args]
             mixed = best(functools.partial(ask, v, amplitude)) / v.size
             spring = spring or mixed
             told = f"mixed {1e9 * mixed:7.0f} ns, {mixed / spring:6.1f} springs; median {np.median(each) / spring:6.1f}"

@@ -2,7 +2,8 @@
 
 mu~ along a ray of k (v~ and y~ are both proportional to it) is not monotone: it falls from 1, may rise again, by up to
 0.0087 per unit of ln k, and falls to its limit of rigid contact.  So the extremes may lie inside; where the slope
-changes its sign between two samples, bisection finds them.
+changes its sign between two samples, bisection finds them.  Both turns begin in one point, for one spring at
+y~ = 9.72 v~, so they may stand between two samples, which the cubic through these then shows.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ __all__ = ["BOUND", "ENDS", "as_ends", "extremes", "middle", "without_interval"]
 Array = NDArray[np.float64]
 ENDS = ("k_low", "k_high")  # columns that hold an interval
 BOUND = "two stiffnesses [N/m] with 0 < low <= high, both finite"
-SPACING = 0.1  # of samples, in ln k: slopes keep their sign over more than a unit of it
+SPACING = 0.1  # of samples, in ln k
 HALVINGS = 20  # of a spacing, until mu_macro next to an extreme is flat to 1e-14
 
 
@@ -102,24 +103,46 @@ def extremes(
     count = 1 + max(1, math.ceil(largest / SPACING)) if largest > 0.0 else 1
     least, most, bound = np.full(low.size, np.inf), np.full(low.size, -np.inf), np.zeros(low.size)
 
-    def take(k: Array, where: NDArray[np.intp]) -> Array:
+    def take(k: Array, where: NDArray[np.intp]) -> tuple[Array, Array]:
         mu, error, slope = evaluate(k, where)
         least[where] = np.fmin(least[where], mu)
         most[where] = np.fmax(most[where], mu)
         bound[where] = np.fmax(bound[where], error)
-        return slope
+        return mu, slope
 
-    before, slope_before = low, take(low, places)
+    def close_in(left: Array, right: Array, sign: Array, where: NDArray[np.intp]) -> None:
+        """Takes points ever closer to a turn, left of which the slope has this sign."""
+        for _ in range(HALVINGS if where.size else 0):
+            half = np.sqrt(left) * np.sqrt(right)
+            same = take(half, where)[1] * sign > 0.0
+            left, right = np.where(same, half, left), np.where(same, right, half)
+
+    before, (mu_before, slope_before) = low, take(low, places)
     for i in range(1, count):
         here = high if i == count - 1 else low * np.exp(ratio * (i / (count - 1)))
-        slope = take(here, places)
+        mu, slope = take(here, places)
         turns = np.flatnonzero(slope_before * slope < 0.0)
-        left, right, sign = before[turns], here[turns], slope_before[turns]
-        for _ in range(HALVINGS if turns.size else 0):
-            half = np.sqrt(left) * np.sqrt(right)
-            same = take(half, turns) * sign > 0.0
-            left, right = np.where(same, half, left), np.where(same, right, half)
-        before, slope_before = here, slope
+        close_in(before[turns], here[turns], slope_before[turns], turns)
+        share = _between(mu - mu_before, slope_before * np.log(here / before), slope * np.log(here / before))
+        pairs = np.flatnonzero(share > 0.0)
+        inside = before[pairs] * (here[pairs] / before[pairs]) ** share[pairs]
+        turned = take(inside, pairs)[1] * slope[pairs] < 0.0 if pairs.size else pairs > 0
+        pairs, inside = pairs[turned], inside[turned]
+        close_in(before[pairs], inside, slope_before[pairs], pairs)
+        close_in(inside, here[pairs], -slope[pairs], pairs)
+        before, mu_before, slope_before = here, mu, slope
     illegal = np.isnan(ratio) | (least > most)
     least[illegal] = most[illegal] = np.nan
     return least, most, bound
+
+
+def _between(rise: Array, first: Array, last: Array) -> Array:
+    """Where two turns may hide between samples whose slopes have the same sign: the place of the extreme slope.
+
+    That of the cubic with this rise and these slopes over an interval of 1, where it has the other sign; else 0.
+    """
+    with np.errstate(all="ignore"):
+        bend, fall = 3.0 * (first + last - 2.0 * rise), 6.0 * rise - 4.0 * first - 2.0 * last
+        place = -0.5 * fall / bend
+        hidden = (first * last > 0.0) & (place > 0.0) & (place < 1.0) & ((first + 0.5 * fall * place) * first < 0.0)
+    return np.where(hidden, place, 0.0)

@@ -55,6 +55,17 @@ def test_extremes_inside(table, kind):
     assert found.mu_macro_high >= max(most, *both) - 1e-9
 
 
+@pytest.mark.parametrize("ratio", [9.725, 9.735, 9.75, 9.8])
+def test_turns_closer_than_samples(table, ratio):
+    """Where both turns have just begun, an interval that ends between them, or next to them."""
+    ray = {"mu0": 1.0, "Fz": 1.0, "y0": ratio, "omega": 1.0, "v0": 1.0}
+    for end in np.exp(np.linspace(-0.5, -0.3, 21)):
+        found = table.evaluate(k_range=(end * np.exp(-0.31), end), **ray)
+        some = table.evaluate(k=end * np.exp(np.linspace(-0.31, 0.0, 5001)), **ray).mu_macro
+        assert found.mu_macro_low <= some.min() + found.error_bound
+        assert found.mu_macro_high >= some.max() - found.error_bound
+
+
 def test_a_point_and_normal(table):
     found = table.evaluate(k_range=(1e6, 1e6), **CASE)
     assert found.mu_macro_low == found.mu_macro == found.mu_macro_high == table.evaluate(k=1e6, **CASE).mu_macro

@@ -144,6 +144,7 @@ def test_extreme_steps_keep_the_limit(way) -> None:
             x, y = contact.step(dx, dy)
             assert math.isfinite(x)
             assert math.hypot(x, y) <= 3.0 * (1.0 + 1e-15)
+    assert Element(0.3, 10.0, 1.0).step(1e-310, 1e-310) == (1e-310, 1e-310)  # whose squares are below it, too
     assert Element(1e-300, 1e-300, 1.0).step(1.0, 1.0) == (0.0, 0.0)  # mu0 Fz is below double range
 
 

@@ -11,6 +11,7 @@ import pytest
 from builder.export import export_table
 from comparing import close
 from mumacro import Surrogate
+from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.inputs import FIELDS
 
 pytestmark = pytest.mark.slow
@@ -86,16 +87,19 @@ def test_a_simulation_follows_its_inputs(unit, fmpy, table, kind):
     assert set(found["regime"]) == {0, 1}
 
 
-def instance(fmpy, unit, folder):
-    """The unit, loaded and initialised, and its variables by name."""
+def instance(fmpy, unit, folder, choices=None):
+    """The unit, loaded and initialised with parameters, and its variables by name."""
     description = fmpy.read_model_description(str(unit))
     folder = fmpy.extract(str(unit), str(folder))
     made = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
     if description.fmiVersion == "2.0":
         made.setupExperiment(startTime=0.0)
+    at = {v.name: v.valueReference for v in description.modelVariables}
+    for name, value in (choices or {}).items():
+        (made.setInteger if description.fmiVersion == "2.0" else made.setInt64)([at[name]], [value])
     made.enterInitializationMode()
     made.exitInitializationMode()
-    return made, {v.name: v.valueReference for v in description.modelVariables}
+    return made, at
 
 
 def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
@@ -116,6 +120,44 @@ def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
         adjoint = made.getAdjointDerivative([at["mu_macro"]], [at[name] for name in FIELDS], [2.0], len(FIELDS))
         assert adjoint == close([2.0 * answer.gradient[name] for name in FIELDS], rel=1e-9)
     made.terminate()
+    made.freeInstance()
+
+
+@pytest.mark.parametrize(
+    ("contact", "direction"), [("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
+)
+def test_contacts_and_directions(unit, fmpy, table, tmp_path, contact, direction):
+    kind = {"contact": CONTACTS.index(contact), "direction": DIRECTIONS.index(direction)}
+    time = np.linspace(0.0, 1.0, 21)
+    given = np.array(list(zip(time, 10.0 ** (-4.0 + 5.0 * time), strict=True)), dtype=[("time", float), ("v0", float)])
+    found = fmpy.simulate_fmu(
+        str(unit), fmi_type="CoSimulation", stop_time=1.0, output_interval=0.05, input=given,
+        output=["v0", "mu_macro", "y_tilde", "source"], start_values={**kind, "Fz_amplitude": 4.0},
+    )  # fmt: skip
+    case = {name: value for name, value in CASE.items() if direction != "normal" or name != "y0"}
+    case |= {"Fz_amplitude": 4.0} if direction == "normal" else {}
+    answer = table.evaluate({**case, "v0": found["v0"]}, contact=contact, direction=direction, groups=True)
+    assert np.allclose(found["mu_macro"], answer.mu_macro, rtol=1e-13, atol=0.0)
+    assert np.allclose(found["y_tilde"], answer.y_tilde, rtol=1e-15, atol=0.0)
+    assert np.array_equal(found["source"], answer.source_code)
+    made, at = instance(fmpy, unit, tmp_path, kind)
+    second = hasattr(made, "setReal")
+    put, choose, chosen = (
+        (made.setReal, made.setInteger, made.getInteger) if second else (made.setFloat64, made.setInt64, made.getInt64)
+    )
+    assert chosen([at[name] for name in kind]) == list(kind.values())
+    put([at["Fz_amplitude"]], [4.0])
+    exact = table.evaluate(case, contact=contact, direction=direction, gradient=True).gradient
+    for name in (*FIELDS, "Fz_amplitude"):
+        assert made.getDirectionalDerivative([at["mu_macro"]], [at[name]], [1.0]) == close(
+            [exact.get(name, 0.0)], rel=1e-9
+        )
+    for name, wrong in (("contact", -1), ("contact", 2), ("direction", -1), ("direction", 3), ("source", 0)):
+        with pytest.raises(Exception, match="status 3"):
+            choose([at[name]], [wrong])
+    choose([at["contact"], at["direction"]], [1, 2])
+    with pytest.raises(Exception, match="status 2"):  # a ball whose normal force oscillates
+        (made.getReal if second else made.getFloat64)([at["mu_macro"]])
     made.freeInstance()
 
 

@@ -11,6 +11,7 @@ from comparing import close
 from mumacro import Surrogate, batch, charts
 from mumacro.cells import outer_cells
 from mumacro.charts import CHARTS, RHO_MAX, SIGMA_CUT, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
+from mumacro.contact import put_rules
 from mumacro.library import Kernel, kernels
 
 Array = NDArray[np.float64]
@@ -198,3 +199,30 @@ def test_every_level_with_fused_multiply_add_gives_the_same_bits(table: Surrogat
         else:
             for ours, theirs in zip((value, bound, source, slopes), best, strict=True):
                 np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("kind", [(1, 0), (0, 1), (1, 1), (0, 2)], ids=["ball", "along", "ball-along", "normal"])
+def test_contacts_and_directions_have_the_same_bits(table: Surrogate, kind: tuple[int, int]) -> None:
+    """On every level with fused multiply-add, in an array and alone: all 17 rows, of cases and their neighbours."""
+    rng, n = np.random.default_rng(13), 1500
+    six = [10.0 ** rng.uniform(low, high, n) for low, high in ((-1, 0), (0, 2), (4, 9), (-9, -2), (1, 6), (-7, 2))]
+    if kind[1] == 2:
+        six[3] = six[1] * rng.uniform(0.0, 1.0, n)
+    six[5][:20], six[3][20:40], six[2][40:60] = 0.0, 0.0, np.inf
+    put_rules(table._data, table.tolerance)
+
+    def asked(kernel: Kernel, part: slice) -> list[Array]:
+        columns = [np.ascontiguousarray(column[part]) for column in six]
+        rows, source = np.empty((17, columns[0].size)), np.empty(columns[0].size, np.int8)
+        kernel.cases(table._data, source.size, columns, rows, source, kind=kind)
+        return [rows, source]
+
+    best = asked(kernels[-1], slice(None))
+    assert np.unique(best[1]).size >= 4
+    for kernel in kernels[1:] or kernels:
+        for ours, theirs in zip(asked(kernel, slice(None)), best, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+        for i in range(0, n, 5):
+            alone = asked(kernel, slice(i, i + 1))
+            np.testing.assert_array_equal(alone[0][:, 0], best[0][:, i])
+            assert alone[1][0] == best[1][i]

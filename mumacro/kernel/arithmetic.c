@@ -50,7 +50,7 @@ static double mu_log1(double x) {
 /* sqrt(x^2 + y^2) of what may not be squared, to the last digit: the root's own error is taken out of it. */
 static double mu_hypot(double x, double y) {
     const double larger = mu_max(fabs(x), fabs(y)), smaller = mu_min(fabs(x), fabs(y));
-    const double scale = larger > 1e150 ? 1e-160 : smaller < 1e-140 ? 1e140 : 1.0;
+    const double scale = larger > 1e150 ? 1e-160 : larger < 1e-280 ? 1e300 : smaller < 1e-140 ? 1e140 : 1.0;
     const double a = larger * scale, b = smaller * scale;
     double h, d, excess;
     if (larger == HUGE_VAL || smaller <= larger * 1e-17) return larger;

@@ -1,12 +1,14 @@
-/* Every entry of the kernel under sanitizers: random, nasty and illegal inputs, with a real table and with tables of
+/* Every entry of the kernel and of mumacro.h under sanitizers: random, nasty and illegal inputs, with a real table and with tables of
  * nonsense.  Arrays are allocated to the last number, so that one too many is seen.  Prints how much was asked. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #define MUMACRO_LEVEL base
 #include "level.c"
+#include "mumacro.h"
 
 extern const mumacro_export mumacro_table;
+#include "interface.c"
 
 static const double nasty[] = {
     -1.0, -0.0, 0.0, 5e-324, 1e-310, 1e-160, 1.0, 1e160, 1.7976931348623157e308, HUGE_VAL, -HUGE_VAL, NAN,
@@ -80,6 +82,10 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         for (int quantity = 0; quantity < 3; ++quantity)
             kernel->values_as(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value, bound, source);
     }
+    for (int quantity = 0; quantity < 3; ++quantity) {
+        kernel->partials(data, quantity, n, v, y, value, bound);
+        kernel->bends(data, quantity, n < FEW ? n : FEW, v, y, value, bound, again);
+    }
     free(value), free(bound), free(again), free(rows), free(source);
 }
 
@@ -109,6 +115,51 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     free(rows[0]), free(rows[1]), free(rows[2]), free(source);
 }
 
+/* Steps of n contacts of a few springs, whose forces are what x holds. */
+static void ask_elements(const mumacro_kernel *kernel, int64_t n, double *const *x) {
+    const int springs = 1 + (int)(drawn() * 5.0);
+    double *held = nonsense(2 * (size_t)(n * springs)), *sums = numbers(2 * (size_t)n);
+    for (int step = 0; step < 3; ++step) kernel->element_steps(n, springs, x[0], x[2], x[3], x[5], held, sums);
+    free(held), free(sums);
+}
+
+/* One case through the functions of mumacro.h, of the real table: the bits of arrays, and what they promise. */
+static void ask_calls(const mumacro_kernel *kernel, const double *x, double v_rest) {
+    static const int64_t strides[6] = {0, 0, 0, 0, 0, 0};
+    const double *const columns[6] = {x, x + 1, x + 2, x + 3, x + 4, x + 5};
+    const double size = mumacro_force(x[5], v_rest, x[0], x[1], x[2], x[3], x[4]);
+    double held[8] = {0.0}, *sum = numbers(2);
+    mumacro_answer *answer = (mumacro_answer *)malloc(sizeof *answer);
+    mumacro_cycle cycle;
+    int8_t source;
+    if (answer == NULL) exit(2);
+    for (int contact = -1; contact <= MU_CONTACTS; ++contact)
+        for (int direction = -1; direction <= MU_DIRECTIONS; ++direction) {
+            const int error = mumacro_evaluate_as(contact, direction, x[0], x[1], x[2], x[3], x[4], x[5], answer);
+            double rows[17];
+            if ((error != 0) != (answer->source < 0) || (error != 0) != (answer->mu_macro != answer->mu_macro))
+                wrong("an answer beside its error");
+            if (mumacro_error_text(error)[0] == 'e') wrong("the text of an error");
+            if (error < 0) continue;
+            if (contact + direction == 0) kernel->cases(&mumacro_table.data, 1, columns, strides, 17, rows, 1, &source);
+            else kernel->cases_as(&mumacro_table.data, contact, direction, 1, columns, strides, 17, rows, 1, &source);
+            if (answer->source != source || differ(answer->mu_macro, rows[0])) wrong("evaluate_as");
+            for (int i = 0; i < 6; ++i)
+                if (differ(answer->gradient[i], rows[5 + i])) wrong("the gradient of evaluate_as");
+        }
+    if (differ(size, -mumacro_force(-x[5], v_rest, x[0], x[1], x[2], x[3], x[4]))) wrong("a force that is not odd");
+    if (fabs(size) > x[0] * x[1]) wrong("a force beyond mu0 Fz");
+    mumacro_evaluate_cycle(x[0], x[1], x[2], x[3], x[4], x[5], &cycle);
+    for (int springs = 0; springs <= 4; ++springs) {
+        memset(held, 0, sizeof held);
+        for (int step = 0; step < 3; ++step)
+            if (mumacro_element_step(springs, x[0], x[1], x[2], x[3], x[5], held, sum) == 0 &&
+                !(mu_hypot(sum[0], sum[1]) <= x[0] * x[1] * (1.0 + 1e-12) + 1e-307))
+                wrong("an element beyond its limit");
+    }
+    free(sum), free(answer);
+}
+
 /* What the builder calls. */
 static void ask_builder(const mumacro_kernel *kernel, int64_t n, const double *v, const double *y) {
     double *one = numbers((size_t)n), *two = numbers((size_t)n), *rows = numbers(5 * (size_t)n);
@@ -128,6 +179,13 @@ static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int6
     for (int64_t j = 0; j < n; ++j)
         for (int i = 0; i < 6; ++i) columns[i][i == single ? 0 : j] = number(i);
     ask_cases(kernel, data, n, columns, single);
+    if (single < 0) ask_elements(kernel, n, columns);
+    if (single < 0 && data == &mumacro_table.data)
+        for (int64_t j = 0; j < n && j < FEW; ++j) {
+            double x[6];
+            for (int i = 0; i < 6; ++i) x[i] = columns[i][j];
+            ask_calls(kernel, x, drawn() < 0.2 ? anything() : x[5] * scaled(-2.0, 2.0));
+        }
     if (single < 0) ask_points(kernel, data, n, columns[5], columns[3]);
     if (single < 0) ask_builder(kernel, n, columns[5], columns[3]);
     for (int i = 0; i < 6; ++i) free(columns[i]);

@@ -50,13 +50,15 @@ EXPORT Status fmi3DoStep(ME, double time, double step, bool keeps, bool *event, 
 EXPORT Status fmi3GetNumberOfEventIndicators(ME, size_t *n) { return *n = 0, OK; }
 EXPORT Status fmi3GetNumberOfContinuousStates(ME, size_t *n) { return *n = 0, OK; }
 
+FOR_ALL(fmi3GetInt32, int32_t, get_whole(m, at[i], value + i))
+
+RETURNS(NONE, SetInt32, ME, AT, const int32_t value[], size_t values)
 NO_VALUES(Float32, float)
 NO_VALUES(Int8, int8_t)
 NO_VALUES(UInt8, uint8_t)
 NO_VALUES(Int16, int16_t)
 NO_VALUES(UInt16, uint16_t)
 NO_VALUES(UInt32, uint32_t)
-NO_VALUES(Int64, int64_t)
 NO_VALUES(UInt64, uint64_t)
 RETURNS(NONE, GetBinary, ME, AT, size_t size[], const uint8_t *value[], size_t values)
 RETURNS(NONE, SetBinary, ME, AT, const size_t size[], const uint8_t *const value[], size_t values)

@@ -1,7 +1,8 @@
-/* What FMI 2.0 and 3.0 share; MUMACRO_FMI is 2 or 3.  The model has no states, events, clocks or parameters, so most
- * functions of the standards have nothing to do.
- * Value references, as in modelDescription.xml: 0 is the time (3.0 only), 1 to 6 are the inputs; then come mu_macro and
- * mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source. */
+/* What FMI 2.0 and 3.0 share; MUMACRO_FMI is 2 or 3.  The model has no states, events or clocks, so most functions of
+ * the standards have nothing to do.
+ * Value references, as in modelDescription.xml: 0 is the time (3.0 only), 1 to 7 are the inputs, the last of them
+ * Fz_amplitude; then come mu_macro and mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source, and the
+ * parameters contact and direction. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -20,39 +21,42 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* what a standard passes and this model has no use for */
 #endif
 
-enum { TIME, INPUTS = 6, MU_MACRO, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE };
+enum { TIME, Y0 = 4, INPUTS = 7, MU_MACRO, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE, CONTACT, DIRECTION };
+enum { CONTACTS = 2, DIRECTIONS = 3 };
 typedef enum { OK, WARNING, DISCARD, ERROR } Status;
 typedef const char *String;
 typedef uint32_t Reference;
 
 #if MUMACRO_FMI == 2
-typedef int Boolean;
+typedef int Boolean, Choice;
 typedef void (*Logger)(void *environment, String instance, Status status, String category, String text, ...);
 #define FMI(name) fmi2##name
 #define STATE(before, after) fmi2##before##FMUstate##after
 #define DESERIALIZE fmi2DeSerializeFMUstate
 #define GET_NUMBERS fmi2GetReal
 #define SET_NUMBERS fmi2SetReal
-#define GET_WHOLES fmi2GetInteger
-#define SET_WHOLES SetInteger
+#define GET_CHOICES fmi2GetInteger /* and other integers */
+#define SET_CHOICES fmi2SetInteger
 #define SIZE(name) /* 3.0 gives the length of arrays of values, too */
 #define SHORTER(name, n) 0
 #else
 typedef bool Boolean;
+typedef int64_t Choice;
 typedef void (*Logger)(void *environment, Status status, String category, String text);
 #define FMI(name) fmi3##name
 #define STATE(before, after) fmi3##before##FMUState##after
 #define DESERIALIZE fmi3DeserializeFMUState
 #define GET_NUMBERS fmi3GetFloat64
 #define SET_NUMBERS fmi3SetFloat64
-#define GET_WHOLES fmi3GetInt32
-#define SET_WHOLES SetInt32
+#define GET_CHOICES fmi3GetInt64 /* of enumerations */
+#define SET_CHOICES fmi3SetInt64
 #define SIZE(name) , size_t name
 #define SHORTER(name, n) (name < n)
 #endif
 
 typedef struct {
     double time, x[INPUTS];
+    int contact, direction;
     int known; /* whether answer belongs to x */
     mumacro_answer answer;
 } State;
@@ -83,11 +87,15 @@ static void say(Logger logger, void *environment, String name, Status status, St
 #endif
 }
 
+/* The input in whose place its amplitude goes: that of the normal force, or y0; the other one has no influence. */
+static Reference amplitude(const Instance *m) { return m->state.direction == MUMACRO_NORMAL ? INPUTS : Y0; }
+
 /* OK when the inputs are legal; else DISCARD, and the log says which is not. */
 static Status answered(ME) {
     const double *x = m->state.x;
     if (!m->state.known) {
-        const int error = mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], &m->state.answer);
+        const int error = mumacro_evaluate_as(m->state.contact, m->state.direction, x[0], x[1], x[2],
+                                              x[amplitude(m) - 1], x[4], x[5], &m->state.answer);
         m->state.known = error == 0;
         if (error) say(m->logger, m->environment, m->name, DISCARD, mumacro_error_text(error));
     }
@@ -117,6 +125,25 @@ static Status get_whole(ME, Reference variable, int32_t *value) {
     return OK;
 }
 
+static Status get_choice(ME, Reference variable, Choice *value) {
+#if MUMACRO_FMI == 2
+    if (variable == REGIME || variable == SOURCE) return get_whole(m, variable, value);
+#endif
+    if (variable != CONTACT && variable != DIRECTION) return ERROR;
+    *value = variable == CONTACT ? m->state.contact : m->state.direction;
+    return OK;
+}
+
+static Status set_choice(ME, Reference variable, Choice value) {
+    const int count = variable == CONTACT ? CONTACTS : variable == DIRECTION ? DIRECTIONS : 0;
+    if (value < 0 || value >= count) {
+        say(m->logger, m->environment, m->name, ERROR, mumacro_error_text(MUMACRO_NO_CONTACT));
+        return ERROR;
+    }
+    *(variable == CONTACT ? &m->state.contact : &m->state.direction) = (int)value;
+    return m->state.known = 0, OK;
+}
+
 static Status set_number(ME, Reference variable, double value) {
     if (variable <= TIME || variable > INPUTS) return ERROR;
     return m->state.x[variable - 1] = value, m->state.known = 0, OK;
@@ -128,7 +155,7 @@ static Status add_slope(ME, Reference output, Reference input, double seed, doub
     double slope;
     if ((output != MU_MACRO && output != MU_RATIO) || input <= TIME || input > INPUTS) return ERROR;
     if (answered(m) != OK) return DISCARD;
-    slope = a->gradient[input - 1];
+    slope = input == amplitude(m) ? a->gradient[Y0 - 1] : input == Y0 || input == INPUTS ? 0.0 : a->gradient[input - 1];
     if (output == MU_RATIO) slope = (slope - (input == 1 ? a->mu_ratio : 0.0)) / m->state.x[0];
     if (seed != 0.0) *sum += seed * slope;
     return OK;
@@ -137,7 +164,7 @@ static Status add_slope(ME, Reference output, Reference input, double seed, doub
 /* --- an instance ---------------------------------------------------------------------------------------------- */
 
 EXPORT Status FMI(Reset)(ME) {
-    static const State start = {.x = MUMACRO_FMU_STARTS};
+    static const State start = {.x = MUMACRO_FMU_STARTS}; /* a spring, across */
     return m->state = start, OK;
 }
 
@@ -190,7 +217,8 @@ EXPORT Status DESERIALIZE(ME, const void *bytes, size_t size, void **kept) {
     }
 FOR_ALL(GET_NUMBERS, double, get_number(m, at[i], value + i))
 FOR_ALL(SET_NUMBERS, const double, set_number(m, at[i], value[i]))
-FOR_ALL(GET_WHOLES, int32_t, get_whole(m, at[i], value + i))
+FOR_ALL(GET_CHOICES, Choice, get_choice(m, at[i], value + i))
+FOR_ALL(SET_CHOICES, const Choice, set_choice(m, at[i], value[i]))
 
 EXPORT Status FMI(GetDirectionalDerivative)(ME, const Reference unknowns[], size_t n, const Reference knowns[],
                                             size_t k, const double seeds[] SIZE(seeded), double out[] SIZE(outs)) {
@@ -214,7 +242,6 @@ RETURNS(OK, Terminate, ME)
     RETURNS(NONE, Set##name, ME, AT, type const value[] SIZE(values))
 NO_VALUES(Boolean, Boolean)
 NO_VALUES(String, String)
-RETURNS(NONE, SET_WHOLES, ME, AT, const int32_t value[] SIZE(values))
 RETURNS(NONE, SetContinuousStates, ME, const double x[], size_t n)
 RETURNS(NONE, GetContinuousStates, ME, double x[], size_t n)
 RETURNS(NONE, GetEventIndicators, ME, double x[], size_t n)

@@ -1,8 +1,10 @@
 """``--format fmu``: a table as a Functional Mock-up Unit, FMI 2.0 or 3.0, made of the C header; no Python inside.
 
-Inputs are mu0, Fz, k, y0, omega, v0; outputs mu_macro and mu_ratio with directional derivatives by all inputs; beside
-them error_bound, v_tilde, y_tilde, regime and source.  Model Exchange and Co-Simulation.  An illegal input makes a
-simulator's call return "discard", with the reason in its log.
+Inputs are mu0, Fz, k, y0, omega, v0 and Fz_amplitude; outputs mu_macro and mu_ratio with directional derivatives by
+all inputs; beside them error_bound, v_tilde, y_tilde, regime and source.  The parameters contact and direction are
+enumerations, in the order of :data:`mumacro.contact.CONTACTS` and ``DIRECTIONS``; Fz_amplitude counts for direction
+normal alone, y0 for the others.  Model Exchange and Co-Simulation.  An illegal input makes a simulator's call return
+"discard", with the reason in its log.
 
 The unit holds its sources, the binary of the machine it is made on, and where zig is installed those of Linux and
 Windows for 64-bit Intel and AMD; without any compiler the sources alone.
@@ -20,7 +22,8 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from mumacro import charts
-from mumacro.inputs import FIELDS, UNITS
+from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS
+from mumacro.inputs import UNITS
 from mumacro.table import Table
 from mumacro.version import __version__
 
@@ -29,17 +32,23 @@ from ..source import compiled, header_text, zig
 __all__ = ["fmu2", "fmu3"]
 
 _HERE = Path(__file__).parent
-STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01, AMPLITUDE: 0.0}
 OPTIONS = ("-O2", "-std=c99", "-fPIC", "-shared", "-fvisibility=hidden")
 _TEXTS = {
     "mu0": "Coulomb friction coefficient", "Fz": "normal force", "k": "tangential stiffness; infinite: rigid contact",
-    "y0": "amplitude of the transverse oscillation", "omega": "angular frequency of the oscillation",
-    "v0": "sliding speed", "mu_macro": "macroscopic friction coefficient", "mu_ratio": "mu_macro / mu0",
+    "y0": "amplitude of the oscillation, across or along",
+    "omega": "angular frequency of the oscillation", "v0": "sliding speed",
+    AMPLITUDE: "amplitude of the normal force, for direction normal",
+    "mu_macro": "macroscopic friction coefficient", "mu_ratio": "mu_macro / mu0",
     "error_bound": "bound of the absolute error of mu_macro", "v_tilde": "v0 k / (mu0 Fz omega)",
-    "y_tilde": "y0 k / (mu0 Fz)", "regime": ", ".join(f"{i}: {name}" for i, name in enumerate(charts.REGIMES)),
+    "y_tilde": "y0 k / (mu0 Fz); normal: Fz_amplitude / Fz",
+    "regime": ", ".join(f"{i}: {name}" for i, name in enumerate(charts.REGIMES)),
     "source": ", ".join(f"{i}: {name}" for i, name in enumerate(charts.SOURCES)),
+    "contact": "one spring, or a ball on a flat: k is that before slip",
+    "direction": "of the oscillation: across the sliding direction, along it, or of the normal force (not of a ball)",
 }  # fmt: skip
 _OUTPUTS, _WHOLE = ("mu_macro", "mu_ratio"), ("regime", "source")
+_CHOICES: dict[str, tuple[str, ...]] = {"contact": CONTACTS, "direction": DIRECTIONS}
 _UNITS = """<UnitDefinitions>
 <Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit><Unit name="N/m"><BaseUnit kg="1" s="-2"/></Unit>
 <Unit name="m"><BaseUnit m="1"/></Unit><Unit name="rad/s"><BaseUnit s="-1" rad="1"/></Unit>
@@ -63,7 +72,7 @@ def fmu3(table: Table) -> bytes:
 
 
 def _unit(table: Table, version: int) -> bytes:
-    starts = ", ".join(repr(STARTS[name]) for name in FIELDS)
+    starts = ", ".join(map(repr, STARTS.values()))
     sources = {name: (_HERE / name).read_text("ascii") for name in ("instance.h", f"fmu{version}.c")}
     sources["instance.h"] = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n" + sources["instance.h"]
     sources["mumacro.h"] = header_text(table)
@@ -109,7 +118,7 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
 
 def _description(version: int, token: str) -> str:
     """modelDescription.xml."""
-    second, first = version == 2, len(FIELDS) + 1
+    second, first = version == 2, len(STARTS) + 1
     token_name, state, able = (
         ("guid", "canGetAndSetFMUstate", "providesDirectionalDerivative") if second
         else ("instantiationToken", "canGetAndSetFMUState", "providesDirectionalDerivatives")
@@ -117,14 +126,15 @@ def _description(version: int, token: str) -> str:
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="{version}.0" modelName="mumacro" {token_name}="{token}"'
-        ' description="Macroscopic friction of a contact that is oscillated transversely to its sliding direction"'
+        ' description="Macroscopic friction of a contact that is oscillated"'
         f' version="{__version__}" license="Apache-2.0" generationTool="mumacro {__version__}"'
         f' variableNamingConvention="flat"{" numberOfEventIndicators=" + quoteattr("0") if second else ""}>',
     ]
     for kind, extra in (("ModelExchange", ""), ("CoSimulation", ' canHandleVariableCommunicationStepSize="true"')):
         inside = '<SourceFiles><File name="fmu2.c"/></SourceFiles>' if second else ""
         lines.append(f'<{kind} modelIdentifier="mumacro" {state}="true" {able}="true"{extra}>{inside}</{kind}>')
-    lines += [_UNITS, '<DefaultExperiment startTime="0" stopTime="1"/>', "<ModelVariables>"]
+    lines += [_UNITS, "<TypeDefinitions>", *(_type(second, name) for name in _CHOICES), "</TypeDefinitions>"]
+    lines += ['<DefaultExperiment startTime="0" stopTime="1"/>', "<ModelVariables>"]
     if not second:
         lines.append('<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>')
     lines += [_variable(second, name, reference) for reference, name in enumerate(_TEXTS, 1)]
@@ -137,17 +147,32 @@ def _description(version: int, token: str) -> str:
     return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>", ""])
 
 
+def _type(second: bool, name: str) -> str:
+    """The enumeration of a parameter."""
+    items = "".join(f'<Item name="{item}" value="{i}"/>' for i, item in enumerate(_CHOICES[name]))
+    if second:
+        return f'<SimpleType name="{name}"><Enumeration>{items}</Enumeration></SimpleType>'
+    return f'<EnumerationType name="{name}">{items}</EnumerationType>'
+
+
 def _variable(second: bool, name: str, reference: int) -> str:
-    kind = "input" if name in STARTS else "output" if name in _OUTPUTS else "local"
+    kind = "input" if name in STARTS else "output" if name in _OUTPUTS else "parameter" if name in _CHOICES else "local"
+    varies = "discrete" if name in _WHOLE else "fixed" if name in _CHOICES else "continuous"
+    held = "Enumeration" if name in _CHOICES else "Real" if second else "Float64"
+    if name in _WHOLE:
+        held = "Integer" if second else "Int32"
     about = (
         f'name="{name}" valueReference="{reference}" description={quoteattr(_TEXTS[name])} causality="{kind}"'
-        f' variability="{"discrete" if name in _WHOLE else "continuous"}"'
+        f' variability="{varies}"'
     )
-    value = "" if UNITS.get(name, "-") == "-" else f' unit="{UNITS[name]}"'
+    unit = "N" if name == AMPLITUDE else UNITS.get(name, "-")
+    value = "" if unit == "-" else f' unit="{unit}"'
     if name in STARTS:
         value += f' start="{STARTS[name]!r}" min="0"'
+    elif name in _CHOICES:
+        value = f' declaredType="{name}" start="0"'
     else:
         about += ' initial="calculated"'
     if second:
-        return f"<ScalarVariable {about}><{'Integer' if name in _WHOLE else 'Real'}{value}/></ScalarVariable>"
-    return f"<{'Int32' if name in _WHOLE else 'Float64'} {about}{value}/>"
+        return f"<ScalarVariable {about}><{held}{value}/></ScalarVariable>"
+    return f"<{held} {about}{value}/>"
