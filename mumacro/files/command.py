@@ -17,8 +17,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from mumacro.command import OneLineParser, open_table
 from mumacro.files.columns import FilesError
 from mumacro.files.evaluation import Evaluation
-from mumacro.files.reading import SEPARATORS, one_line
+from mumacro.files.reading import one_line
 from mumacro.files.run import evaluate_files
+from mumacro.separators import SEPARATORS
 
 __all__ = ["main"]
 
