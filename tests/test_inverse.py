@@ -270,7 +270,7 @@ def test_the_approximations_hold_where_they_should(surrogate):
     def compare(name, case, **ranges):
         values = sweep_values("v0", *ranges["v0"], 31, "log")
         law = friction_law(surrogate, "v0", values, others(case, "v0"))
-        approximation = approximations(surrogate, law, others(case, "v0"))[name]
+        approximation = approximations(surrogate, law)[name]
         return np.max(np.abs(approximation - law.answer.mu_macro)) / case["mu0"]
 
     unit = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 1.0}
@@ -287,13 +287,13 @@ def test_the_approximations_hold_where_they_should(surrogate):
 def test_an_approximation_is_nan_outside_its_stated_range(surrogate):
     values = sweep_values("v0", 1e-3, 10.0, 11, "log")
     law = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 1e-5})  # y~ = 3.3
-    found = approximations(surrogate, law, {**others(CASE, "v0"), "y0": 1e-5})
+    found = approximations(surrogate, law)
     assert found.keys() == APPROXIMATIONS.keys()
     assert np.isnan(found["small_amplitude"]).all()
     assert np.isnan(found["corner"]).all()
     assert np.isfinite(found["rigid"]).all()
     rigid = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "k": None})
-    found = approximations(surrogate, rigid, {**others(CASE, "v0"), "k": None})
+    found = approximations(surrogate, rigid)
     assert found["rigid"] == close(rigid.answer.mu_macro, rel=1e-14)
     assert np.isnan(found["creep"]).all()
     assert np.isnan(found["continuous"]).all()
@@ -306,7 +306,7 @@ def test_an_approximation_is_nan_outside_its_stated_range(surrogate):
 def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate, along):
     values = sweep_values(along, 0.1 * CASE[along], 10.0 * CASE[along], 31, "log")
     law = friction_law(surrogate, along, values, others(CASE, along))
-    speeds = border_speeds(surrogate, law, others(CASE, along))
+    speeds = border_speeds(surrogate, law)
     assert speeds.keys() == BORDERS.keys()
     v0 = values if along == "v0" else CASE["v0"]
     assert ((v0 >= speeds["exact"]) == (law.answer.regime == "continuous")).all()
@@ -320,7 +320,7 @@ def test_what_never_sticks_has_no_border(surrogate):
     values = sweep_values("v0", 1e-3, 10.0, 5, "log")
     for changed in ({"k": None}, {"y0": 0.0}, {"omega": 0.0}):
         case = {**others(CASE, "v0"), **changed}
-        for column in border_speeds(surrogate, friction_law(surrogate, "v0", values, case), case).values():
+        for column in border_speeds(surrogate, friction_law(surrogate, "v0", values, case)).values():
             assert (column == 0.0).all()
 
 

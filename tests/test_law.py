@@ -26,8 +26,8 @@ def columns(surrogate, y, v):
     """Law, approximations and borders (as v~) at the amplitude y~ over v~ = ``v``."""
     case = {**UNIT, "y0": y * LENGTH}
     law = friction_law(surrogate, "v0", np.asarray(v) * LENGTH * 3.0, case)
-    borders = border_speeds(surrogate, law, case)
-    return law, approximations(surrogate, law, case), {name: x / (LENGTH * 3.0) for name, x in borders.items()}
+    borders = border_speeds(surrogate, law)
+    return law, approximations(surrogate, law), {name: x / (LENGTH * 3.0) for name, x in borders.items()}
 
 
 def test_every_equation_number_names_a_column() -> None:
@@ -94,7 +94,7 @@ def test_extreme_inputs_give_numbers_or_nan_and_no_warning(surrogate, along) -> 
     values = sweep_values(along, 1e-300 if along != "v0" else 0.0, 1e300, 41, "log" if along != "v0" else "linear")
     others = {name: value for name, value in case.items() if name != along}
     law = friction_law(surrogate, along, values, others)
-    for column in (*approximations(surrogate, law, others).values(), *border_speeds(surrogate, law, others).values()):
+    for column in (*approximations(surrogate, law).values(), *border_speeds(surrogate, law).values()):
         assert column.shape == values.shape
     top = law.values if along == "mu0" else 0.3
     assert (law.answer.mu_macro <= top).all()
@@ -106,5 +106,5 @@ def test_rigid_contact_is_given_as_none_or_infinity(surrogate) -> None:
     for stiffness in (None, math.inf):
         case = {"mu0": 0.3, "Fz": 10.0, "k": stiffness, "y0": 2e-6, "omega": 1.3e5}
         law = friction_law(surrogate, "v0", values, case)
-        assert (border_speeds(surrogate, law, case)["exact"] == 0.0).all()
-        assert approximations(surrogate, law, case)["rigid"] == close(0.3 * closed_forms.outer(r), rel=1e-14)
+        assert (border_speeds(surrogate, law)["exact"] == 0.0).all()
+        assert approximations(surrogate, law)["rigid"] == close(0.3 * closed_forms.outer(r), rel=1e-14)

@@ -127,7 +127,7 @@ def _curve(table: LoadedTable, form: LawOptions, values: Any, case: dict[str, fl
     answer["border"] = [{"value": mark.value / per_value(form.along), "mu_macro": mark.mu_macro} for mark in law.border]
     if "approximations" in (form.include or ()):
         for name, columns in (("approximations", approximations), ("border_speeds", border_speeds)):
-            answer[name] = {key: column.tolist() for key, column in columns(table.surrogate, law, case).items()}
+            answer[name] = {key: column.tolist() for key, column in columns(table.surrogate, law).items()}
     return answer
 
 
