@@ -262,7 +262,8 @@ def format_for(chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[s
         found = surrogate.evaluate(**{**case, **kind.names})
         width = 0.5 * (found.mu_macro_high - found.mu_macro_low)
         return f".{digits(width / found.mu_macro if found.mu_macro else math.inf)}g"
-    return f".{digits(k_effect(surrogate, case, kind.names['contact'], kind.names['direction']))}g"
+    contact, direction = kind.names.values()
+    return f".{digits(k_effect(surrogate, case, contact, direction))}g"
 
 
 def read_values(given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number) -> list[Any]:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mumacro.answer import IntervalAnswer
 from mumacro.charts import REGIMES
 from mumacro.contact import Kind, kind_of
 from mumacro.errors import InputError, MumacroError
@@ -18,10 +17,11 @@ from mumacro.inputs import unit_of
 
 if TYPE_CHECKING:
     from mumacro.answer import Answer
+    from mumacro.inverse import Crossing
     from mumacro.law import Law
     from mumacro.surrogate import Surrogate
 
-__all__ = ["ENDINGS", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
+__all__ = ["ENDINGS", "border_name", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
@@ -83,12 +83,13 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     """
     axes, x = _own(axes), law.values
     axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")
-    if isinstance(law.answer, IntervalAnswer):
-        low, high = law.answer.mu_macro_low, law.answer.mu_macro_high
-        axes.fill_between(x, low, high, alpha=0.25, lw=0.0, label="for every $k$ of the interval")
+    if law.band:
+        axes.fill_between(x, *law.band, alpha=0.25, lw=0.0, label="for every $k$ of the interval")
     axes.plot(x, law.mu_static, ":", color="grey", label="static limit")
+    named = [f"border of {border_name(crossing)}" for crossing in law.border]
     for i, crossing in enumerate(law.border):
-        axes.axvline(crossing.value, ls="--", lw=1.0, color="grey", label=None if i else "border of continuous sliding")
+        new, style = named[i] not in named[:i], "-." if "reverse_slip" in crossing.regimes else "--"
+        axes.axvline(crossing.value, ls=style, lw=1.0, color="grey", label=named[i] if new else None)
     if target is not None:
         axes.axhline(target, lw=0.8, color="tab:red", label=f"target {target:.6g}")
         axes.plot([*roots], [target] * len([*roots]), "o", color="tab:red")
@@ -98,6 +99,11 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     axes.set_ylim(bottom=0.0)
     axes.legend()
     return axes
+
+
+def border_name(crossing: Crossing) -> str:
+    """What begins or ends there."""
+    return "reverse slip" if "reverse_slip" in crossing.regimes else "continuous sliding"
 
 
 def y_range(kind: Kind) -> tuple[float, float]:

@@ -6,12 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mumacro import command, plotting
-from mumacro.answer import IntervalAnswer
 from mumacro.command import (
     ImpossibleError,
     OneLineParser,
@@ -23,7 +21,7 @@ from mumacro.command import (
     open_table,
     read_case,
 )  # fmt: skip
-from mumacro.contact import AMPLITUDE, SPRING
+from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 from mumacro.inputs import NAMES, RAD_PER_CYCLE, unit_of
 from mumacro.inverse import solve_for
@@ -71,27 +69,19 @@ def law(words: Sequence[str]) -> str:
         raise UsageError(f"give the first and the last value: --along {along} LOW HIGH")
     (inner, scale), unit = _inner(along), unit_of(along)
     case = read_case([*chosen.words, *known], kind, [along])
-    band = list(IntervalAnswer.__slots__)[::-1] if "k_range" in case else []
-    if chosen.approximations and (band or kind != SPRING):
-        raise UsageError("--approximations are those of one spring across the sliding direction, with one k")
     start, stop = (scale * end for end in command.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     values = sweep_values(inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale)
     surrogate = open_table(chosen.table)
-    found = friction_law(surrogate, inner, values, case, **kind.names)
-    columns: dict[str, Any] = {
-        along: values / scale,
-        **{name: getattr(found.answer, name) for name in ("mu_macro", *band, "regime", "error_bound", "source")},
-        "mu_static": found.mu_static,
-    }
-    if chosen.approximations:
-        columns |= approximations(surrogate, found)
+    found = friction_law(surrogate, inner, values, case, **kind.names, refine=drawn)
+    columns = found.columns | (approximations(surrogate, found) if chosen.approximations else {})
+    columns = {along: columns.pop(inner) / scale, **columns}
     border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
     if chosen.json:
         return as_json({"along": along, "unit": unit, **columns, "border": border, "table": command.about(surrogate)})
     headed = {f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()}
     form = format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
-    marks = [f"border of continuous sliding at {along} = {b[along]:{form}} {unit}" for b in border]
+    marks = [f"border of {plotting.border_name(c)} at {along} = {c.value / scale:{form}} {unit}" for c in found.border]
     if chosen.out is not None:
         return "\n".join(
             [command.write_result(chosen.out, headed, lambda axes: plotting.plot_law(found, axes)), *marks]
@@ -152,7 +142,7 @@ def solve(words: Sequence[str]) -> str:
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
         values = sweep_values(inner, low, high, CURVE, "log" if low > 0.0 else "linear")
-        curve = friction_law(surrogate, inner, values, case, **kind.names)
+        curve = friction_law(surrogate, inner, values, case, **kind.names, refine=True)
         columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
         return command.write_result(
             chosen.out, columns, lambda axes: plotting.plot_law(curve, axes, roots=at, target=target)
