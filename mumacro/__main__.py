@@ -92,8 +92,8 @@ def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: K
     """An answer as rows of name, value, unit, meaning."""
     groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
     rows = [
-        ("mu_macro", f"{answer.mu_macro:{form}}", "[-]", f"+- {answer.error_bound:.2g}"),
-        ("mu_ratio", f"{answer.mu_ratio:{form}}", "[-]", "mu_macro / mu0"),
+        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", f"+- {answer.error_bound:.2g}"),
+        ("mu_ratio", f"{answer.mu_ratio:#{form}}", "[-]", "mu_macro / mu0"),
         ("regime", answer.regime, "", REGIME_WORDS[answer.regime]),
         ("v_tilde", f"{answer.v_tilde:{form}}", "[-]", "v0 k / (mu0 Fz omega)"),
         ("y_tilde", f"{answer.y_tilde:{form}}", "[-]", groups),
@@ -104,8 +104,8 @@ def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: K
         middle = f"{rows[0][3]}, at k = {command.middle_of(case)['k']:.6g} N/m, the geometric middle"
         rows[:1] = [
             (*rows[0][:3], middle),
-            ("from", f"{answer.mu_macro_low:{form}}", "[-]", f"the least for k from {low} to {high} N/m"),
-            ("to", f"{answer.mu_macro_high:{form}}", "[-]", "the most"),
+            ("from", f"{answer.mu_macro_low:#{form}}", "[-]", f"the least for k from {low} to {high} N/m"),
+            ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
         ]
     for name, slope in (answer.gradient or {}).items():
         unit = PER_UNIT[LIKE.get(name, name)]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def law(words: Sequence[str]) -> str:
         description="mu_macro over a range of one input, with the static value and the border of continuous sliding.",
         epilog=f"{command.INPUTS}\nexamples:\n  {LAW}\n  {LAW} -o law.png",
     )
-    command.add_case(parser, "a case without the swept input")
+    command.add_case(parser, "a case without the swept input", "*")
     text = "the swept input, its first and its last value"
     parser.add_argument("--along", nargs="+", metavar=("NAME", "LOW HIGH"), default=["v0"], help=text)
     parser.add_argument("--from", dest="start", help="first value, in its SI unit or with a unit, as in --along")
@@ -73,7 +74,8 @@ def law(words: Sequence[str]) -> str:
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     values = sweep_values(inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale)
     surrogate = open_table(chosen.table)
-    found = friction_law(surrogate, inner, values, case, **kind.names, refine=drawn)
+    options: dict[str, Any] = {**kind.names, "refine": drawn}
+    found = friction_law(surrogate, inner, values, case, **options)
     columns = found.columns | (approximations(surrogate, found) if chosen.approximations else {})
     columns = {along: columns.pop(inner) / scale, **columns}
     border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
@@ -81,7 +83,10 @@ def law(words: Sequence[str]) -> str:
         return as_json({"along": along, "unit": unit, **columns, "border": border, "table": command.about(surrogate)})
     headed = {f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()}
     form = format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
-    marks = [f"border of {plotting.border_name(c)} at {along} = {c.value / scale:{form}} {unit}" for c in found.border]
+    of_k = ", for the geometric middle of k" if found.band else ""
+    marks = [
+        f"border of {plotting.border_name(c)} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border
+    ]
     if chosen.out is not None:
         return "\n".join(
             [command.write_result(chosen.out, headed, lambda axes: plotting.plot_law(found, axes)), *marks]
@@ -142,7 +147,8 @@ def solve(words: Sequence[str]) -> str:
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
         values = sweep_values(inner, low, high, CURVE, "log" if low > 0.0 else "linear")
-        curve = friction_law(surrogate, inner, values, case, **kind.names, refine=True)
+        options: dict[str, Any] = {**kind.names, "refine": True}
+        curve = friction_law(surrogate, inner, values, case, **options)
         columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
         return command.write_result(
             chosen.out, columns, lambda axes: plotting.plot_law(curve, axes, roots=at, target=target)
