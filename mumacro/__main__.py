@@ -18,10 +18,9 @@ from typing import Any
 from mumacro import command
 from mumacro.bundled import bundled_tables
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
-from mumacro.contact import Kind
+from mumacro.contact import SPRING, Kind
 from mumacro.extras import missing
 from mumacro.inputs import LIKE, NAMES, PER_UNIT
-from mumacro.measured import chosen as chosen_kind
 from mumacro.points import FIT, fit_points
 from mumacro.questions import LAW, SOLVE_FOR, STIFFNESS, law, map_, solve, stiffness_of
 from mumacro.surrogate import Surrogate
@@ -82,7 +81,8 @@ def _one_case(words: Sequence[str]) -> str:
         ends = {name: getattr(answer, name) for name in ("mu_macro_low", "mu_macro_high") if "k_range" in case}
         found |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
         found |= {"model": rows} if chosen.model else {}
-        return as_json({**found, **chosen_kind(**kind.names), "table": command.about(surrogate)})
+        found |= dict(kind.names.items() - SPRING.names.items())
+        return as_json({**found, "table": command.about(surrogate)})
     lines = [("model", f"{row['row']}: {row['text']}") for row in rows if (row["row"], "k_range" in case) != ROW_OF_K]
     text = in_columns(_rows_of(answer, surrogate, case, kind, command.format_for(chosen, surrogate, case, kind)))
     return "\n".join([text, *([in_columns(lines)] if lines else [])])

@@ -16,7 +16,7 @@ __all__ = ["ANSWERS", "BAND", "Columns", "FilesError", "find_columns"]
 
 #: columns that are added
 ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
-BAND = tuple(sorted(IntervalAnswer.__slots__, reverse=True))  # beside mu_macro, of an interval of k
+BAND = IntervalAnswer.__slots__  # beside mu_macro, of an interval of k
 
 
 class FilesError(MumacroError):
