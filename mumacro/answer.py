@@ -177,7 +177,7 @@ class Answer(Generic[Number]):
     def _repr_html_(self) -> str:
         columns = self.columns()
         rows = zip(*(np.ravel(column)[:_ROWS] for column in columns.values()), strict=True)
-        return html_table(columns, rows, np.size(self.mu_macro) - _ROWS)
+        return html_table(columns, rows, np.size(columns["mu_macro"]) - _ROWS)
 
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]

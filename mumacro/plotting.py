@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mumacro.charts import REGIMES
-from mumacro.contact import Kind, kind_of
+from mumacro.contact import AMPLITUDE, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
 from mumacro.extras import missing
 from mumacro.inputs import unit_of
@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from mumacro.law import Law
     from mumacro.surrogate import Surrogate
 
-__all__ = ["ENDINGS", "border_name", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
+__all__ = ["ENDINGS", "mark_of", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
-_SYMBOLS = {"mu0": r"$\mu_0$", "Fz": "$F_z$", "k": "$k$", "y0": "$y_0$", "omega": r"$\omega$", "v0": "$v_0$",
-            "Fz_amplitude": r"$\Delta F_z$"}  # fmt: skip
+_SYMBOLS = {
+    "mu0": r"$\mu_0$", "Fz": "$F_z$", "k": "$k$", "y0": "$y_0$", "omega": r"$\omega$", "v0": "$v_0$",
+    AMPLITUDE: r"$\hat F_z$",
+}  # fmt: skip
+_MARKS = {"reverse_slip": ("-.", "border of reverse slip"), "continuous": ("--", "border of continuous sliding")}
 
 
 def _loaded(name: str) -> Any:
@@ -61,7 +64,7 @@ def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
 
 
 def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None) -> Any:
-    """mu_macro along one input: static limit, border of continuous sliding, band of an uncertain k, roots of a target.
+    """mu_macro along one input, with the static limit, the borders, the band of k_range, and roots of a target.
 
     Parameters
     ----------
@@ -86,10 +89,11 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     if law.band:
         axes.fill_between(x, *law.band, alpha=0.25, lw=0.0, label="for every $k$ of the interval")
     axes.plot(x, law.mu_static, ":", color="grey", label="static limit")
-    named = [f"border of {border_name(crossing)}" for crossing in law.border]
-    for i, crossing in enumerate(law.border):
-        new, style = named[i] not in named[:i], "-." if "reverse_slip" in crossing.regimes else "--"
-        axes.axvline(crossing.value, ls=style, lw=1.0, color="grey", label=named[i] if new else None)
+    told = set[str]()
+    for crossing in law.border:
+        line, label = mark_of(crossing)
+        axes.axvline(crossing.value, ls=line, lw=1.0, color="grey", label=None if label in told else label)
+        told.add(label)
     if target is not None:
         axes.axhline(target, lw=0.8, color="tab:red", label=f"target {target:.6g}")
         axes.plot([*roots], [target] * len([*roots]), "o", color="tab:red")
@@ -101,9 +105,9 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     return axes
 
 
-def border_name(crossing: Crossing) -> str:
-    """What begins or ends there."""
-    return "reverse slip" if "reverse_slip" in crossing.regimes else "continuous sliding"
+def mark_of(crossing: Crossing) -> tuple[str, str]:
+    """The line that marks a border, and what it is."""
+    return next(_MARKS[name] for name in ("continuous", "reverse_slip") if name in crossing.regimes)
 
 
 def y_range(kind: Kind) -> tuple[float, float]:

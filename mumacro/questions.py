@@ -84,9 +84,7 @@ def law(words: Sequence[str]) -> str:
     headed = {f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()}
     form = format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
     of_k = ", for the geometric middle of k" if found.band else ""
-    marks = [
-        f"border of {plotting.border_name(c)} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border
-    ]
+    marks = [f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
     if chosen.out is not None:
         return "\n".join(
             [command.write_result(chosen.out, headed, lambda axes: plotting.plot_law(found, axes)), *marks]

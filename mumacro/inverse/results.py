@@ -118,8 +118,9 @@ def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> 
     given = {name: value for name, value in case.items() if value is not None or name == "k" != without}
     for name in given.keys() & ({"omega", "f"} if without == "omega" else {without}):
         raise InputError(name, given[name], f"left out, because {without} is the unknown")
+    given = kind.as_six({**given, without: 1.0})
     try:
-        six = as_columns(kind.as_six({**given, without: 1.0}))
+        six = as_columns(given)
         columns = kind.as_given(six)
         for name, column in columns.items():
             if column.size != 1:

@@ -66,6 +66,12 @@ class Curve:
         out: Bools = (level >= low) & (level <= high)
         return out
 
+    def end(self) -> float:
+        """Where the piece first has its last value: at its end, or where the plateau begins that ends it."""
+        at = int(np.argmax(self.mu == self.mu[-1]))
+        before, there = self.x[max(at - 1, 0) : at], self.x[at : at + 1]
+        return float(last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, there)[1][0] if at else there[0])
+
     def meet(self, level: Array, leave: ArrayLike = False) -> Array:
         """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,) [SI].
 

@@ -271,12 +271,12 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
         which = np.flatnonzero(curve.holds(targets))
         if not which.size:
             continue
-        wanted, start, end = targets[which], curve.x[0], curve.x[-1]
+        wanted, start = targets[which], curve.x[0]
         # a target equal to the value at an edge has its root there; just inside, rounding may hide it
         value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
         last = wanted == curve.mu[-1]
         if last.any():
-            value = np.where(last & (sweep.mu(value) != wanted), end, value)
+            value = np.where(last & (sweep.mu(value) != wanted), curve.end(), value)
         answer, slope = sweep.with_slope(value)
         low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
         columns = (value, low, high, answer.mu_macro, answer.regime)
@@ -297,6 +297,7 @@ def _enclosures(
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
         beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
         bound = np.maximum(bound, sweep.answer(beside).error_bound)
+    bound = np.maximum(bound, 2.0**-50 * wanted)  # a root is found to rounding, even where mu_macro is exact
     levels = np.concatenate((wanted - curve.sign * bound, wanted + curve.sign * bound))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = bound / (curve.sign * slope)
