@@ -129,7 +129,7 @@ def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, floa
     axes.figure.colorbar(found, ax=axes, label=r"$\mu_\mathrm{macro} / \mu_0$ [-]")
     _plane(axes, surrogate.v_tilde_crit(y, **kind), y)
     if chosen.normal:
-        axes.set_ylabel(r"$\tilde y = \Delta F_z / F_z$")
+        axes.set_ylabel(r"$\tilde y = \hat F_z / F_z$")
     if point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
         axes.plot(*point, "o", color="tab:red", markeredgecolor="white")
     axes.set(xlim=V_RANGE, ylim=ends)
