@@ -48,7 +48,7 @@ class Kind(NamedTuple):
         return tuple(AMPLITUDE if name == "y0" and self.normal else name for name in FIELDS)
 
     @property
-    def names(self) -> dict[str, str]:
+    def names(self) -> dict[str, Any]:
         """Both as the keywords of ``evaluate``."""
         return {"contact": CONTACTS[self.contact], "direction": DIRECTIONS[self.direction]}
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 from mumacro.inputs import real
 
-__all__ = ["BOUND", "ENDS", "as_ends", "extremes", "middle"]
+__all__ = ["BOUND", "ENDS", "as_ends", "extremes", "middle", "without_interval"]
 
 Array = NDArray[np.float64]
 ENDS = ("k_low", "k_high")  # columns that hold an interval
@@ -69,6 +69,24 @@ def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array
         raise InputError("k_range", (float(low.flat[i]), float(high.flat[i])), BOUND, i if legal.ndim else None)
     low, high = (np.where(legal, end, np.nan) for end in (low, high))
     return low, high, np.asarray(np.clip(np.sqrt(low) * np.sqrt(high), low, high))
+
+
+def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
+    """A case with the middle stiffness, and the ends of an interval of it, if there is one.
+
+    Raises
+    ------
+    InputError
+        What is no interval; an interval where k is the swept input ``along``.
+    """
+    if all(case.get(name) is None for name in ("k_range", *ENDS)):
+        return case, {}
+    given = as_ends(case)
+    if along == "k":
+        raise InputError("k_range", (given["k_low"], given["k_high"]), "left out where k is the swept input")
+    between = middle(given, "raise")[2]
+    ends = {name: given.pop(name) for name in ENDS}
+    return {**given, "k": between}, ends
 
 
 def extremes(

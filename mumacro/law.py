@@ -15,7 +15,7 @@ from mumacro.answer import Answer
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import FIELDS, POSITIVE
-from mumacro.interval import ENDS, as_ends, middle
+from mumacro.interval import without_interval
 from mumacro.inverse import Crossing, border_crossings, checked_case
 from mumacro.inverse.rootfinding import Sweep
 from mumacro.surrogate import Surrogate
@@ -63,7 +63,6 @@ EQUATIONS = {
 }  # fmt: skip
 _CORNER_REACH, _CORNER_TOP = 0.5, 0.7
 _BAND = ("mu_macro_low", "mu_macro_high")
-_CHORD, _HALVINGS = 1e-3, 8  # largest error of a straight line, over the law's height, and how often values are halved
 #: column of BORDERS -> formula, smallest and largest y~
 _FORMULAS = {
     "eq_23": (closed_forms.border_23, 0.0, 1.0),
@@ -110,8 +109,8 @@ class Law:
     @property
     def band(self) -> tuple[Array, Array] | None:
         """Smallest and largest mu_macro over an interval of k [-], (n,) each; None where k is one number."""
-        found = tuple(getattr(self.answer, name, None) for name in _BAND)
-        return found if found[0] is not None else None
+        low, high = (getattr(self.answer, name, None) for name in _BAND)
+        return None if low is None or high is None else (low, high)
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -197,47 +196,18 @@ def friction_law(
     ([0.2238, 0.24, 0.2957], 0.07105)
     """
     kind = kind_of(contact, direction)
-    case, ends = _without_interval(case if k_range is None else {**case, "k_range": k_range}, along)
+    case, ends = without_interval(case if k_range is None else {**case, "k_range": k_range}, along)
     known = checked_case(case, along, kind)
     sweep = Sweep(surrogate, known, along, kind)
-    names = kind.names
-    border = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]), **names)
+    border = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]), **kind.names)
     if refine:
-        values = _refined(sweep, np.union1d(values, [mark.value for mark in border]))
+        values = sweep.refined(np.union1d(values, [mark.value for mark in border]))
     answer = sweep.answer(values, groups=True, illegal="raise")
     if ends:
         others = {name: value for name, value in known.items() if name != "k"}
         answer = Sweep(surrogate, {**others, **ends}, along, kind).answer(values, groups=True, illegal="raise")
     at_rest = sweep.answer(values, v0=0.0) if along != "v0" else sweep.answer(0.0)
     return Law(along, values, answer, np.broadcast_to(at_rest.mu_macro, values.shape), border, known, kind)
-
-
-def _without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """The case with the middle stiffness, and the ends of an interval of it, if there is one."""
-    if case.keys().isdisjoint(("k_range", *ENDS)):
-        return case, {}
-    given = as_ends(case)
-    if along == "k":
-        raise InputError("k_range", (given["k_low"], given["k_high"]), "left out where k is the swept input")
-    between = middle(given, "raise")[2]
-    ends = {name: given.pop(name) for name in ENDS}
-    return {**given, "k": between}, ends
-
-
-def _refined(sweep: Sweep, values: Array) -> Array:
-    """``values`` and more between them, where chords of mu_macro differ from it."""
-    mu = sweep.mu(values)
-    for _ in range(_HALVINGS):
-        # between neighbours 20 % apart and more a law is drawn over the logarithm
-        low, high = values[:-1], values[1:]
-        middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
-        inside = sweep.mu(middle)
-        bent = np.abs(inside - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
-        at = np.flatnonzero(bent & (middle > low) & (middle < high))
-        if not at.size:
-            break
-        values, mu = np.insert(values, at + 1, middle[at]), np.insert(mu, at + 1, inside[at])
-    return values
 
 
 def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:

@@ -13,6 +13,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
+from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import RAD_PER_CYCLE, as_columns, length_scale
 from mumacro.measured import HARDLY
@@ -73,7 +74,7 @@ def model_rows(
     >>> found["text"]
     'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
     """
-    mu = surrogate.evaluate(**case, contact=contact, direction=direction).mu_macro
+    mu = surrogate.evaluate(**case, **kind_of(contact, direction).names).mu_macro
     six = _six(case)
     swing = case["Fz_amplitude"] if direction == "normal" else six["y0"]
     if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
@@ -102,7 +103,7 @@ def k_effect(
     if math.isinf(found := _six(case)["k"]):
         return 0.0
     k = found * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
-    mu = surrogate.evaluate(**{**case, "k": k}, contact=contact, direction=direction).mu_macro
+    mu = surrogate.evaluate(**{**case, "k": k}, **kind_of(contact, direction).names).mu_macro
     apart = float(np.abs(mu - mu[3]).max())
     return 0.0 if apart == 0.0 else apart / float(mu[3]) if mu[3] > 0.0 else math.inf
 
@@ -133,7 +134,7 @@ def _six(case: Mapping[str, Any]) -> dict[str, float]:
 def _kind(surrogate: Surrogate, case: Mapping[str, Any], mu: float, contact: str, direction: str) -> Row | None:
     other = "ball" if contact == "spring" else "spring"
     try:
-        found = surrogate.evaluate(**case, contact=other, direction=direction).mu_macro
+        found = surrogate.evaluate(**case, **kind_of(other, direction).names).mu_macro
     except InputError:  # a ball that oscillates along its normal is another model
         return None
     off = (found - mu) / mu if mu else math.copysign(math.inf, found) if found else 0.0
@@ -166,7 +167,7 @@ def _tilt(mu0: float, y: float) -> Row | None:
     return {"row": "constant normal force", "text": text, "effect": effect}
 
 
-def _cycle(surrogate: Surrogate, six: dict[str, float]) -> list[Row]:
+def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
     """Rows that the slip path of a period tells, taken from one spring."""
     found = settling(surrogate, **six)
     force = six["mu0"] * six["Fz"]

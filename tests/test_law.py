@@ -225,3 +225,14 @@ def test_the_picture_shows_band_and_borders(surrogate, pair) -> None:
         surrogate, "Fz_amplitude", np.array([1.0, 9.0]), {**LINE, "k": 1e6, "v0": 0.01, "y0": None}, direction="normal"
     )
     assert other.plot().get_xlabel().endswith("[N]")
+
+
+@every_pair
+def test_columns_are_evaluated_as_a_law_is(surrogate, pair) -> None:
+    said, case = as_kind(pair, k=1e6)
+    law = friction_law(surrogate, "v0", SPEEDS, case, **said)
+    columns = (SPEEDS if name == "v0" else np.array([case[name]]) for name in law.kind.fields)
+    macro, _, bound, source = surrogate.evaluate_columns(*columns, **said)
+    assert (macro == law.answer.mu_macro).all()
+    assert (bound == law.answer.error_bound).all()
+    assert (source == law.answer.source_code).all()

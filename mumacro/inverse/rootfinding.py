@@ -8,6 +8,7 @@ step is replaced by halving the bracket: by its geometric mean, so that any scal
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -18,7 +19,7 @@ from mumacro.answer import Answer
 from mumacro.contact import SPRING, Kind
 from mumacro.surrogate import Surrogate
 
-__all__ = ["TINY", "Curve", "Sweep", "last_double"]
+__all__ = ["TINY", "Curve", "Sweep", "curves_between", "last_double", "samples"]
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -26,6 +27,8 @@ Bools = NDArray[np.bool_]
 TINY = 5e-324
 _ROUNDING = 2.0**-52
 _PER_CALL = 512
+_CHORD, _HALVINGS = 1e-3, 8  # of a refined sweep: error of a straight line over the height, rounds
+_MAX_SAMPLES = 20_001
 
 
 class Sweep:
@@ -49,6 +52,20 @@ class Sweep:
         answer = self.answer(x, gradient=True)
         with np.errstate(over="ignore", invalid="ignore"):
             return answer, x * answer.gradient[self.unknown]  # type: ignore[index]
+
+    def refined(self, values: Array) -> Array:
+        """``values`` and more between them, where chords of mu_macro differ from it."""
+        mu = self.mu(values)
+        for _ in range(_HALVINGS):
+            low, high = values[:-1], values[1:]
+            middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
+            inside = self.mu(middle)
+            bent = np.abs(inside - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
+            at = np.flatnonzero(bent & (middle > low) & (middle < high))
+            if not at.size:
+                break
+            values, mu = np.insert(values, at + 1, middle[at]), np.insert(mu, at + 1, inside[at])
+        return values
 
 
 class Curve:
@@ -118,6 +135,28 @@ class Curve:
             found[i] = np.where(met, at, np.where(np.abs(fa[i]) < np.abs(fb[i]), a[i], b[i]))
             i = i[~(met | shut)]
         return found
+
+
+def samples(low: float, high: float, per_decade: int) -> Array:
+    """Values > 0 from ``low`` to ``high``, ascending, evenly spread over the logarithm."""
+    start, stop = math.log(max(low, TINY)), math.log(high)
+    count = min(max(int((stop - start) / math.log(10.0) * per_decade), 64) + 1, _MAX_SAMPLES)
+    with np.errstate(over="ignore"):
+        return np.clip(np.exp(np.linspace(start, stop, count)), max(low, TINY), high)
+
+
+def curves_between(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
+    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the whole range."""
+    at = np.array(edges)
+    ends = sweep.mu(at)
+    curves = []
+    for i in range(at.size - 1):
+        two = slice(i, i + 2)
+        inside = slice(np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left"))
+        # next to a turning point a sample may lie beyond it by a rounding error
+        between = np.clip(mu[inside], ends[two].min(), ends[two].max())
+        curves.append(Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between)))
+    return curves
 
 
 def _middle(a: Array, b: Array) -> Array:

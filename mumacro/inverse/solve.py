@@ -39,7 +39,7 @@ from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import POSITIVE
 from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case
-from mumacro.inverse.rootfinding import TINY, Curve, Sweep, last_double
+from mumacro.inverse.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
 from mumacro.surrogate import Surrogate
 
 __all__ = ["border_crossings", "solve_for"]
@@ -54,7 +54,6 @@ HUGE = 1.7976931348623157e308
 # percent above its onset, the fold is a sixth of a decade wide; the steep descent (y~ = 1 at large r) holds none.
 # Where mu_macro is monotone, samples only bracket roots, for Newton's method to finish.
 _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
-_MAX_SAMPLES = 20_001
 # Direction -> y~, for normal v~/z, of a contact as soft and as stiff as it matters.  Across, mu~ = 1 - O(y~^2), along
 # 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c = arccos(v~/y~) is 1e-8 or more.
 _ENDS = {"across": (1e-6, 1e8), "along": (1e-17, 1e30), "normal": (1e-17, 10.0)}
@@ -117,14 +116,14 @@ def solve_for(
         raise InputError("target", float(wanted[bad[0]]), "finite and >= 0", int(bad[0]) if np.ndim(targets) else None)
     low, high = _default_range(sweep, wanted) if within is None else _checked_range(sweep, within)
     folds = unknown in ("k", "Fz") and direction == "across"
-    x = _samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
+    x = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
     answer = sweep.answer(x)
     mu, noise = answer.mu_macro, 2.0 * answer.error_bound
     turns = _turning_points(sweep, x, mu, noise) if folds else []
-    curves = _curves(sweep, [low, *turns, high], x, mu)
+    curves = curves_between(sweep, [low, *turns, high], x, mu)
     if low == 0.0 and unknown != "v0" and abs(curves[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
         # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
-        curves = [Curve(sweep, np.zeros(1), curves[0].mu[:1]), *_curves(sweep, [TINY, high], x, mu)]
+        curves = [Curve(sweep, np.zeros(1), curves[0].mu[:1]), *curves_between(sweep, [TINY, high], x, mu)]
     ends = np.concatenate([curve.mu[[0, -1]] for curve in curves])
     reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
     constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
@@ -213,14 +212,6 @@ def _where(sweep: Sweep, place: float) -> float:
     return place / scale if sweep.unknown == "k" else scale / place
 
 
-def _samples(low: float, high: float, per_decade: int) -> Array:
-    """Values > 0 from ``low`` to ``high``, ascending, evenly spread over the logarithm."""
-    start, stop = math.log(max(low, TINY)), math.log(high)
-    count = min(max(int((stop - start) / math.log(10.0) * per_decade), 64) + 1, _MAX_SAMPLES)
-    with np.errstate(over="ignore"):
-        return np.clip(np.exp(np.linspace(start, stop, count)), max(low, TINY), high)
-
-
 def _without_limit(sweep: Sweep, reach: Reach) -> Reach:
     """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in general not reached."""
     if sweep.unknown == "v0":
@@ -248,20 +239,6 @@ def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[flo
     _, turns = last_double(lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1])
     found: list[float] = turns.tolist()
     return found
-
-
-def _curves(sweep: Sweep, edges: list[float], x: Array, mu: Array) -> list[Curve]:
-    """The monotone pieces between ``edges`` (ascending), from samples ``x``, ``mu`` (n,) of the whole range."""
-    at = np.array(edges)
-    ends = sweep.mu(at)
-    curves = []
-    for i in range(at.size - 1):
-        two = slice(i, i + 2)
-        inside = slice(np.searchsorted(x, at[i], side="right"), np.searchsorted(x, at[i + 1], side="left"))
-        # next to a turning point a sample may lie beyond it by a rounding error
-        between = np.clip(mu[inside], ends[two].min(), ends[two].max())
-        curves.append(Curve(sweep, np.insert(at[two], 1, x[inside]), np.insert(ends[two], 1, between)))
-    return curves
 
 
 def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]]:
