@@ -337,7 +337,7 @@ class Surrogate:
         Examples
         --------
         >>> [round(x, 6) for x in Surrogate.open().derivatives(0.1, 0.5)]
-        [0.204078, -0.504056]
+        [0.108351, -0.250146]
         """
         if of not in self.table.quantities:
             raise InputError("of", of, f"one of {', '.join(self.table.quantities)}")
