@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import difflib
 import importlib
-import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,13 @@ from typing import Any
 from mumacro import command
 from mumacro.bundled import bundled_tables
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
+from mumacro.contact import SPRING, Kind
 from mumacro.extras import missing
-from mumacro.inputs import NAMES, PER_UNIT
-from mumacro.inverse import solve_for
-from mumacro.questions import LAW, SOLVE_FOR, law, map_, solve, stiffness_of
+from mumacro.inputs import LIKE, NAMES, PER_UNIT
+from mumacro.points import FIT, fit_points
+from mumacro.questions import LAW, SOLVE_FOR, STIFFNESS, law, map_, solve, stiffness_of
+from mumacro.surrogate import Surrogate
+from mumacro.validity import model_rows
 from mumacro.version import __version__
 
 __all__ = ["main"]
@@ -34,14 +36,15 @@ friction along the speed:  {LAW}
 which amplitude halves it: {SOLVE_FOR}
 everything else:           mumacro --help"""
 OVERVIEW = f"""\
-Macroscopic friction of a contact that is oscillated transversely to its sliding direction.
+Macroscopic friction of a contact that oscillates across or along its sliding direction, or normally.
 
   mumacro '{CASE}'          one case
   mumacro eval cases.parquet -o out.parquet                      files of cases: csv, ndjson, parquet
   mumacro law 'mu0=0.3 ...' --along v0 1mm/s 1m/s -o law.png     mu_macro along one input
   mumacro solve-for y0 'mu0=0.3 ...' --target 0.15               which input gives a wanted mu_macro
   mumacro map -o map.png                                         mu_macro/mu0 over speed and amplitude
-  mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3    k from materials
+  {FIT}    k and mu0 from measured points
+  {STIFFNESS}    k from materials
   mumacro table                                                  the table in use and its errors
   mumacro export --format csv                                    the table for other tools
   mumacro serve                                                  the same over HTTP
@@ -53,43 +56,61 @@ REGIME_WORDS = {
     "continuous": "slips all the time",
     "stick_slip": "sticks during a part of each period",
     "static": "at rest: the limit v0 -> 0",
+    "partial_slip": "the rim of the contact slips all the time, its middle sticks during a part of each period",
+    "reverse_slip": "slips forwards and backwards in each period",
 }
+ROW_OF_K = ("k is known", True)  # the answer for an interval tells that already
 
 
 def _one_case(words: Sequence[str]) -> str:
     parser = OneLineParser(prog="mumacro", description=OVERVIEW + command.INPUTS)
-    command.add_table(parser, "the six inputs, quoted together or apart")
+    command.add_case(parser, "the six inputs, quoted together or apart")
     parser.add_argument("--gradient", action="store_true", help="also d mu_macro / d input")
+    parser.add_argument("--model", action="store_true", help="in JSON, too: what the model leaves out in this case")
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
     chosen = parser.parse_intermixed_args(words)
-    case = read_case(chosen.words, ranges=True)
-    between: dict[str, Any] = {}
+    kind = command.kind_in(chosen)
+    case = read_case(chosen.words, kind)
     surrogate = open_table(chosen.table)
-    if isinstance(case["k"], tuple):
-        reach = solve_for(surrogate, "k", 0.0, {**case, "k": None}, case["k"]).reach
-        between = {"k": case["k"], "mu_macro_low": reach.mu_min, "mu_macro_high": reach.mu_max}
-        case["k"] = math.sqrt(case["k"][0]) * math.sqrt(case["k"][1])
-    answer = surrogate.evaluate(case, gradient=chosen.gradient)
+    answer = surrogate.evaluate(**{**case, **kind.names, "gradient": chosen.gradient})
+    middle = command.middle_of(case)
+    rows = model_rows(surrogate, middle, **kind.names) if chosen.model or not chosen.json else []
     if chosen.json:
         names = ["mu_macro", "mu_ratio", "regime", "error_bound", "source", "v_tilde", "y_tilde"]
         found = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
-        return as_json({**found, "inputs": case, "k_range": between or None, "table": command.about(surrogate)})
-    digits = f".{chosen.digits}g"
+        ends = {name: getattr(answer, name) for name in ("mu_macro_low", "mu_macro_high") if "k_range" in case}
+        found |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
+        found |= {"model": rows} if chosen.model else {}
+        found |= dict(kind.names.items() - SPRING.names.items())
+        return as_json({**found, "table": command.about(surrogate)})
+    lines = [("model", f"{row['row']}: {row['text']}") for row in rows if (row["row"], "k_range" in case) != ROW_OF_K]
+    text = in_columns(_rows_of(answer, surrogate, case, kind, command.format_for(chosen, surrogate, case, kind)))
+    return "\n".join([text, *([in_columns(lines)] if lines else [])])
+
+
+def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind, form: str) -> list[Sequence[str]]:
+    """An answer as rows of name, value, unit, meaning."""
+    groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
     rows = [
-        ("mu_macro", f"{answer.mu_macro:{digits}}", "[-]", f"+- {answer.error_bound:.2g}"),
-        ("mu_ratio", f"{answer.mu_ratio:{digits}}", "[-]", "mu_macro / mu0"),
+        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", f"+- {answer.error_bound:.2g}"),
+        ("mu_ratio", f"{answer.mu_ratio:#{form}}", "[-]", "mu_macro / mu0"),
         ("regime", answer.regime, "", REGIME_WORDS[answer.regime]),
-        ("v_tilde", f"{answer.v_tilde:{digits}}", "[-]", "v0 k / (mu0 Fz omega)"),
-        ("y_tilde", f"{answer.y_tilde:{digits}}", "[-]", "y0 k / (mu0 Fz)"),
+        ("v_tilde", f"{answer.v_tilde:{form}}", "[-]", "v0 k / (mu0 Fz omega)"),
+        ("y_tilde", f"{answer.y_tilde:{form}}", "[-]", groups),
         ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
     ]
-    if between:
-        rows.insert(1, ("from", f"{between['mu_macro_low']:{digits}}", "[-]", f"for k from {between['k'][0]:{digits}}"))
-        rows.insert(2, ("to", f"{between['mu_macro_high']:{digits}}", "[-]", f"to {between['k'][1]:{digits}} N/m"))
-        rows[0] = (*rows[0][:3], f"{rows[0][3]}, at k = {case['k']:{digits}} N/m, the geometric middle")
+    if "k_range" in case:
+        low, high = (f"{end:.6g}" for end in case["k_range"])
+        middle = f"{rows[0][3]}, at k = {command.middle_of(case)['k']:.6g} N/m, the geometric middle"
+        rows[:1] = [
+            (*rows[0][:3], middle),
+            ("from", f"{answer.mu_macro_low:#{form}}", "[-]", f"the least for k from {low} to {high} N/m"),
+            ("to", f"{answer.mu_macro_high:#{form}}", "[-]", "the most"),
+        ]
     for name, slope in (answer.gradient or {}).items():
-        rows.append((f"slope {name}", f"{slope:{digits}}", f"[{PER_UNIT[name]}]", f"d mu_macro / d {name}"))
-    return in_columns(rows)
+        unit = PER_UNIT[LIKE.get(name, name)]
+        rows.append((f"slope {name}", f"{slope:{form}}", f"[{unit}]", f"d mu_macro / d {name}"))
+    return list(rows)
 
 
 def _table(words: Sequence[str]) -> str:
@@ -151,8 +172,8 @@ def _serve(words: Sequence[str]) -> int:
 
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
-    "eval": _eval, "law": law, "solve-for": solve, "map": map_, "stiffness": stiffness_of, "table": _table,
-    "export": _export, "serve": _serve,
+    "eval": _eval, "law": law, "solve-for": solve, "map": map_, "fit": fit_points, "stiffness": stiffness_of,
+    "table": _table, "export": _export, "serve": _serve,
 }  # fmt: skip
 
 

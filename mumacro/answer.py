@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Generic
 import numpy as np
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
+from mumacro.errors import MumacroError
+from mumacro.html import html_table
 
 __all__ = ["Answer", "AnswerWithGradient", "IntervalAnswer", "single"]
 
@@ -25,6 +27,8 @@ else:
 # by code; the last entry is that of -1, an illegal case
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
+_BAND = ("mu_macro_low", "mu_macro_high")
+_ROWS = 10  # of a table in a notebook
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 
 
@@ -134,6 +138,47 @@ class Answer(Generic[Number]):
         """Name of the block or closed form that gave the value: str, or ndarray of shared str, made on request."""
         return self._by_source("source", _SOURCE_NAMES)
 
+    def plot(self, axes: Any = None) -> Any:
+        """The cases over (v~, y~), see :func:`mumacro.plotting.plot_answer`; needs matplotlib."""
+        from mumacro.plotting import plot_answer
+
+        return plot_answer(self, axes)
+
+    def columns(self) -> dict[str, Any]:
+        """What is known of each case, by name: mu_macro first, then what was requested beside it."""
+        names = ["mu_macro", *(name for name in _BAND if hasattr(self, name)), "mu_ratio", "regime", "error_bound"]
+        names += ["source", *(("v_tilde", "y_tilde", "length_scale") if self._groups is not None else ())]
+        slopes = {f"d_mu_macro_d_{name}": slope for name, slope in (self.gradient or {}).items()}
+        return {**{name: getattr(self, name) for name in names}, **slopes}
+
+    def to_frame(self) -> Any:
+        """The columns as a DataFrame of pandas, one row a case, in the order of ``ravel``.
+
+        Raises
+        ------
+        MumacroError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> from mumacro import Surrogate
+        >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3)
+        >>> Surrogate.open().evaluate(**case, v0=np.array([0.0, 0.01])).to_frame()["regime"].tolist()
+        ['static', 'stick_slip']
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise MumacroError("pandas is not installed: pip install pandas") from None
+        columns = self.columns().items()
+        return pandas.DataFrame({name: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
+                                 for name, x in columns})  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        columns = self.columns()
+        rows = zip(*(np.ravel(column)[:_ROWS] for column in columns.values()), strict=True)
+        return html_table(columns, rows, np.size(columns["mu_macro"]) - _ROWS)
+
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
         names += [name for name in IntervalAnswer.__slots__ if hasattr(self, name)]
@@ -160,7 +205,7 @@ class IntervalAnswer(AnswerWithGradient[Number]):
         Smallest and largest mu_macro over the interval [-]; ``error_bound`` holds for them, too.
     """
 
-    __slots__ = ("mu_macro_high", "mu_macro_low")
+    __slots__ = _BAND
 
     mu_macro_low: Number
     mu_macro_high: Number

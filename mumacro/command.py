@@ -17,21 +17,34 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs import FIELDS, NAMES, RAD_PER_CYCLE, SI, check_inputs, read_number, read_range, scale_of, suggestion
+from mumacro.inputs import (
+    LIKE,
+    NAMES,
+    RAD_PER_CYCLE,
+    check_inputs,
+    read_number,
+    read_range,
+    scale_of,
+    suggestion,
+    unit_of,
+)
 from mumacro.surrogate import Surrogate
+from mumacro.validity import digits, k_effect
 
 __all__ = [
-    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_form", "add_table", "as_json",
-    "in_columns", "open_table", "read_case", "read_values", "run", "write_result",
+    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_kind",
+    "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "read_case",
+    "read_values", "run", "write_result",
 ]  # fmt: skip
 
 INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0
   Fz     normal force [N], > 0
-  k      tangential stiffness [N/m], > 0, or rigid
-  y0     amplitude of the transverse oscillation [m], >= 0
+  k      tangential stiffness [N/m], > 0, or rigid; an uncertain one as k=0.8..1.2N/um
+  y0     amplitude of the oscillation [m], >= 0; of the normal force Fz_amplitude [N], < Fz
   omega  its angular frequency [rad/s], or f, its frequency [Hz], >= 0
   v0     sliding speed [m/s], >= 0
 """
@@ -55,19 +68,37 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
-def add_table(parser: OneLineParser, words: str | None = None) -> None:
-    """The options of all commands that answer, after the inputs, if there are any, explained by ``words``."""
-    if words is not None:
-        parser.add_argument("words", nargs="*" if words.startswith("a case") else "+", metavar="name=value", help=words)
+def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
+    """The inputs, explained by ``words``, the kind of contact, and the options of all commands that answer."""
+    parser.add_argument("words", nargs=least, metavar="name=value", help=words)
+    add_kind(parser)
+    add_table(parser)
+
+
+def add_kind(parser: argparse.ArgumentParser) -> None:
+    """The options for the contact and the direction of its oscillation; :func:`kind_in` reads them."""
+    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
+    text = "of the oscillation to the sliding direction; normal: the normal force oscillates; default: across"
+    parser.add_argument("--direction", choices=DIRECTIONS, default="across", help=text)
+
+
+def kind_in(chosen: argparse.Namespace) -> Kind:
+    """The contact and direction that were chosen; InputError for a ball whose normal force oscillates."""
+    return kind_of(chosen.contact, chosen.direction)
+
+
+def add_table(parser: OneLineParser) -> None:
+    """The options of all commands that read a table and answer."""
     text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
 
 
-def add_form(parser: OneLineParser) -> None:
+def add_form(parser: argparse.ArgumentParser) -> None:
     """The options for the form of a result."""
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
-    parser.add_argument("--digits", type=int, choices=range(1, 18), default=6, metavar="N", help="default: 6; 15: all")
+    text = "digits to print; default: as many as k supports, 4 to 6; 15: all"
+    parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
 
 
 def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
@@ -98,22 +129,29 @@ def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
 # --- what a person writes -------------------------------------------------------------------------------
 
 
-def read_case(words: Sequence[str], without: str | None = None, ranges: bool = False) -> dict[str, Any]:
+def read_case(
+    words: Sequence[str], kind: Kind = SPRING, without: Sequence[str] = (), *, one_k: str = "", whole: bool = True
+) -> dict[str, Any]:
     """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; an infinite ``k`` is rigid.
 
     Parameters
     ----------
     words : sequence of str
         Each holds any number of ``name=value``, with or without a unit.
-    without : str, optional
-        The unknown or swept input, which must not be among them.
-    ranges : bool
-        ``k`` may be ``low..high``; then it is the pair of both.
+    kind : Kind
+        The contact and direction, which say what the amplitude is.
+    without : sequence of str
+        Unknown or swept inputs, which must not be among them.
+    one_k : str
+        Why ``k`` must not be an interval ``low..high`` here; empty where it may be.
+    whole : bool
+        The other inputs must all be there.
 
     Returns
     -------
     dict of str to float
-        By name: the six inputs (``f`` [Hz] in place of ``omega`` where that was given) less ``without``.
+        By name: the six inputs (``f`` [Hz] in place of ``omega``, the pair ``k_range`` in place of ``k`` where that was
+        given) less ``without``; keywords of :meth:`mumacro.Surrogate.evaluate`.
 
     Raises
     ------
@@ -132,28 +170,50 @@ def read_case(words: Sequence[str], without: str | None = None, ranges: bool = F
         if text is None:
             faults.append(f"{name!r} is no name=value such as Fz=10")
             continue
-        if name not in NAMES:
+        if name not in kind.columns:
             meant = suggestion(name)
             case[meant or name] = math.nan  # not reported as missing, too
-            advice = f"did you mean {meant}?" if meant else f"there are {', '.join(NAMES)}"
-            faults.append(f"unknown input {name!r}: {advice}")
+            faults.append(_unknown(name, text, meant, kind))
             continue
         if name in case:
             faults.append(f"{name} is given twice")
         case[name] = math.nan
         try:
-            if ".." in text and name == "k" and ranges:
-                case[name] = read_range(name, text)
-                continue
-            case[name] = read_number(name, text)
-            field, value = ("omega", case[name] * RAD_PER_CYCLE) if name == "f" else (name, case[name])
-            check_inputs({field: np.asarray(value)}, case[name] if name == "f" else None)
+            case[name] = _read(name, text, kind, one_k)
         except ValueError as error:
             faults.append(str(error))
-    faults += _faults_of_names(case, without)
+    faults += _faults_of_names(case, kind, without, whole)
     if faults:
         raise UsageError("; ".join(faults))
-    return case
+    return {"k_range" if isinstance(value, tuple) else name: value for name, value in case.items()}
+
+
+def _read(name: str, text: str, kind: Kind, one_k: str) -> float | tuple[float, float]:
+    """The value of an input, or the ends of k; ValueError where it is none, or out of bounds."""
+    if name == "k" and ".." in text:
+        ends = read_range(name, text)
+        if one_k:
+            raise ValueError(f"k={text}: {one_k}")
+        return ends
+    value = read_number(name, text)
+    field, in_model = ("omega", value * RAD_PER_CYCLE) if name == "f" else (name, value)
+    try:
+        check_inputs(kind.as_six({field: np.asarray(in_model)}), value if name == "f" else None)
+    except InputError as error:
+        raise kind.refused(error) from None
+    return value
+
+
+def _unknown(name: str, text: str, meant: str | None, kind: Kind) -> str:
+    """Why a name is refused, and what to write."""
+    if name in ("contact", "direction"):
+        return f"{name} is an option: --{name} {text}"
+    if name == AMPLITUDE:
+        return f"{name} is the amplitude of --direction normal; otherwise it is y0"
+    if name == "y0":
+        return f"y0 does not belong to --direction normal, whose amplitude is {AMPLITUDE}"
+    advice = f"did you mean {meant}?" if meant else f"there are {', '.join(kind.columns)}"
+    return f"unknown input {name!r}: {advice}"
 
 
 def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
@@ -164,31 +224,54 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
         last, value = found[-1] if found else ("", None)
         if equals:
             found.append((name, text))
-        elif value is not None and last in NAMES and scale_of(last, name):
+        elif value is not None and last in (*NAMES, *LIKE) and scale_of(last, name):
             found[-1] = last, f"{value} {name}"
         else:
             found.append((name, None))
     return found
 
 
-def _faults_of_names(case: Mapping[str, Any], without: str | None) -> list[str]:
+def _faults_of_names(case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool) -> list[str]:
     frequencies = {"f", "omega"}
-    left_out = frequencies if without in frequencies else {without}
-    faults = [f"leave {name} out: {without} is the unknown or the swept input" for name in case if name in left_out]
+    left_out = {*without} | (frequencies if frequencies & {*without} else set())
+    names = " and ".join(without)
+    told = f"{names} {'is' if len(without) == 1 else 'are'} the unknown or the swept input"
+    faults = [f"leave {name} out: {told}" for name in case if name in left_out]
     if frequencies <= case.keys():
         faults.append("give exactly one of omega [rad/s] and f [Hz]")
     given = case.keys() | left_out | (frequencies if frequencies & case.keys() else set())
     hints = {"k": "k [N/m] (k=rigid for a rigid contact)", "omega": "omega [rad/s] or f [Hz]"}
-    absent = [hints.get(name, f"{name} [{SI[name][0]}]") for name in FIELDS if name not in given]
-    return faults + (["missing: " + ", ".join(absent)] if absent else [])
+    absent = [hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in given]
+    return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
 
 
-def read_values(given: Iterable[tuple[str, str]]) -> list[float]:
+def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
+    """A case with the geometric middle in place of an interval of k."""
+    found = dict(case)
+    if "k_range" in found:
+        low, high = found.pop("k_range")
+        found["k"] = math.sqrt(low) * math.sqrt(high)
+    return found
+
+
+def format_for(chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING) -> str:
+    """How numbers are printed: with ``--digits``, or as many as the stiffness of a case supports."""
+    if chosen.digits is not None:
+        return f".{chosen.digits}g"
+    if "k_range" in case:
+        found = surrogate.evaluate(**{**case, **kind.names})
+        width = 0.5 * (found.mu_macro_high - found.mu_macro_low)
+        return f".{digits(width / found.mu_macro if found.mu_macro else math.inf)}g"
+    contact, direction = kind.names.values()
+    return f".{digits(k_effect(surrogate, case, contact, direction))}g"
+
+
+def read_values(given: Iterable[tuple[str, str]], read: Callable[[str, str], Any] = read_number) -> list[Any]:
     """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that are none."""
     values, faults = [], []
     for name, text in given:
         try:
-            values.append(read_number(name, text))
+            values.append(read(name, text))
         except ValueError as error:
             faults.append(str(error))
     if faults:
@@ -221,7 +304,7 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
 
 
-def write_result(path: Path, columns: Mapping[str, Sequence[Any]], draw: Callable[[Any], Any]) -> str:
+def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any]) -> str:
     """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that names the file."""
     if path.suffix == ".csv":
         with path.open("w", encoding="utf-8", newline="") as stream:

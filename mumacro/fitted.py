@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.extras import missing
+from mumacro.html import html_table
 from mumacro.inputs import SI, real
 from mumacro.measured import STD, UNKNOWNS, Measured
 
@@ -116,6 +117,11 @@ class Fit:
     def _told(self) -> list[str]:
         units = {"k": " N/m", "mu0": ""}
         return [f"{name} = {x:.4g} ± {self.std[name]:.2g}{units[name]}" for name, x in self.values.items()]
+
+    def _repr_html_(self) -> str:
+        ends = {name: f"{low:.6g} to {high:.6g}" for name, (low, high) in self.interval.items()}
+        rows = [(name, x, self.std[name], ends[name]) for name, x in self.values.items()]
+        return html_table(("", "value", "standard deviation", "95 %"), rows, notes=self.warnings)
 
     def __repr__(self) -> str:
         given = STD in self.points

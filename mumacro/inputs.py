@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 
 __all__ = [
-    "BODIES", "BOUNDS", "FIELDS", "GAP", "MOST_HZ", "NAMES", "PER_UNIT", "POSITIVE", "RAD_PER_CYCLE", "RIGID", "SI",
+    "BOUNDS", "FIELDS", "GAP", "LIKE", "MOST_HZ", "NAMES", "PER_UNIT", "POSITIVE", "RAD_PER_CYCLE", "RIGID", "SI",
     "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "is_rigid", "length_scale", "number_hint",
     "read_number", "read_quantity", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion",
-    "unknown_name",
+    "unit_of", "unknown_name",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -40,6 +40,8 @@ SI = {
     "f": ("Hz", "hertz"),
     "v0": ("m/s", "metres per second"),
 }
+#: what may stand for an input, and the input that has its unit: the amplitude of the normal force, the ends of k
+LIKE = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}
@@ -94,13 +96,6 @@ UNITS_OF: dict[str, dict[str, Scale]] = {
         for length, scale in {**_LENGTH, "km": Scale(1e3)}.items()
         for time, seconds in _TIME.items()
     },
-}  # fmt: skip
-
-_PRESSURE = {"Pa": Scale(), "kPa": Scale(1e3), "MPa": Scale(1e6), "GPa": Scale(1e9), "N/mm2": Scale(1e6)}
-#: what else a person types, of two bodies in contact: SI unit, its words, known units
-BODIES: dict[str, tuple[str, str, dict[str, Scale]]] = {
-    "radius": ("m", "metres", _LENGTH), "length": ("m", "metres", _LENGTH),
-    "E": ("Pa", "pascals", _PRESSURE), "nu": ("-", "a plain number", UNITS_OF["mu0"]),
 }  # fmt: skip
 
 # Without case, spaces and punctuation.  Only names that hardly mean anything else: a column of a file that has one of
@@ -161,7 +156,16 @@ def scale_of(name: str, unit: str) -> Scale | None:
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
     """
-    return _scale(UNITS_OF[name] if name in SI else BODIES[name][2], unit)
+    return _scale(UNITS_OF[LIKE.get(name, name)], unit)
+
+
+def unit_of(name: str) -> str:
+    """The SI unit of an input, or of what may stand for one.
+
+    >>> unit_of("k_low"), unit_of("f")
+    ('N/m', 'Hz')
+    """
+    return SI[LIKE.get(name, name)][0]
 
 
 def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:
@@ -245,8 +249,8 @@ def read_number(name: str, text: str) -> float:
     ...
     ValueError: y0=2 N: give metres as a plain number such as 2e-6, or with a unit: m, cm, mm, um, ...
     """
-    words, units = (SI[name][1], UNITS_OF[name]) if name in SI else BODIES[name][1:]
-    return read_quantity(name, text, words, units, rigid=name == "k")
+    like = LIKE.get(name, name)
+    return read_quantity(name, text, SI[like][1], UNITS_OF[like], rigid=name == "k")
 
 
 def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], *, rigid: bool = False) -> float:

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mumacro.charts import REGIMES
-from mumacro.contact import AMPLITUDE
+from mumacro.contact import AMPLITUDE, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
 from mumacro.extras import missing
-from mumacro.inputs import SI
+from mumacro.inputs import unit_of
 
 if TYPE_CHECKING:
     from mumacro.answer import Answer
+    from mumacro.inverse import Crossing
     from mumacro.law import Law
     from mumacro.surrogate import Surrogate
 
-__all__ = ["ENDINGS", "plot_answer", "plot_law", "plot_map", "save"]
+__all__ = ["ENDINGS", "mark_of", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
@@ -85,12 +86,12 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     """
     axes, x = _own(axes), law.values
     axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")
+    if law.band:
+        axes.fill_between(x, *law.band, alpha=0.25, lw=0.0, label="for every $k$ of the interval")
     axes.plot(x, law.mu_static, ":", color="grey", label="static limit")
-    if law.band is not None:
-        axes.fill_between(x, *law.band, alpha=0.3, lw=0.0, label="interval of $k$")
     told = set[str]()
     for crossing in law.border:
-        line, label = next(_MARKS[name] for name in ("continuous", "reverse_slip") if name in crossing.regimes)
+        line, label = mark_of(crossing)
         axes.axvline(crossing.value, ls=line, lw=1.0, color="grey", label=None if label in told else label)
         told.add(label)
     if target is not None:
@@ -98,26 +99,40 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
         axes.plot([*roots], [target] * len([*roots]), "o", color="tab:red")
     if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
         axes.set_xscale("log")
-    unit = SI["Fz" if law.along == AMPLITUDE else law.along][0]
-    axes.set(xlabel=f"{_SYMBOLS[law.along]} [{unit}]", ylabel=r"$\mu_\mathrm{macro}$ [-]")
+    axes.set(xlabel=f"{_SYMBOLS[law.along]} [{unit_of(law.along)}]", ylabel=r"$\mu_\mathrm{macro}$ [-]")
     axes.set_ylim(bottom=0.0)
     axes.legend()
     return axes
 
 
-def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, float] | None = None) -> Any:
+def mark_of(crossing: Crossing) -> tuple[str, str]:
+    """The line that marks a border, and what it is."""
+    return next(_MARKS[name] for name in ("continuous", "reverse_slip") if name in crossing.regimes)
+
+
+def y_range(kind: Kind) -> tuple[float, float]:
+    """Amplitudes of the map [-]; that of a normal force is below 1, where the contact lifts off."""
+    return (Y_RANGE[0], 0.999) if kind.normal else Y_RANGE
+
+
+def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, float] | None = None, **kind: str) -> Any:
     """mu~ over the dimensionless speed and amplitude, with the border of continuous sliding and a ``point`` (v~, y~).
 
-    Returns the matplotlib Axes; raises MumacroError where matplotlib is not installed.
+    ``contact`` and ``direction`` as in :meth:`mumacro.Surrogate.quantity`.  Returns the matplotlib Axes; raises
+    MumacroError where matplotlib is not installed.
     """
-    axes = _own(axes)
-    v, y = np.geomspace(*V_RANGE, 281), np.geomspace(*Y_RANGE, 201)
-    found = axes.contourf(v, y, surrogate.mu_ratio(v, y[:, None]), np.linspace(0.0, 1.0, 21), cmap="viridis")
+    axes, chosen = _own(axes), kind_of(**kind)
+    ends = y_range(chosen)
+    v, y = np.geomspace(*V_RANGE, 281), np.geomspace(*ends, 201)
+    ratio = surrogate.quantity("mu_ratio", v, y[:, None], **kind)[0]
+    found = axes.contourf(v, y, ratio, np.linspace(0.0, 1.0, 21), cmap="viridis")
     axes.figure.colorbar(found, ax=axes, label=r"$\mu_\mathrm{macro} / \mu_0$ [-]")
-    _plane(axes, surrogate.v_tilde_crit(y), y)
+    _plane(axes, surrogate.v_tilde_crit(y, **kind), y)
+    if chosen.normal:
+        axes.set_ylabel(r"$\tilde y = \hat F_z / F_z$")
     if point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
         axes.plot(*point, "o", color="tab:red", markeredgecolor="white")
-    axes.set(xlim=V_RANGE, ylim=Y_RANGE)
+    axes.set(xlim=V_RANGE, ylim=ends)
     return axes
 
 

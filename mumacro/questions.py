@@ -2,30 +2,40 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mumacro import command, plotting, stiffness
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
-from mumacro.inputs import BODIES, NAMES, RAD_PER_CYCLE, SI
+from mumacro import command, plotting
+from mumacro.command import (
+    ImpossibleError,
+    OneLineParser,
+    UsageError,
+    as_json,
+    format_for,
+    in_columns,
+    kind_in,
+    open_table,
+    read_case,
+)  # fmt: skip
+from mumacro.contact import AMPLITUDE
+from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
+from mumacro.inputs import NAMES, RAD_PER_CYCLE, unit_of
 from mumacro.inverse import solve_for
 from mumacro.law import approximations, friction_law, sweep_values
 
-__all__ = ["LAW", "SOLVE_FOR", "law", "map_", "solve", "stiffness_of"]
+__all__ = ["LAW", "ONE_K", "SOLVE_FOR", "STIFFNESS", "law", "map_", "solve", "stiffness_of"]
 
 LAW = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s 1m/s"
 SOLVE_FOR = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
+STIFFNESS = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"
 OUT = "write the result there: a picture, .png, .svg or .pdf, or .csv"
 CURVE = 400  # points of a curve in a picture
-GEOMETRIES: dict[str, Callable[..., stiffness.Contact]] = {
-    "ball": stiffness.ball_on_flat, "flat": stiffness.flat_punch, "cylinder": stiffness.cylinder_on_flat,
-}  # fmt: skip
+ONE_K = "one k is needed: over an interval of it a wanted mu_macro has no single answer; solve for both ends"
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 
 
@@ -41,7 +51,7 @@ def law(words: Sequence[str]) -> str:
         description="mu_macro over a range of one input, with the static value and the border of continuous sliding.",
         epilog=f"{command.INPUTS}\nexamples:\n  {LAW}\n  {LAW} -o law.png",
     )
-    command.add_table(parser, "a case without the swept input")
+    command.add_case(parser, "a case without the swept input", "*")
     text = "the swept input, its first and its last value"
     parser.add_argument("--along", nargs="+", metavar=("NAME", "LOW HIGH"), default=["v0"], help=text)
     parser.add_argument("--from", dest="start", help="first value, in its SI unit or with a unit, as in --along")
@@ -52,41 +62,40 @@ def law(words: Sequence[str]) -> str:
     parser.add_argument("-o", "--out", type=Path, help=OUT)
     chosen = parser.parse_intermixed_args(words)
     (along, *ends), known = [x for x in chosen.along if "=" not in x] or [""], [x for x in chosen.along if "=" in x]
-    if along not in NAMES:
-        raise UsageError(f"--along {along or known[0]}: the swept input is one of {', '.join(NAMES)}")
+    kind = kind_in(chosen)
+    if along not in kind.columns:
+        raise UsageError(f"--along {along or known[0]}: the swept input is one of {', '.join(kind.columns)}")
     ends = ends or [end for end in (chosen.start, chosen.stop) if end is not None]
     if len(ends) != 2:
         raise UsageError(f"give the first and the last value: --along {along} LOW HIGH")
-    (inner, scale), unit = _inner(along), SI[along][0]
-    case = read_case([*chosen.words, *known], along)
+    (inner, scale), unit = _inner(along), unit_of(along)
+    case = read_case([*chosen.words, *known], kind, [along])
     start, stop = (scale * end for end in command.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     values = sweep_values(inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale)
     surrogate = open_table(chosen.table)
-    found = friction_law(surrogate, inner, values, case)
-    columns: dict[str, Any] = {
-        along: values / scale,
-        **{name: getattr(found.answer, name) for name in ("mu_macro", "regime", "error_bound", "source")},
-        "mu_static": found.mu_static,
-    }
-    if chosen.approximations:
-        columns |= approximations(surrogate, found)
+    options: dict[str, Any] = {**kind.names, "refine": drawn}
+    found = friction_law(surrogate, inner, values, case, **options)
+    columns = found.columns | (approximations(surrogate, found) if chosen.approximations else {})
+    columns = {along: columns.pop(inner) / scale, **columns}
     border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
     if chosen.json:
         return as_json({"along": along, "unit": unit, **columns, "border": border, "table": command.about(surrogate)})
     headed = {f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()}
-    marks = [f"border of continuous sliding at {along} = {b[along]:.{chosen.digits}g} {unit}" for b in border]
+    form = format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
+    of_k = ", for the geometric middle of k" if found.band else ""
+    marks = [f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
     if chosen.out is not None:
         return "\n".join(
             [command.write_result(chosen.out, headed, lambda axes: plotting.plot_law(found, axes)), *marks]
         )
     del headed["source"]
-    shown = [[cell if isinstance(cell, str) else _shown(cell, chosen.digits) for cell in x] for x in headed.values()]
+    shown = [[cell if isinstance(cell, str) else _shown(cell, form) for cell in x] for x in headed.values()]
     return "\n".join([in_columns([[*headed], *zip(*shown, strict=True)]), *marks])
 
 
-def _shown(value: float, digits: int) -> str:
-    return "-" if math.isnan(value) else f"{value:.{digits}g}"
+def _shown(value: float, form: str) -> str:
+    return "-" if math.isnan(value) else f"{value:{form}}"
 
 
 def solve(words: Sequence[str]) -> str:
@@ -96,22 +105,25 @@ def solve(words: Sequence[str]) -> str:
         description="Every value of one input at which mu_macro has a wanted value.",
         epilog=f"{command.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {SOLVE_FOR}",
     )
-    parser.add_argument("unknown", choices=NAMES, help="the unknown input")
-    command.add_table(parser, "the other five inputs")
+    parser.add_argument("unknown", choices=(*NAMES, AMPLITUDE), help="the unknown input")
+    command.add_case(parser, "the other five inputs")
     parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     parser.add_argument("-o", "--out", type=Path, help=OUT)
     chosen = parser.parse_intermixed_args(words)
-    unknown, (inner, scale), unit = chosen.unknown, _inner(chosen.unknown), SI[chosen.unknown][0]
-    case = read_case(chosen.words, unknown)
+    unknown, (inner, scale), unit = chosen.unknown, _inner(chosen.unknown), unit_of(chosen.unknown)
+    kind = kind_in(chosen)
+    if unknown not in kind.columns:
+        raise UsageError(f"{unknown} does not belong to --direction {chosen.direction}: {', '.join(kind.columns)} do")
+    case = read_case(chosen.words, kind, [unknown], one_k=ONE_K)
     if chosen.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
     ends = [scale * end for end in command.read_values((unknown, text) for text in chosen.between or ())]
     surrogate = open_table(chosen.table)
-    found = solve_for(surrogate, inner, target, case, (ends[0], ends[1]) if ends else None)
+    found = solve_for(surrogate, inner, target, case, (ends[0], ends[1]) if ends else None, **kind.names)
     reach = found.reach
     if not found.roots[0]:
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
@@ -133,13 +145,14 @@ def solve(words: Sequence[str]) -> str:
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
         values = sweep_values(inner, low, high, CURVE, "log" if low > 0.0 else "linear")
-        curve = friction_law(surrogate, inner, values, case)
+        options: dict[str, Any] = {**kind.names, "refine": True}
+        curve = friction_law(surrogate, inner, values, case, **options)
         columns = dict(zip(heads, zip(*roots, strict=True), strict=True))
         return command.write_result(
             chosen.out, columns, lambda axes: plotting.plot_law(curve, axes, roots=at, target=target)
         )  # fmt: skip
-    text = f".{chosen.digits}g"
-    return in_columns([heads, *([*(f"{x:{text}}" for x in numbers), regime] for *numbers, regime in roots)])
+    form = format_for(chosen, surrogate, {**case, inner: found.roots[0][0].value}, kind)
+    return in_columns([heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)])
 
 
 def map_(words: Sequence[str]) -> str:
@@ -149,16 +162,21 @@ def map_(words: Sequence[str]) -> str:
         description="The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case on it.",
         epilog=f"{command.INPUTS}\nexample:\n  mumacro map -o map.png",
     )
-    command.add_table(parser, "a case to mark, if any")
+    command.add_case(parser, "a case to mark, if any", "*")
     parser.add_argument("-o", "--out", type=Path, required=True, help=OUT)
     chosen = parser.parse_intermixed_args(words)
-    surrogate = open_table(chosen.table)
-    case = surrogate.evaluate(read_case(chosen.words)) if chosen.words else None
-    point = None if case is None else (case.v_tilde, case.y_tilde)
-    v, y = (x.ravel() for x in np.meshgrid(np.geomspace(*plotting.V_RANGE, 141), np.geomspace(*plotting.Y_RANGE, 101)))
-    columns = {"v_tilde": v, "y_tilde": y, "mu_ratio": surrogate.mu_ratio(v, y)}
-    text = command.write_result(chosen.out, columns, lambda axes: plotting.plot_map(surrogate, axes, point=point))
-    ranges = (plotting.V_RANGE, plotting.Y_RANGE)
+    kind, surrogate = kind_in(chosen), open_table(chosen.table)
+    one_k = "one k is needed: the map marks one point"
+    point = None
+    if chosen.words:
+        case = surrogate.evaluate(**{**read_case(chosen.words, kind, one_k=one_k), **kind.names})
+        point = (case.v_tilde, case.y_tilde)
+    ranges = (plotting.V_RANGE, plotting.y_range(kind))
+    v, y = (x.ravel() for x in np.meshgrid(np.geomspace(*ranges[0], 141), np.geomspace(*ranges[1], 101)))
+    columns = {"v_tilde": v, "y_tilde": y, "mu_ratio": surrogate.quantity("mu_ratio", v, y, **kind.names)[0]}
+    text = command.write_result(
+        chosen.out, columns, lambda axes: plotting.plot_map(surrogate, axes, point=point, **kind.names)
+    )
     if point and not all(low <= x <= high for x, (low, high) in zip(point, ranges, strict=True)):
         text += f"\nthe case lies outside the map: v~ = {point[0]:.6g}, y~ = {point[1]:.6g}"
     return text
@@ -168,43 +186,27 @@ def stiffness_of(words: Sequence[str]) -> str:
     """``mumacro stiffness``."""
     parser = OneLineParser(
         prog="mumacro stiffness",
-        description="The tangential stiffness k of a contact from materials and geometry.",
-        epilog="example:\n  mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3",
+        description="The tangential stiffness k of a contact from materials and geometry, and the kind of the contact.",
+        epilog=f"example:\n  {STIFFNESS}\n\nThe arguments of each: mumacro stiffness ball --help.",
     )
-    parser.add_argument("geometry", choices=GEOMETRIES, help="a ball, a flat punch or a lying cylinder on a flat body")
-    parser.add_argument("--radius", required=True, help="[m], of the ball, the punch or the cylinder")
-    parser.add_argument("--length", help="[m], of the cylinder")
-    parser.add_argument("--Fz", required=True, help="normal force [N]")
-    parser.add_argument("--E", required=True, help="Young's modulus [Pa], of both bodies or of the first")
-    parser.add_argument("--nu", required=True, help="Poisson's ratio [-], of both bodies or of the first")
-    parser.add_argument("--E2", help="of the flat body, where it is another material; inf: rigid")
-    parser.add_argument("--nu2", help="of the flat body")
-    parser.add_argument("--along", action="store_true", help="k along the axis of the cylinder, not across it")
-    command.add_form(parser)
+    parts = parser.add_subparsers(dest="geometry", required=True, metavar="GEOMETRY")
+    for name, geometry in GEOMETRIES.items():
+        part = parts.add_parser(name, help=geometry.meaning, description=f"k of {geometry.meaning}.")
+        for argument in (*geometry.arguments, *BODIES):
+            about, needed = ARGUMENTS[argument], argument in (*geometry.arguments, *BODIES[:2])
+            unit, choices = f" [{about.unit}]" if about.unit else "", about.choices or None
+            part.add_argument(f"--{argument}", required=needed, choices=choices, help=f"{about.meaning}{unit}")
+        command.add_form(part)
     chosen = parser.parse_args(words)
-    texts = {name: getattr(chosen, name) for name in ("radius", "length", "Fz", "E", "nu", "E2", "nu2")}
-    texts |= {"E2": texts["E2"] or texts["E"], "nu2": texts["nu2"] or texts["nu"]}
-    wanted = inspect.signature(GEOMETRIES[chosen.geometry]).parameters
-    faults = []
-    for name in ("length", "along"):
-        given = getattr(chosen, name)
-        if given and {"along": "oscillation"}.get(name, name) not in wanted:
-            faults.append(f"--{name}: a {chosen.geometry} has none; leave it out")
-        elif name == "length" and name in wanted and not given:
-            faults.append("--length is missing: the length of the cylinder [m]")
-    if faults:
-        raise UsageError("; ".join(faults))
-    there = {name: text for name, text in texts.items() if text is not None}
-    values = command.read_values((name.rstrip("2"), text) for name, text in there.items())
-    si = dict(zip(there, values, strict=True))
-    bodies = [stiffness.Material(si["E"], si["nu"]), stiffness.Material(si["E2"], si["nu2"])]
-    sizes = {name: si[name] for name in ("radius", "length", "Fz") if name in wanted}
-    more = {"oscillation": "along" if chosen.along else "across"} if "oscillation" in wanted else {}
-    found = asdict(GEOMETRIES[chosen.geometry](**sizes, **more, first=bodies[0], second=bodies[1]))
-    contact = found.pop("contact")
+    names = (*GEOMETRIES[chosen.geometry].arguments, *BODIES)
+    texts = {name: text for name in names if (text := getattr(chosen, name)) is not None}
+    given = dict(zip(texts, command.read_values(texts.items(), read_argument), strict=True))
+    contact = contact_of(chosen.geometry, **given)
+    found = asdict(contact)
     if chosen.json:
-        materials = [asdict(body) for body in bodies]
-        return as_json({**found, "contact": contact, "geometry": chosen.geometry, **sizes, "bodies": materials})
-    rows = [(name, f"{value:.{chosen.digits}g}", f"[{_UNITS[name]}]") for name, value in found.items()]
-    told = [f"E = {body.E:.6g} {BODIES['E'][0]}, nu = {body.nu:g}" for body in bodies]
-    return in_columns([*rows, ("contact", contact), *zip(("first body", "second body"), told, strict=True)])
+        return as_json({**found, "geometry": chosen.geometry, **given})
+    form = f".{chosen.digits or 4}g"  # what materials and geometry give at best
+    rows = [(name, f"{found[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
+    option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
+    rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
+    return in_columns(rows)

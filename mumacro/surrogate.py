@@ -18,6 +18,7 @@ from mumacro.bundled import bundled_tables
 from mumacro.cells import block_rows, outer_cells, quantity_cells
 from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
 from mumacro.errors import InputError, TableError
+from mumacro.html import html_table
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, real
 from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
@@ -111,6 +112,17 @@ class Surrogate:
 
     def __repr__(self) -> str:
         return f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most {self.max_abs_error:.1e}>"
+
+    def _repr_html_(self) -> str:
+        errors = f"{self.max_abs_error:.1e} absolute, {self.max_rel_error:.1e} relative"
+        rows = [("table", self.id), ("tolerance of mu~", f"{self.tolerance:g}"), ("verified error", errors)]
+        return html_table((), rows)
+
+    def plot(self, axes: Any = None, **more: Any) -> Any:
+        """The map of mu~, see :func:`mumacro.plotting.plot_map`; needs matplotlib."""
+        from mumacro.plotting import plot_map
+
+        return plot_map(self, axes, **more)
 
     def on_one_thread(self) -> Surrogate:
         """The same table, whose calls start no thread."""

@@ -1,5 +1,7 @@
 """The command ``mumacro``: answers with units, advice for wrong arguments, exit codes."""
 
+import csv
+import io
 import json
 import math
 import shlex
@@ -10,9 +12,11 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import Surrogate, stiffness
+from mumacro import Surrogate, fit
 from mumacro.__main__ import COMMANDS, main
+from mumacro.geometries import GEOMETRIES, contact_of
 from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
+from mumacro.validity import model_rows
 
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 LAW_FROM = ("law", CASE, "--from", "1", "--to", "2", "--radius", "1")
@@ -45,7 +49,12 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightes
     assert f"+- {expected.error_bound:.2g}" in row
     for part in (expected.regime, expected.source, tightest.id):
         assert part in text
-    assert f"{expected.mu_macro:.6g} " in said(capsys, 0, CASE)
+    shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
+    assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
+    told = [f"model  {row['row']}: {row['text']}" for row in model_rows(tightest, VALUES)]
+    assert rows[-len(told) :] == told
+    assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(tightest, VALUES)
+    assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
 
 
 def test_json_has_every_bit_and_the_inputs_may_be_separate_arguments(capsys, tightest):
@@ -205,11 +214,181 @@ def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
     assert (low, high) == (close(mu.min(), rel=1e-6), close(mu.max(), rel=1e-6))
     assert low <= mu.min() <= mu.max() <= high
     assert found["inputs"]["k"] == close(math.sqrt(1e5 * 1e8), rel=1e-15)
-    assert f"{low:.6g}" in said(capsys, 0, words)
+    assert f"{low:#.4g}" in said(capsys, 0, words)
+    assert "k is known" not in said(capsys, 0, words)
     for wrong in ("2..1 N/um", "0..1 N/um", "1..inf", "a..2"):
         assert "k=" in said(capsys, 2, words.replace("0.1..100 N/um", wrong.replace(" ", "")))
-    assert "k=1..2" in said(capsys, 2, "law", words.replace("0.1..100 N/um", "1..2").replace("v0=2cm/s", ""),
-                            "--along", "v0", "1", "2")  # fmt: skip
+    assert "one k is needed" in said(capsys, 2, "map", words, "-o", "x.csv")
+
+
+NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
+KINDS = {
+    "ball": (CASE, {"contact": "ball"}, {}), "along": (CASE, {"direction": "along"}, {}),
+    "ball along": (CASE, {"contact": "ball", "direction": "along"}, {}),
+    "normal": (NORMAL, {"direction": "normal"}, {"Fz_amplitude": 1.0}),
+    "range": (CASE.replace("1e6", "0.8..1.2N/um"), {"contact": "ball"}, {"k_range": (0.8e6, 1.2e6)}),
+}  # fmt: skip
+
+
+def asked(name):
+    """The words and options of a case, and the keywords of the library."""
+    words, kind, more = KINDS[name]
+    inputs = {**VALUES, **more, **kind}
+    inputs.pop("y0" if "Fz_amplitude" in more else "", None)
+    inputs.pop("k" if "k_range" in more else "", None)
+    return words, [f"--{key}={value}" for key, value in kind.items()], inputs
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(capsys, tightest, name):
+    words, options, inputs = asked(name)
+    expected = tightest.evaluate(**inputs, gradient=True)
+    found = json.loads(said(capsys, 0, words, *options, "--json", "--gradient"))
+    assert {key: found[key] for key in ("mu_macro", "regime", "source", "error_bound", "gradient")} == {
+        key: getattr(expected, key) for key in ("mu_macro", "regime", "source", "error_bound", "gradient")
+    }
+    assert {key: found[key] for key in ("contact", "direction") if key in found} == KINDS[name][1]
+    if "k_range" in inputs:
+        ends = {key: getattr(expected, key) for key in ("mu_macro_low", "mu_macro_high")}
+        assert found["k_range"] == {"k": [0.8e6, 1.2e6], **ends}
+    text = said(capsys, 0, words, *options, "--digits", "15")
+    assert f"{expected.mu_macro:#.15g}" in text
+    assert expected.regime in text
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_law_and_solve_for_know_contact_direction_and_range(capsys, tmp_path, tightest, name):
+    words, options, inputs = asked(name)
+    words = words.replace("v0=0.01", "")
+    out = tmp_path / "law.csv"
+    said(capsys, 0, "law", words, "--along", "v0", "1mm/s", "1m/s", "--points", "5", *options, "-o", str(out))
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    expected = tightest.evaluate(**{**inputs, "v0": np.array([float(row["v0 [m/s]"]) for row in rows])})
+    columns = ["mu_macro"] + ["mu_macro_low", "mu_macro_high"] * ("k_range" in inputs)
+    assert list(rows[0])[1 : 1 + len(columns)] == columns
+    for column in columns:
+        assert [float(row[column]) for row in rows] == getattr(expected, column).tolist()
+    assert [row["regime"] for row in rows] == expected.regime.tolist()
+    if "k_range" in inputs:
+        assert "one k is needed" in said(capsys, 2, "solve-for", "v0", words, "--target", "0.25", *options)
+        return
+    found = json.loads(said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json"))
+    for root in found["roots"]:
+        assert tightest.evaluate(**{**inputs, "v0": root["v0"]}).mu_macro == close(0.29, abs=1e-10)
+    assert found["roots"]
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        ((CASE + " contact=ball",), "contact is an option: --contact ball"),
+        ((CASE, "--direction", "normal"), "y0 does not belong to --direction normal, whose amplitude is Fz_amplitude"),
+        ((NORMAL,), "Fz_amplitude is the amplitude of --direction normal; otherwise it is y0"),
+        ((NORMAL, "--direction", "normal", "--contact", "ball"), "across or along for a ball"),
+        ((NORMAL.replace("1N", "10N"), "--direction", "normal"), "lifts off"),
+        ((NORMAL.replace("1N", "-1N"), "--direction", "normal"), "Fz_amplitude must be >= 0"),
+        (("solve-for", "y0", NORMAL, "--direction", "normal", "--target", "0.1"), "y0 does not belong"),
+        (("law", NORMAL, "--along", "Fz_amplitude", "1", "2"), "the swept input is one of mu0"),
+        (("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1", "2", "--contact", "ball", "--approximations"),
+         "one spring"),
+    ],
+)  # fmt: skip
+def test_what_does_not_belong_to_a_contact_or_direction_is_named(capsys, words, part):
+    assert part in said(capsys, 2, *words)
+
+
+# --- fit ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def measured(tmp_path, tightest):
+    """Thirty points of a ball, with scatter, in a file; and the same in SI."""
+    v0 = np.geomspace(1e-3, 1.0, 30)
+    exact = tightest.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=v0, contact="ball").mu_macro
+    mu = exact + 1e-3 * np.cos(17.0 * np.arange(30))
+    rows = [f"{1e3 * v!r},a note,{100.0 * m!r}" for v, m in zip(v0.tolist(), mu.tolist(), strict=True)]
+    path = tmp_path / "measured.csv"
+    path.write_text("\n".join(["v0 [mm/s],note,mu_macro [%]", *rows, ""]))
+    return path, {"v0": 1e3 * v0 / 1e3, "mu_macro": 100.0 * mu / 100.0}
+
+
+RIG = ("Fz=10N y0=2um", "f=20kHz")
+
+
+@pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)])
+def test_fit_is_that_of_the_library(capsys, monkeypatch, measured, unknowns):
+    pytest.importorskip("scipy")
+    path, points = measured
+    known = {name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns}
+    words = [*RIG, *(f"{name}={value!r}" for name, value in known.items()), "--contact", "ball"]
+    expected = fit(points, unknowns, contact="ball", Fz=10.0, y0=2e-6, f=20e3, **known)
+    found = json.loads(said(capsys, 0, "fit", str(path), "--unknown", *unknowns, *words, "--json"))
+    for name in unknowns:
+        assert found["values"][name] == close(expected.values[name], rel=1e-9)
+        assert found["std"][name] == close(expected.std[name], rel=1e-6)
+        assert found["interval"][name] == close(list(expected.interval[name]), rel=1e-6)
+    assert (found["contact"], found["warnings"]) == ("ball", list(expected.warnings))
+    monkeypatch.setattr(sys, "stdin", io.StringIO(path.read_text()))
+    text = said(capsys, 0, "fit", "-", *words, "--unknown", *unknowns)
+    assert [line.split()[0] for line in text.splitlines()[: len(unknowns)]] == list(unknowns)
+    assert f"+- {expected.std[unknowns[0]]:.2g}" in text
+    assert "95 %" in text
+
+
+def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(capsys, tmp_path, measured):
+    pytest.importorskip("scipy")
+    pytest.importorskip("matplotlib")
+    path, points = measured
+    for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
+        said(capsys, 0, "fit", str(path), *RIG, "--contact", "ball", "-o", str(tmp_path / f"fit{ending}"))
+        assert (tmp_path / f"fit{ending}").read_bytes().startswith(begin)
+    said(capsys, 0, "fit", str(path), *RIG, "--contact", "ball", "-o", str(tmp_path / "fit.csv"))
+    with (tmp_path / "fit.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["v0 [m/s]"]) for row in rows] == close(points["v0"].tolist(), rel=1e-15)
+    fitted = fit(points, contact="ball", Fz=10.0, y0=2e-6, f=20e3)
+    assert [float(row["mu_macro fitted"]) for row in rows] == close(
+        (points["mu_macro"] - fitted.residuals).tolist(), rel=1e-9
+    )
+    two = "".join(path.read_text().splitlines(keepends=True)[:3])
+    path.write_text(two)
+    assert "warning: as many points as unknowns" in said(capsys, 0, "fit", str(path), *RIG, "--contact", "ball")
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "code", "parts"),
+    [
+        ("", RIG, 1, ["no column v0 [m/s]", "no column mu_macro"]),
+        ("speed,mu_macro\n1,0.2\n", RIG, 1, ["no column v0 [m/s]; rename 'speed'"]),
+        ("v0 [s],mu_macro\n1,0.2\n", RIG, 1, ["'v0 [s]' has a unit that v0 cannot have"]),
+        ("v0,v0 [mm/s],mu_macro\n1,1,0.2\n", RIG, 1, ["v0 is there twice"]),
+        ("v0,mu_macro\n1,\nx,0.2\n1,2,3\n1_0,0.1\n", RIG, 1,
+         ["row 1: mu_macro is missing", "row 2: v0 must be a number, got 'x'", "row 3 has 3 cells", "row 4: v0 must"]),
+        ("v0;mu_macro\n0,1;0,2\n0,2;0,21\n", RIG, 1, ["give --sep ';' --decimal ','"]),
+        ("v0,mu_macro\n1,0.2\n2,0.21\n", RIG[:1], 2, ["missing: omega [rad/s] or f [Hz]"]),
+        ("v0,mu_macro\n1,0.2\n2,0.21\n", (*RIG, "v0=1"), 2, ["leave v0 out"]),
+        ("v0,mu_macro\n1,0.2\n2,0.21\n", (*RIG, "--unknown", "y0"), 2, ["k, mu0 or both"]),
+        ("v0,mu_macro\n1,0.2\n", RIG, 1, ["1 different inputs"]),
+        ("v0,mu_macro\n1,nan\n2,0.2\n", RIG, 1, ["mu_macro at index 0"]),
+    ],
+)  # fmt: skip
+def test_points_that_cannot_be_fitted_are_refused_with_the_remedy(capsys, tmp_path, text, words, code, parts):
+    (tmp_path / "points.csv").write_text(text)
+    message = said(capsys, code, "fit", str(tmp_path / "points.csv"), *words)
+    assert all(part in message for part in parts), message
+
+
+def test_points_of_a_german_file_are_read(capsys, tmp_path, measured):
+    pytest.importorskip("scipy")
+    path, _ = measured
+    (tmp_path / "german.csv").write_text("\ufeff" + path.read_text().replace(",", ";").replace(".", ","), "utf-8")
+    words = (*RIG, "--sep", ";", "--decimal", ",", "--json")
+    german = json.loads(said(capsys, 0, "fit", str(tmp_path / "german.csv"), *words))
+    assert german["values"] == json.loads(said(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
+
+
+# --- pictures and files ---------------------------------------------------------------------------------
 
 
 PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s", "1m/s"),
@@ -281,25 +460,47 @@ def test_objects_plot_themselves(tightest):
         plot_answer(tightest.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}), figure.add_subplot())
 
 
-def test_stiffness_from_materials_with_units(capsys):
-    ball = ("stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
-    found = json.loads(said(capsys, 0, *ball, "--json"))
-    steel = stiffness.Material(210e9, 0.3)
-    assert (found["k"], found["contact"]) == (stiffness.ball_on_flat(5e-3, 10.0, steel, steel).k, "ball")
-    soft = json.loads(said(capsys, 0, *ball, "--E2", "3 MPa", "--nu2", "0.5", "--json"))
-    assert soft["k"] == stiffness.ball_on_flat(5e-3, 10.0, steel, stiffness.Material(3e6, 0.5)).k
-    text = said(capsys, 0, "stiffness", "flat", *ball[2:])
-    assert "spring" in text
-    assert f"{stiffness.flat_punch(5e-3, 10.0, steel, steel).k:.6g}" in text
-    lying = ("stiffness", "cylinder", *ball[2:], "--length", "1cm", "--json")
-    ks = [json.loads(said(capsys, 0, *lying, *more))["k"] for more in ((), ("--along",))]
-    assert ks == [stiffness.cylinder_on_flat(5e-3, 0.01, 10.0, steel, steel, way).k for way in stiffness.AXES]
-    message = said(capsys, 2, *ball[:3], "5mN", "--Fz", "10V", *ball[6:])
+BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
+
+
+@pytest.mark.parametrize(
+    ("words", "geometry", "given"),
+    [
+        (BALL, "ball", {}),
+        ((*BALL, "--E2", "3 MPa", "--nu2", "0.5"), "ball", {"E2": 3e6, "nu2": 0.5}),
+        ((*BALL, "--E2", "rigid"), "ball", {"E2": math.inf}),
+        (("flat", *BALL[1:]), "flat", {}),
+        (("cylinder", *BALL[1:], "--length", "1cm", "--oscillation", "along"), "cylinder",
+         {"length": 0.01, "oscillation": "along"}),
+    ],
+)  # fmt: skip
+def test_stiffness_from_materials_with_units_and_what_it_prints_goes_into_the_next_command(
+    capsys, words, geometry, given
+):
+    found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
+    expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
+    assert (found["k"], found["contact"]) == (expected.k, expected.contact)
+    lines = said(capsys, 0, "stiffness", *words).splitlines()
+    assert lines[-2].split() == ["contact", expected.contact]
+    pasted = lines[-1].split()[1:]
+    answer = json.loads(said(capsys, 0, CASE.replace("k=1e6", ""), *pasted, "--json"))
+    assert answer.get("contact", "spring") == expected.contact
+    assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
+
+
+def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys):
+    message = said(capsys, 2, "stiffness", *BALL[:2], "5mN", "--Fz", "10V", *BALL[5:])
     assert "radius=5mN" in message
     assert "Fz=10V" in message
-    assert "--length is missing" in said(capsys, 2, "stiffness", "cylinder", *ball[2:])
-    assert "leave it out" in said(capsys, 2, *ball, "--length", "1")
-    assert "nu must be" in said(capsys, 2, *ball[:-1], "0.7")
+    assert "nu must be" in said(capsys, 2, "stiffness", *BALL[:-1], "0.7")
+    for geometry, about in GEOMETRIES.items():
+        with pytest.raises(SystemExit):
+            main(["stiffness", geometry])
+        error = capsys.readouterr().err
+        assert all(f"--{name}" in error for name in (*about.arguments, "E", "nu"))
+    with pytest.raises(SystemExit):
+        main(["stiffness", *BALL, "--length", "1"])
+    assert "--length" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])

@@ -340,3 +340,84 @@ def test_folders_patterns_and_hive_names(tmp_path, surrogate):
     assert (summary.answered, summary.rejected) == (10, 1)
     (reject,) = read(summary.rejects)
     assert (reject["file"], reject["row"]) == (str(texts[1]), "6")
+
+
+# --- contact, direction, an uncertain k -----------------------------------------------------------------
+
+ALIKE = {name: value for name, value in CASE.items() if name not in ("k", "y0", "omega")}
+KINDS = {
+    "ball": ({"contact": "ball"}, {"k": 1e6, "y0": 2e-6}), "along": ({"direction": "along"}, {"k": 1e6, "y0": 2e-6}),
+    "normal": ({"direction": "normal"}, {"k": 1e6, "Fz_amplitude": 1.0}),
+    "range": ({}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
+    "range of a ball": ({"contact": "ball"}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+@pytest.mark.parametrize("start", ["csv", "ndjson", "parquet"])
+@pytest.mark.parametrize("name", KINDS)
+def test_files_know_contact_direction_and_ends_of_k_as_the_library_does(tmp_path, capsys, surrogate, start, end, name):
+    kind, more = KINDS[name]
+    rng = np.random.default_rng(3)
+    given = {field: value * rng.uniform(0.9, 1.1, 40) for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()}
+    source, out, rows = tmp_path / f"cases.{start}", tmp_path / f"out.{end}", pa.table(given).to_pylist()
+    if start == "parquet":
+        pq.write_table(pa.table(given), source)
+    else:
+        lines = [",".join(given), *(",".join(map(repr, row.values())) for row in rows)]
+        source.write_text("\n".join(lines if start == "csv" else map(json.dumps, rows)))
+    options = [f"--{key}={value}" for key, value in kind.items()]
+    ran(capsys, 0, source, "-o", out, *options, "--include", "gradient")
+    found = read(out)
+    expected = surrogate.evaluate(given, gradient=True, **kind)
+    names = ["mu_macro", *(["mu_macro_low", "mu_macro_high"] if "k_low" in given else []), *ANSWERS[1:]]
+    slopes = [f"d_mu_macro_d_{field}" for field in expected.gradient]
+    assert list(found[0]) == [*given, *names, *slopes]
+    for column in names:
+        read_back = [row[column] if column in ("regime", "source") else float(row[column]) for row in found]
+        assert read_back == getattr(expected, column).tolist()
+    for field, slope in expected.gradient.items():
+        assert [float(row[f"d_mu_macro_d_{field}"]) for row in found] == slope.tolist()
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+def test_a_gap_or_a_wrong_order_of_the_ends_of_k_rejects_its_row(tmp_path, capsys, end):
+    rows = ["0.8,1.2", ",1.2", "0.8,", "1.2,0.8", "0,1", "rigid,2", "0.8,inf", "1,1"]
+    rows = [f"0.3,10,{ends},2e-6,1.3e5,0.01" for ends in rows]
+    (tmp_path / "cases.csv").write_text("\n".join(["mu0,Fz,k_low [N/um],k_high [N/um],y0,omega,v0", *rows]))
+    out = tmp_path / f"out.{end}"
+    ran(capsys, 3, tmp_path / "cases.csv", "-o", out)
+    one, same = read(out)
+    assert float(one["mu_macro_low"]) < float(one["mu_macro"]) < float(one["mu_macro_high"])
+    assert same["mu_macro_low"] == same["mu_macro"] == same["mu_macro_high"]
+    assert rejects_of(out) == [
+        (2, "k_low", "is missing"), (3, "k_high", "is missing"), (4, "k_high", "must be >= k_low"),
+        (5, "k_low", "must be finite and > 0"), (6, "k_low", "must be a number"),
+        (7, "k_high", "must be finite and > 0"),
+    ]  # fmt: skip
+
+
+def test_a_normal_force_that_lifts_off_rejects_its_row(tmp_path, capsys):
+    rows = [f"0.3,10,1e6,{amplitude},20,0.01" for amplitude in ("0", "9.99", "10", "-1", "", "inf")]
+    (tmp_path / "cases.csv").write_text("\n".join(["mu0,Fz,k,Fz_amplitude,f [kHz],v0", *rows]))
+    out, lifts = tmp_path / "out.csv", "must be >= 0 and below Fz: at Fz the contact lifts off"
+    assert "no column y0, but Fz_amplitude: give --direction normal" in ran(
+        capsys, 1, tmp_path / "cases.csv", "-o", out
+    )
+    ran(capsys, 3, tmp_path / "cases.csv", "-o", out, "--direction", "normal")
+    assert [float(row["mu_macro"]) > 0.0 for row in read(out)] == [True, True]
+    assert rejects_of(out) == [(row, "Fz_amplitude", "is missing" if row == 5 else lifts) for row in (3, 4, 5, 6)]
+    assert "across or along for a ball" in ran(
+        capsys, 2, tmp_path / "cases.csv", "-o", out, "--direction", "normal", "--contact", "ball"
+    )
+
+
+@pytest.mark.parametrize(
+    ("head", "part"),
+    [("mu0,Fz,k,k_low,y0,omega,v0", "both k and k_low"), ("mu0,Fz,k_low,y0,omega,v0", "no column k_high [N/m]"),
+     ("mu0,Fz,k_low,k_high [s],y0,omega,v0", "a unit that k_high cannot have"),
+     ("mu0,Fz,k_low,k_high,y0,omega,v0,mu_macro_low", "'mu_macro_low' would be written twice")],
+)  # fmt: skip
+def test_columns_of_an_interval_are_never_ignored(tmp_path, capsys, head, part):
+    (tmp_path / "cases.csv").write_text(f"{head}\n{head}\n")
+    assert part in ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv")

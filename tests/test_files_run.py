@@ -289,3 +289,15 @@ def test_memory_does_not_grow_with_the_file(tmp_path, repository):
 
     # 1.2 million more rows are 130 MB of numbers
     assert peak(1_500_000) - peak(300_000) < 100
+
+
+@pytest.mark.parametrize("kind", [{"contact": "ball"}, {"direction": "along"}])
+def test_a_run_of_another_contact_or_direction_is_another_run(tmp_path, surrogate, cases, kind):
+    source, out = copied(cases, "csv", tmp_path), tmp_path / "out.csv"
+    stopped(source, out, surrogate, **kind)
+    with pytest.raises(FilesError, match=r"parts of another run \(options differ\); --force deletes them"):
+        evaluate_files([source], out, surrogate)
+    assert evaluate_files([source], out, surrogate, **kind).resumed
+    whole = tmp_path / "whole.csv"
+    evaluate_files([source], whole, surrogate, **kind)
+    assert out.read_bytes() == whole.read_bytes() != (cases / "whole.csv").read_bytes()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,10 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
-from mumacro.files.columns import ANSWERS, Columns, FilesError, find_columns
-from mumacro.inputs import FIELDS, POSITIVE, RAD_PER_CYCLE, Scale, refusal
+from mumacro.contact import AMPLITUDE, kind_of
+from mumacro.files.columns import ANSWERS, BAND, Columns, FilesError, find_columns
+from mumacro.inputs import POSITIVE, RAD_PER_CYCLE, Scale, refusal
+from mumacro.interval import ENDS
 from mumacro.surrogate import Surrogate
 
 __all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "answer_columns", "numbers"]
@@ -29,13 +31,10 @@ _NO_NUMBER, _TOO_LARGE = 1, 2
 _WHY = {_NO_NUMBER: "must be a number", _TOO_LARGE: "is beyond double range"}
 
 
-def added_fields(include: Sequence[str] = ()) -> list[pa.Field]:
-    """The Arrow fields that :func:`answer` adds."""
+def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
+    """The Arrow fields of the columns that :func:`answer` adds."""
     words = pa.dictionary(pa.int8(), pa.string())
-    fields = [pa.field(name, words if name in ("regime", "source") else pa.float64()) for name in ANSWERS]
-    if "gradient" in include:
-        fields += [pa.field(f"d_mu_macro_d_{name}", pa.float64()) for name in FIELDS]
-    return fields
+    return [pa.field(name, words if name in ("regime", "source") else pa.float64()) for name in names]
 
 
 def answer(
@@ -44,6 +43,8 @@ def answer(
     *,
     rigid: bool = False,
     include: Sequence[str] = (),
+    contact: str = "spring",
+    direction: str = "across",
 ) -> tuple[pa.RecordBatch, pa.RecordBatch]:
     """Evaluate every case of a batch.
 
@@ -52,20 +53,22 @@ def answer(
     batch : pyarrow.RecordBatch
         Columns ``mu0`` [-], ``Fz`` [N], ``k`` [N/m], ``y0`` [m], ``omega`` [rad/s] or ``f`` [Hz], ``v0`` [m/s], with
         another unit where the heading has it in brackets; numbers or text.  An infinite k, or the word ``rigid``, is a
-        rigid contact.  A null, a NaN or an empty cell is missing, in k as elsewhere.  Other columns are copied
-        unchanged.
+        rigid contact.  A null, a NaN or an empty cell is missing, in k as elsewhere.  ``k_low`` and ``k_high`` may
+        stand for k; ``Fz_amplitude`` [N] stands for y0 in direction normal.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
         The table; left out, the tightest one that comes with the library.
     rigid : bool
         All contacts are rigid and there is no column k.
     include : sequence of str
         ``"gradient"`` adds d mu_macro / d input, ``d_mu_macro_d_mu0`` and so on.
+    contact, direction : str
+        Of all cases, as in :meth:`mumacro.Surrogate.evaluate`.
 
     Returns
     -------
     batch : pyarrow.RecordBatch
-        As many rows in the same order, with mu_macro, mu_ratio, regime, error_bound and source; null where a case has
-        no result.
+        As many rows in the same order, with mu_macro (for an interval of k also mu_macro_low and mu_macro_high),
+        mu_ratio, regime, error_bound and source; null where a case has no result.
     rejects : pyarrow.RecordBatch
         One row of ``REJECTS`` for each of those.
 
@@ -73,6 +76,8 @@ def answer(
     ------
     FilesError
         A column is missing, has a wrong name or no numbers.
+    InputError
+        An unknown contact or direction.
 
     Examples
     --------
@@ -81,10 +86,9 @@ def answer(
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
-    fields = added_fields(include)
-    columns = find_columns(batch.schema.names, rigid, [field.name for field in fields])
+    columns = find_columns(batch.schema.names, rigid, include, kind_of(contact, direction))
     added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), columns, include)
-    schema = pa.schema([*batch.schema, *fields], batch.schema.metadata)
+    schema = pa.schema([*batch.schema, *added_fields(columns.added(include))], batch.schema.metadata)
     return pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema), rejects
 
 
@@ -94,7 +98,7 @@ def answer_columns(
     """The columns that :func:`answer` adds, the rejects, and the inputs as doubles in their units by heading."""
     n = batch.num_rows
     given: dict[str, Array] = {}
-    values: dict[str, Array] = {"k": np.array([math.inf])}
+    values: dict[str, Any] = {} if ENDS[0] in columns.places else {"k": np.full(n, math.inf)}
     faults: dict[str, Codes] = {}
     for name, (heading, scale) in columns.places.items():
         field = "omega" if name == "f" else name
@@ -104,27 +108,24 @@ def answer_columns(
             raise FilesError(f"the column {heading!r} {error}") from None
         values[field] = _in_si(given[heading], scale, RAD_PER_CYCLE if name == "f" else 1.0, fault)
         faults[field] = fault
-    macro, ratio, bound, source = surrogate.evaluate_columns(
-        values["mu0"], values["Fz"], values["k"], values["y0"], values["omega"], values["v0"], n=n
-    )
-    bad = source < 0
+    gradient = "gradient" in include
+    found = surrogate.evaluate(**{**values, **columns.kind.names, "gradient": gradient})
+    bad = found.source_code < 0
     mask = bad if bad.any() else None
-    code = np.where(bad, 0, source).astype(np.int8)
-    found: dict[str, Any] = {
-        "mu_macro": pa.array(macro, mask=mask),
-        "mu_ratio": pa.array(ratio, mask=mask),
+    code = np.where(bad, 0, found.source_code).astype(np.int8)
+    arrays: dict[str, Any] = {
         "regime": _words(REGIME_OF_SOURCE[code], REGIMES, mask),
-        "error_bound": pa.array(bound, mask=mask),
         "source": _words(code, SOURCES, mask),
     }
-    if "gradient" in include:
-        full: dict[str, Any] = {name: np.broadcast_to(column, n) for name, column in values.items()}
-        slopes = surrogate.evaluate(**full, gradient=True).gradient or {}
+    for name, slope in (found.gradient or {}).items():
         # the slope along k is 0 for a rigid contact, which has no k
-        slopes["k"] = np.where(np.isinf(full["k"]), math.nan, slopes["k"])
-        found |= {f"d_mu_macro_d_{name}": pa.array(slope, mask=np.isnan(slope)) for name, slope in slopes.items()}
+        told = slope if name != "k" or name not in values else np.where(np.isinf(values["k"]), math.nan, slope)
+        arrays[f"d_mu_macro_d_{name}"] = pa.array(told, mask=np.isnan(told))
+    for name in ("mu_macro", *BAND, "mu_ratio", "error_bound"):
+        if hasattr(found, name):
+            arrays[name] = pa.array(getattr(found, name), mask=mask)
     rejects = _rejects(batch, columns, np.flatnonzero(bad), values, faults)
-    return [found[field.name] for field in added_fields(include)], rejects, given
+    return [arrays[name] for name in columns.added(include)], rejects, given
 
 
 def _words(codes: Codes, words: Sequence[str], mask: NDArray[np.bool_] | None) -> pa.Array:
@@ -202,22 +203,29 @@ def _rejects(
     listed: list[tuple[int, str, str | None, str]] = []
     named = {"omega" if name == "f" else name: name for name in columns.places}
     for i in rows.tolist():
-        for field in filter(named.get, FIELDS):
-            reason = _reason(field, values[field][i], int(faults[field][i]))
-            if reason:
-                cell = batch.column(columns.places[named[field]][0])[i].as_py()
-                listed.append((i, named[field], None if cell is None else str(cell), reason))
-                break
+        row = {field: float(values[field][i]) for field in columns.fields if field in named}
+        reasons = ((field, _reason(field, row, int(faults[field][i]))) for field in row)
+        for field, reason in filter(lambda pair: pair[1], reasons):
+            cell = batch.column(columns.places[named[field]][0])[i].as_py()
+            listed.append((i, named[field], None if cell is None else str(cell), str(reason)))
+            break
     by_field: list[Any] = [list(column) for column in zip(*listed, strict=True)] or [[] for _ in REJECTS]
     arrays = [pa.array(column, field.type) for column, field in zip(by_field, REJECTS, strict=True)]
     return pa.RecordBatch.from_arrays(arrays, schema=REJECTS)
 
 
-def _reason(field: str, value: float, fault: int) -> str | None:
-    """What is wrong with one value; None if it is legal."""
+def _reason(field: str, row: Mapping[str, float], fault: int) -> str | None:
+    """What is wrong with one value of a row; None if it is legal."""
+    value = row[field]
     if fault:
         return _WHY[fault]
     if math.isnan(value) and field != "k":
         return "is missing"
-    legal = (value > 0.0 if field in POSITIVE else value >= 0.0) and (math.isfinite(value) or field == "k")
+    positive = field in (*POSITIVE, *ENDS)
+    legal = (value > 0.0 if positive else value >= 0.0) and (math.isfinite(value) or field == "k")
+    if field == AMPLITUDE:
+        return None if legal and not value >= row["Fz"] else "must be >= 0 and below Fz: at Fz the contact lifts off"
+    if field in ENDS:
+        ordered = field == ENDS[0] or not value < row[ENDS[0]]
+        return "must be finite and > 0" if not legal else None if ordered else f"must be >= {ENDS[0]}"
     return None if legal else refusal(field, value)

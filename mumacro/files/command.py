@@ -14,11 +14,12 @@ import pyarrow as pa
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from mumacro.command import OneLineParser, open_table
+from mumacro.command import OneLineParser, add_kind, open_table
 from mumacro.files.columns import FilesError
 from mumacro.files.evaluation import Evaluation
-from mumacro.files.reading import SEPARATORS, one_line
+from mumacro.files.reading import one_line
 from mumacro.files.run import evaluate_files
+from mumacro.separators import SEPARATORS
 
 __all__ = ["main"]
 
@@ -26,8 +27,9 @@ _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
+  for k also k_low and k_high, its ends; for y0, with --direction normal, Fz_amplitude [N]
   other columns are copied; those of CSV and NDJSON stay text
-added: mu_macro, mu_ratio, regime, error_bound, source
+added: mu_macro, mu_ratio, regime, error_bound, source; for k_low and k_high also mu_macro_low and mu_macro_high
 rejected rows are in OUT.rejects.csv only: row (from 1), field, value, reason
 
 examples:
@@ -48,6 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("cases", nargs="+", help="files, folders or patterns, all of one format; - is standard input")
     parser.add_argument("-o", "--out", required=True, help="the file to write; its ending sets the format; - is output")
+    add_kind(parser)
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table")
     parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,")
     parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: .")
@@ -106,7 +109,7 @@ def main(words: Sequence[str]) -> int:
     """
     chosen = _parser().parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
-    options = {name: getattr(chosen, name) for name in ("rigid", "include", "decimal")}
+    options = {name: getattr(chosen, name) for name in ("rigid", "include", "decimal", "contact", "direction")}
     options["sep"] = SEPARATORS[chosen.sep]
     try:
         with ExitStack() as stack:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from mumacro.contact import kind_of
 from mumacro.files.answering import added_fields, answer_columns
 from mumacro.files.columns import FilesError, find_columns
 from mumacro.files.reading import Block, CsvSource, Fault, NdjsonSource, ParquetSource, Place
@@ -94,7 +95,8 @@ class Evaluation:
 
     def __init__(
         self, given: Sequence[str | Path], out: Path | None, surrogate: Surrogate, *, rigid: bool = False,
-        include: Sequence[str] = (), sep: str = ",", decimal: str = ".",
+        include: Sequence[str] = (), sep: str = ",", decimal: str = ".", contact: str = "spring",
+        direction: str = "across",
     ) -> None:  # fmt: skip
         if sep == decimal:
             raise FilesError(f"--sep and --decimal are both {sep!r}; give another --sep, such as ';'")
@@ -111,12 +113,11 @@ class Evaluation:
             self.source = NdjsonSource(self.files) if kind == "ndjson" else ParquetSource(self.files, folder)
         self.surrogate, self.include = surrogate, include
         self.decimal = decimal if kind == "csv" else "."
-        added = added_fields(include)
-        names = [field.name for field in added]
         try:
-            self.columns = find_columns(self.source.schema.names, rigid, names)
+            self.columns = find_columns(self.source.schema.names, rigid, include, kind_of(contact, direction))
         except FilesError as error:
             raise FilesError(f"{self.files[0]}: {error}") from None
+        added = added_fields(self.columns.added(include))
         self.output = Output(*told, sep, decimal, self.columns.stiffness)
         self.verbatim = told[0] == kind != "parquet"
         given_fields = [

@@ -9,7 +9,6 @@ import csv
 import gzip
 import json
 import math
-import re
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -23,16 +22,13 @@ import pyarrow.dataset
 from numpy.typing import NDArray
 
 from mumacro.files.columns import Columns, FilesError
-from mumacro.inputs import split_unit, suggestion
+from mumacro.separators import advice
 
-__all__ = ["SEPARATORS", "Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "Place", "one_line"]
+__all__ = ["Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "Place", "one_line"]
 
-#: what may stand between the cells of CSV, by the word for it
-SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 ROWS = 65_536  # of a block, at most: a third of a second of work
 LONGEST = 64 * 2**20  # bytes of a line
 _SHOWN = 500  # characters of a bad record that are listed
-_SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
 class Place(NamedTuple):
@@ -178,13 +174,8 @@ class CsvSource:
             raise FilesError(f"{path}: line 1 is no header of a CSV file in UTF-8 ({error})") from None
         if not any(map(str.strip, cells)):
             raise FilesError(f"{path}: is empty; the first line must name the columns")
-        found = _recognised(text, [row.decode("utf-8", "replace") for row in rows], sep, decimal)
-        if found != (sep, decimal):
-            word = next(word for word, known in SEPARATORS.items() if known == found[0])
-            raise FilesError(
-                f"{path}: the columns are separated by {word!r} and the decimal sign is {found[1]!r}: "
-                f"give --sep '{word}' --decimal '{found[1]}'"
-            )
+        if remedy := advice(text, [row.decode("utf-8", "replace") for row in rows], sep, decimal):
+            raise FilesError(f"{path}: {remedy}")
         return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
 
     def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
@@ -221,23 +212,6 @@ class CsvSource:
             fault = f"a quote is not closed, or not at the end of its cell ({error})"
             raise FilesError(f"{path}: row {number}: {fault}") from None
         return rows
-
-
-def _recognised(header: str, rows: list[str], sep: str, decimal: str) -> tuple[str, str]:
-    """The separator that gives the most names of inputs, and the decimal sign of most numbers; if unsure, as given."""
-
-    def inputs(given: str) -> list[int]:
-        names = header.replace('"', "").split(given)
-        return [i for i, name in enumerate(names) if suggestion(split_unit(name)[0], loosely=False)]
-
-    best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
-    places = inputs(best)
-    cells = [cell.strip() for row in csv.reader(rows, delimiter=best) for i, cell in enumerate(row) if i in places]
-
-    def cells_with(sign: str) -> int:
-        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
-
-    return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
 
 
 class NdjsonSource:

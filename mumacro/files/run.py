@@ -67,6 +67,8 @@ def evaluate_files(
     include: Sequence[str] = (),
     sep: str = ",",
     decimal: str = ".",
+    contact: str = "spring",
+    direction: str = "across",
     force: bool = False,
     progress: Progress = lambda _share, _rows, _rejected: None,
     say: Callable[[str], None] = lambda _text: None,
@@ -88,6 +90,8 @@ def evaluate_files(
         ``"gradient"`` adds d mu_macro / d input.
     sep, decimal : str
         Between the cells of CSV, and within its numbers, read and written.
+    contact, direction : str
+        Of all cases, as in :meth:`mumacro.Surrogate.evaluate`.
     force : bool
         Replace an output that exists, and delete the parts of another run.
     progress : callable
@@ -104,6 +108,8 @@ def evaluate_files(
     ------
     FilesError
         An input or output that cannot be used, or an input that changed meanwhile; names it, with the remedy.
+    InputError
+        An unknown contact or direction.
     BusyError
         Another run writes the same output.
 
@@ -115,7 +121,10 @@ def evaluate_files(
     >>> evaluate_files([folder / "cases.csv"], folder / "out.parquet", Surrogate.open()).answered
     1
     """
-    work = Evaluation(given, Path(out), surrogate, rigid=rigid, include=include, sep=sep, decimal=decimal)
+    work = Evaluation(
+        given, Path(out), surrogate, rigid=rigid, include=include, sep=sep, decimal=decimal, contact=contact,
+        direction=direction,
+    )  # fmt: skip
     return _Run(work, Path(out)).run(force, progress, say)
 
 
@@ -137,7 +146,7 @@ class _Run:
             "version": __version__,
             "table": work.surrogate.checksum,
             "inputs": [[path.name, checksum] for path, checksum in zip(work.files, work.checksums, strict=True)],
-            "options": [vars(work.output), list(work.include), [*work.columns.places.items()]],
+            "options": [vars(work.output), list(work.include), [*work.columns.places.items()], work.columns.kind.names],
         }
         self.first = json.dumps(self.plan).encode() + b"\n"
 

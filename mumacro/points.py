@@ -1,0 +1,169 @@
+"""``mumacro fit``: k and mu0 from measured points in a file."""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mumacro import command
+from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, kind_in, open_table
+from mumacro.contact import AMPLITUDE
+from mumacro.errors import InputError
+from mumacro.fitted import Fit
+from mumacro.fitting import fit
+from mumacro.inputs import NAMES, Scale, is_rigid, number_hint, scale_of, split_unit, suggestion, unit_of
+from mumacro.measured import STD, UNKNOWNS
+from mumacro.questions import OUT
+from mumacro.separators import SEPARATORS, advice
+from mumacro.validity import digits
+
+__all__ = ["FIT", "fit_points", "read_points"]
+
+FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
+_COLUMNS = f"""\
+columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
+  v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f; {STD}: of mu_macro, if known
+what is neither a column nor unknown is given as name=value
+
+examples:
+  {FIT}
+  mumacro fit measured.csv Fz=10N y0=2um f=20kHz mu0=0.3 --unknown k --contact ball
+"""
+_SHOWN = 5  # faults of a file
+
+
+def fit_points(words: Sequence[str]) -> str:
+    """``mumacro fit``."""
+    parser = OneLineParser(
+        prog="mumacro fit", description="k and mu0 of a contact from measured friction.", epilog=_COLUMNS
+    )
+    parser.add_argument("points", help="a file of CSV; - is standard input")
+    parser.add_argument("--unknown", nargs="+", default=[*UNKNOWNS], metavar="NAME", help="k, mu0; default: both")
+    parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells; default: ,")
+    parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers; default: .")
+    parser.add_argument("-o", "--out", type=Path, help=OUT)
+    command.add_case(parser, "the other inputs", "*")
+    chosen = parser.parse_intermixed_args(words)
+    unknown, more = ([x for x in chosen.unknown if ("=" in x) == given] for given in (False, True))
+    if wrong := [name for name in unknown if name not in UNKNOWNS]:
+        raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
+    kind = kind_in(chosen)
+    text = sys.stdin.read() if chosen.points == "-" else Path(chosen.points).read_text("utf-8-sig", "replace")
+    points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
+    there = [*unknown, *(name for name in points if name in kind.columns)]
+    given = command.read_case(
+        [*chosen.words, *more], kind, there, one_k="one k is needed; or leave it out, and it is fitted"
+    )
+    surrogate = open_table(chosen.table)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # they are in the result
+            found = fit(points, unknown, **kind.names, surrogate=surrogate, **given)
+    except InputError as error:
+        raise ImpossibleError(f"{chosen.points}: {error}") from None
+    except ModuleNotFoundError as error:  # says what to install
+        raise ImpossibleError(str(error)) from None
+    if chosen.out is not None:
+        heads = [name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]" for name in found.points]
+        columns = dict(zip(heads, found.points.values(), strict=True))
+        columns |= {"mu_macro fitted": found.points["mu_macro"] - found.residuals}
+        return command.write_result(chosen.out, columns, found.plot) + "\n" + _told(found, chosen.digits)
+    if chosen.json:
+        whole = {field.name: getattr(found, field.name) for field in fields(found) if field.repr}
+        return as_json({**whole, "table": command.about(surrogate)})
+    return _told(found, chosen.digits)
+
+
+def _told(found: Fit, shown: int | None) -> str:
+    """Values with standard deviations and intervals, the scatter, other solutions, warnings."""
+    rows: list[Sequence[str]] = []
+    for name, value in found.values.items():
+        off, (low, high) = found.std[name], found.interval[name]
+        form = f".{shown or digits(off / value if 0.0 < value < math.inf else 0.0)}g"
+        told = "rigid" if math.isinf(value) else f"{value:{form}}"
+        rows.append((name, told, f"[{unit_of(name)}]", f"+- {off:.2g}", f"95 %: {low:{form}} to {high:{form}}"))
+    if STD in found.points:
+        rows.append(("chi2", f"{found.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
+    else:
+        rows.append(("scatter", f"{math.sqrt(found.reduced_chi2):.2g}", "[-]", "of mu_macro about the fit"))
+    rows.append(("points", str(found.residuals.size), "", f"{found.contact}, {found.direction}"))
+    for i, one in enumerate(found.solutions[1:], 2):
+        told = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in found.values)
+        rows.append((f"solution {i}", told))
+    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in found.warnings)])
+
+
+def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> dict[str, Any]:
+    """The columns of measured points, by name in SI, (n,); those of other names are left out.
+
+    Raises
+    ------
+    ImpossibleError
+        No header, no v0 or mu_macro, another separator, a column twice or in an unknown unit, a cell that is no
+        number; names ``where`` and the row.
+
+    Examples
+    --------
+    >>> read_points("v0 [mm/s],mu_macro\\n10,0.2\\n", "points.csv")
+    {'v0': array([0.01]), 'mu_macro': array([0.2])}
+    """
+    lines = text.removeprefix("\ufeff").splitlines()
+    header, *rows = [row for row in csv.reader(lines, delimiter=sep) if any(map(str.strip, row))] or [[]]
+    if remedy := advice(sep.join(header), lines[1:50], sep, decimal):
+        raise ImpossibleError(f"{where}: {remedy}")
+    places, faults = _places(header)
+    columns = {name: np.empty(len(rows)) for name in places}
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(header):
+            faults.append(f"row {number} has {len(row)} cells, the header has {len(header)}")
+            continue
+        for name, (i, scale) in places.items():
+            try:
+                columns[name][number - 1] = scale.si(_number(name, row[i].strip(), decimal))
+            except ValueError as error:
+                faults.append(f"row {number}: {name} {error}, got {row[i][:80]!r}")
+    if faults:
+        more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
+        raise ImpossibleError(f"{where}: {'; '.join(faults[:_SHOWN])}{more}")
+    return columns
+
+
+def _places(header: Sequence[str]) -> tuple[Mapping[str, tuple[int, Scale]], list[str]]:
+    """Where the columns are, what one unit of each is, and what is wrong with the header."""
+    places: dict[str, tuple[int, Scale]] = {}
+    faults = []
+    for i, head in enumerate(header):
+        name, unit = split_unit(head)
+        if name not in (*NAMES, AMPLITUDE, "mu_macro", STD):
+            continue
+        scale = Scale() if unit is None else scale_of("mu0" if name in ("mu_macro", STD) else name, unit)
+        if scale is None:
+            faults.append(f"the column {head!r} has a unit that {name} cannot have")
+        if name in places:
+            faults.append(f"{name} is there twice")
+        places[name] = i, scale or Scale()
+    for name, unit in (("v0", "m/s"), ("mu_macro", "-")):
+        if name not in places:
+            near = [head for head in header if suggestion(split_unit(head)[0]) == name]
+            remedy = f"rename {near[0]!r}" if near else f"there are {', '.join(map(repr, header))}"
+            faults.append(f"there is no column {name} [{unit}]; {remedy}")
+    return places, faults
+
+
+def _number(name: str, cell: str, decimal: str) -> float:
+    """A cell as a number; ValueError says what it is instead."""
+    if name == "k" and is_rigid(cell):
+        return math.inf
+    plain = cell if decimal == "." else cell.replace(".", "?").replace(decimal, ".")
+    try:
+        return float(plain.replace("_", "?"))
+    except ValueError:
+        raise ValueError(number_hint(name, cell) if cell else "is missing") from None

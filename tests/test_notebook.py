@@ -1,0 +1,95 @@
+"""What a notebook shows: tables in HTML, pictures by one call, data frames; and the notebook in examples runs."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from comparing import close
+from mumacro import fit
+from mumacro.fitted import Fit
+
+CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
+SPEEDS = np.geomspace(1e-3, 1.0, 30)
+
+
+def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_from(repository, monkeypatch):
+    pytest.importorskip("scipy")
+    pytest.importorskip("pandas")
+    pytest.importorskip("matplotlib")
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    notebook = json.loads((repository / "examples" / "friction.ipynb").read_text("utf-8"))
+    assert notebook["nbformat"] == 4
+    names = {}
+    for i, cell in enumerate(notebook["cells"]):
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]
+            exec(compile("".join(cell["source"]), f"cell {i}", "exec"), names)  # noqa: S102 (our own file)
+    assert isinstance(names["fit"], Fit)
+    low, high = names["fit"].interval["k"]
+    assert low < names["ball"].k < high
+    assert names["known"].mu_macro_low < names["one"].mu_macro < names["known"].mu_macro_high
+
+
+def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate):
+    pytest.importorskip("scipy")
+    assert surrogate.id in surrogate._repr_html_()
+    answer = surrogate.evaluate(**CASE, v0=SPEEDS)
+    shown = answer._repr_html_()
+    assert shown.count("<tr>") == 11
+    assert "and 20 more" in shown
+    assert f"<td>{answer.mu_macro[9]:.6g}</td>" in shown
+    one = surrogate.evaluate(**CASE, v0=0.01)._repr_html_()
+    assert one.count("<tr>") == 2
+    assert "more" not in one
+    found = fit(
+        {"v0": SPEEDS, "mu_macro": answer.mu_macro + 1e-3 * np.cos(17.0 * np.arange(30))}, Fz=10, y0=2e-6, f=2e4
+    )
+    assert f"<td>k</td><td>{found.values['k']:.6g}</td>" in found._repr_html_()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"gradient": True}, {"groups": True}, {"contact": "ball"}, {"k_range": (0.8e6, 1.2e6)}, {"v0": 0.01},
+     {"v0": SPEEDS.reshape(5, 6)}, {"v0": np.array([0.01, -1.0])}],
+)  # fmt: skip
+def test_a_frame_has_one_row_a_case_with_what_was_requested(surrogate, more):
+    pandas = pytest.importorskip("pandas")
+    case = {name: value for name, value in CASE.items() if name != "k" or "k_range" not in more}
+    answer = surrogate.evaluate(**{**case, "v0": SPEEDS, **more})
+    frame = answer.to_frame()
+    assert isinstance(frame, pandas.DataFrame)
+    assert len(frame) == np.size(answer.mu_macro)
+    for name in ("mu_macro", "mu_ratio", "regime", "error_bound", "source"):
+        np.testing.assert_array_equal(frame[name].to_numpy(), np.ravel(getattr(answer, name)))
+    assert ("mu_macro_low" in frame) == ("k_range" in more)
+    assert ("d_mu_macro_d_k" in frame) == ("gradient" in more)
+
+
+def test_a_frame_of_labelled_cases_keeps_the_index(surrogate):
+    pandas = pytest.importorskip("pandas")
+    v0 = pandas.Series([0.01, 0.1], index=["slow", "fast"])
+    assert surrogate.evaluate(**CASE, v0=v0).to_frame().index.tolist() == ["slow", "fast"]
+
+
+def test_surrogate_and_answer_plot_themselves(surrogate):
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    axes = surrogate.plot(figure.add_subplot(), point=(0.1, 0.5))
+    assert axes.lines[1].get_xydata().tolist() == [[0.1, 0.5]]
+    normal = surrogate.plot(figure.add_subplot(), direction="normal")
+    v, y = normal.lines[0].get_data()
+    assert math.isclose(y[-1], 0.999)
+    assert v.tolist() == close(y.tolist(), rel=1e-15)  # normal: the border is the amplitude itself
+    many = surrogate.evaluate(**CASE, v0=SPEEDS, groups=True)
+    assert sum(len(line.get_xdata()) for line in many.plot(figure.add_subplot()).lines[:-1]) == SPEEDS.size
+
+
+def test_without_pandas_a_frame_names_it(surrogate, monkeypatch):
+    import sys
+
+    from mumacro import MumacroError
+
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MumacroError, match="pip install pandas"):
+        surrogate.evaluate(**CASE, v0=0.01).to_frame()
