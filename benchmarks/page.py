@@ -19,7 +19,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 PICTURE = ROOT / "docs" / "img" / "page.png"
-SHOWN = "#approximations=1&family=y0&curves=1um;3um&mu0.std=0.01&y0.std=5%25"
+SHOWN = "#y0=3um&v0=20mm/s"
 SIZES = {1440: 900, 1024: 768, 390: 844}
 READY_S = 300.0
 
