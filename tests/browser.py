@@ -25,7 +25,7 @@ KNOWING = """async (path, options = {}) => {
   if (path === 'v1/stiffness') return say({ geometry: body.geometry, k: 1.307e7, contact: 'ball' });
   if (path === 'v1/fit') return say({
     values: { k: 1.3e6, mu0: 0.29 }, std: { k: 2e4, mu0: null }, interval: { k: [1.26e6, null], mu0: [0.28, 0.3] },
-    solutions: [{ k: 1.3e6, mu0: 0.29 }, { k: null, mu0: 0.3 }], warnings: ['mu0 is not determined'],
+    solutions: [{ k: 1.3e6, mu0: 0.29 }, { k: 'rigid', mu0: 0.3 }], warnings: ['mu0 is not determined'],
     reduced_chi2: 1.25, curve: { v0: [0.001, 0.1], mu_macro: [0.1, 0.2], low: [0.05, 0.15], high: [0.15, 0.25] },
   });
   if (direction === 'normal' && body.along !== 'y0') body.y0 = 1e-6;

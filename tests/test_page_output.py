@@ -237,7 +237,7 @@ def test_downloads(open_page, surrogate, tmp_path):
     v0, mu = (np.array([float(row[i]) for row in rows]) for i in (0, 1))
     assert mu == close(surrogate.evaluate(**{**START, "v0": 1e-3 * v0}).mu_macro, rel=1e-12)
     for button, name in (("#law-image", "friction-law-v0.svg"), ("#map-image", "friction-map.svg")):
-        picture = ElementTree.fromstring(page.download(button, tmp_path, name).read_text("utf-8"))
+        picture = ElementTree.fromstring(page.download(button, tmp_path, name).read_text("utf-8"))  # noqa: S314 - our own file
         words = [one.text for one in picture.iter("{http://www.w3.org/2000/svg}text")]
         assert words[-1].startswith("µ₀ = 0.3, Fz = 10 N, k = 1 N/µm, y₀ = 2 µm, f = 20 kHz")
         assert min(float(picture.get(side)) for side in ("width", "height")) >= 300
@@ -275,7 +275,7 @@ def test_the_panels_ask_and_fill_the_form(open_page, tmp_path):
         }  # fmt: skip
         assert page.run("return [...document.querySelectorAll('#fit-found li')].map((one) => one.textContent);") == [
             "k = 1.3 N/µm ± 0.02 N/µm (95 %: 1.26 N/µm to ∞)", "µ₀ = 0.29 not determined (95 %: 0.28 to 0.3)",
-            "the points allow as well: k = ∞, µ₀ = 0.3", "reduced χ² = 1.25",
+            "the points allow as well: k = rigid, µ₀ = 0.3", "reduced χ² = 1.25",
         ]  # fmt: skip
         assert page.text("#fit-warnings") == "mu0 is not determined"
         assert page.run("return document.querySelectorAll('#fit-plot .measured').length;") == 2

@@ -103,22 +103,26 @@ export class FitPanel extends Panel {
     return { ...caseOf(this.state, "v0", ...unknowns), unknowns, ...readPoints($("points").value) };
   }
 
-  /** A fitted value with its standard deviation and interval; null is infinite. */
-  told(name, { std, interval }, value) {
-    const { unit } = this.state.given[name];
-    const text = (x, digits) => (x === null ? "∞" : inUnit(name, x, unit, digits));
-    const [low, high] = interval[name];
-    const spread = std[name] === null ? "not determined" : `± ${text(std[name], 2)}`;
-    return `${INPUTS[name].symbol} = ${text(value, 4)} ${spread} (95 %: ${text(low, 4)} to ${text(high, 4)})`;
+  /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
+  text(name, value, digits = 4) {
+    if (value === null || value === "rigid") return value ?? "∞";
+    return inUnit(name, value, this.state.given[name].unit, digits);
+  }
+
+  /** A fitted value with its standard deviation and interval. */
+  told(name, { values, std, interval }) {
+    const [low, high] = interval[name].map((end) => this.text(name, end));
+    const spread = std[name] === null ? "not determined" : `± ${this.text(name, std[name], 2)}`;
+    return `${INPUTS[name].symbol} = ${this.text(name, values[name])} ${spread} (95 %: ${low} to ${high})`;
   }
 
   show(found, asked) {
     const { values, solutions, warnings, reduced_chi2: scatter } = found;
     const items = (list) => list.map((text) => make("li", {}, text));
-    const best = Object.entries(values).map(([name, value]) => this.told(name, found, value));
-    const others = solutions.slice(1).map((one) => Object.keys(values).map((name) =>
-      `${INPUTS[name].symbol} = ${one[name] === null ? "∞" : inUnit(name, one[name], this.state.given[name].unit)}`));
-    const beside = others.map((one) => `the points allow as well: ${one.join(", ")}`);
+    const names = Object.keys(values);
+    const best = names.map((name) => this.told(name, found));
+    const other = (one) => names.map((name) => `${INPUTS[name].symbol} = ${this.text(name, one[name])}`).join(", ");
+    const beside = solutions.slice(1).map((one) => `the points allow as well: ${other(one)}`);
     if (asked.std && scatter !== null) beside.push(`reduced χ² = ${show(scatter, 3)}`);
     $("fit-found").replaceChildren(...items([...best, ...beside]));
     $("fit-warnings").replaceChildren(...items(warnings));
@@ -128,18 +132,20 @@ export class FitPanel extends Panel {
   }
 
   taken({ values }) {
-    const given = Object.entries(values).filter(([, value]) => value !== null).map(([name, value]) => {
+    const numbers = Object.entries(values).filter(([, value]) => value !== "rigid");
+    const given = numbers.map(([name, value]) => {
       const { unit } = this.state.given[name];
       return [name, { value: Number(fromSI(name, value, unit).toPrecision(6)), unit }];
     });
-    const rigid = "k" in values ? values.k === null : this.state.rigid;
+    const rigid = "k" in values ? values.k === "rigid" : this.state.rigid;
     return { given: { ...this.state.given, ...Object.fromEntries(given) }, rigid };
   }
 
   /** Points with their standard deviations, the curve of the fit and its 95 % band. */
   paint(width, height) {
     if (!this.found) return [];
-    const { points, found: { curve: fitted }, state: { given: { v0: { unit } } } } = this;
+    const { points, found, state: { given: { v0: { unit } } } } = this;
+    const fitted = found.curve ?? { v0: [], mu_macro: [], low: [], high: [] }; // there is none at rest
     const speeds = (column) => column.map((value) => fromSI("v0", value, unit));
     const [xs, at] = [speeds(points.v0), speeds(fitted.v0)];
     const [least, most] = [Math.min(...xs, ...at), Math.max(...xs, ...at)];
@@ -151,7 +157,7 @@ export class FitPanel extends Panel {
     return [
       axes(x, y, `v₀ [${unit}]`, "µ macro"),
       inside(x, y,
-        band(places, levels(fitted.low), levels(fitted.high)), curve(places, levels(fitted.mu_macro), { class: "curve" }),
+        ...(places.length ? [band(places, levels(fitted.low), levels(fitted.high)), curve(places, levels(fitted.mu_macro), { class: "curve" })] : []),
         xs.flatMap((one, i) => [
           line(x.pixel(one), y.pixel(ends[i][0]), x.pixel(one), y.pixel(ends[i][1]), "error"),
           draw("circle", { cx: x.pixel(one), cy: y.pixel(points.mu_macro[i]), r: 3.5, class: "measured" }),
