@@ -140,7 +140,7 @@ def test_the_map_has_a_colour_between_two_levels(open_page, surrogate, repositor
     colours = page.run(
         "const image = new Image(); image.src = document.querySelector('#map image').getAttribute('href');"
         "await image.decode();"
-        "const context = new OffscreenCanvas(image.width, image.height).getContext('2d');"
+        "const context = new OffscreenCanvas(image.width, image.height).getContext('2d', { willReadFrequently: true });"
         "context.drawImage(image, 0, 0);"
         f"return {np.column_stack((x_share, y_share)).tolist()}.map(([x, y]) => [...context.getImageData("
         "Math.floor(x * image.width), Math.floor(y * image.height), 1, 1).data].slice(0, 3));"
@@ -237,7 +237,8 @@ def test_downloads(open_page, surrogate, tmp_path):
     v0, mu = (np.array([float(row[i]) for row in rows]) for i in (0, 1))
     assert mu == close(surrogate.evaluate(**{**START, "v0": 1e-3 * v0}).mu_macro, rel=1e-12)
     for button, name in (("#law-image", "friction-law-v0.svg"), ("#map-image", "friction-map.svg")):
-        picture = ElementTree.fromstring(page.download(button, tmp_path, name).read_text("utf-8"))  # noqa: S314 - our own file
+        text = page.download(button, tmp_path, name).read_text("utf-8")
+        picture = ElementTree.fromstring(text)  # noqa: S314 - our own file
         words = [one.text for one in picture.iter("{http://www.w3.org/2000/svg}text")]
         assert words[-1].startswith("µ₀ = 0.3, Fz = 10 N, k = 1 N/µm, y₀ = 2 µm, f = 20 kHz")
         assert min(float(picture.get(side)) for side in ("width", "height")) >= 300

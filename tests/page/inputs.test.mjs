@@ -133,4 +133,5 @@ test("the question says what was chosen, and nothing else", () => {
   near(caseOf(state).k, Math.sqrt(8e5) * Math.sqrt(1.2e6));
   const normal = question(fromAddress("#direction=normal&k=rigid").state);
   assert.deepEqual([normal.Fz_amplitude, normal.k, "y0" in normal], [5, "rigid", false]);
+  assert.deepEqual([plain, normal].map(({ include }) => include.includes("power")), [true, false]);
 });

@@ -2,8 +2,8 @@
 import { Status } from "./ask.js";
 import { Field, make } from "./form.js";
 import {
-  INPUTS, MODELS, REGIMES, caseOf, endsOf, friction, fromSI, inUnit, namesOf, readNumber, show, symbolOf, textOf,
-  valueOf, watts,
+  INPUTS, MODELS, REGIMES, caseOf, endsOf, friction, fromSI, inUnit, namesOf, powerOf, readNumber, show, symbolOf,
+  textOf, valueOf, watts,
 } from "./inputs.js";
 import { draw } from "./plots.js";
 import { post } from "./service.js";
@@ -12,13 +12,15 @@ const $ = (id) => document.getElementById(id);
 
 /** Shows the answer to a state; with the digits that k supports, or with all that the table supports. */
 export function showAnswer(found, state) {
-  const { limits, groups, power, mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound } = found;
+  const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound } = found;
+  const { limits, groups, power = { oscillation: null, saved: null } } = found;
   const [ends, rows] = [endsOf(state), found.model ?? []];
+  const width = ends ? high - low : 0;
   const all = state.digits === "all";
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
   const kind = state.rigid ? "rigid contact" : MODELS[state.contact];
   const texts = {
-    mu: all ? friction(mu, bound, 15) : friction(mu, ends ? (high - low) / 2 : 0, found.digits),
+    mu: all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits),
     regime: REGIMES[found.regime],
     ratio: all ? friction(found.mu_ratio, bound / valueOf(state, "mu0"), 15) : show(found.mu_ratio, 4),
     "peak-speed": inUnit("v0", state.direction === "normal" ? null : valueOf(state, "y0") * valueOf(state, "omega")),
@@ -26,10 +28,11 @@ export function showAnswer(found, state) {
     shaker: power.oscillation === null && state.rigid ? "– (rigid)" : watts(power.oscillation),
     saved: watts(power.saved), static: show(limits.mu_static, 4), crit: inUnit("v0", limits.v0_crit),
     "v-tilde": group(groups.v_tilde), "y-tilde": group(groups.y_tilde),
+    "y-tilde-name": state.direction === "normal" ? "ỹ = ΔFz/Fz" : "ỹ = y₀/l₀",
     bound: bound === null ? "not known" : `± ${show(bound, 2)}`, source: found.source,
     table: `${found.table.id}, tolerance ${show(found.table.tolerance)}`,
     model: `Model: ${kind}, ${MODELS[state.direction]}; not compared with measured points.`,
-    interval: ends ? `${[low, high].map((end) => friction(end, high - low)).join(" to ")} for k = ${textOf(state.given.k, 4)}` : "",
+    interval: ends ? `${friction(low, width)} to ${friction(high, width)} for k = ${textOf(state.given.k, 4)}` : "",
   };
   for (const [id, text] of Object.entries(texts)) $(id).textContent = text;
   $("rows").replaceChildren(...rows.map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
@@ -106,11 +109,11 @@ export class Solver {
     this.clear();
     this.target.commit();
     if (this.target.fault) return;
-    const unknown = $("unknown").value;
+    const [unknown, include] = [$("unknown").value, powerOf(this.state)];
     const { value: target } = this.read($("target").value);
     this.found = JSON.stringify(caseOf(this.state));
     this.channel.push({
-      request: { ...caseOf(this.state, unknown), unknown, quantity: $("quantity").value, target, include: ["power"] },
+      request: { ...caseOf(this.state, unknown), unknown, quantity: $("quantity").value, target, include },
       unit: this.state.given[unknown].unit,
     });
   }

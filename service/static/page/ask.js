@@ -1,4 +1,5 @@
-// Asking and its failures: one question in flight, what is told of it, the API key and its field.  Who answers is said in service.js.
+// Asking and its failures: one question in flight, what is told of it, the API key and its field.
+// Who answers is said in service.js.
 
 /** The service wants a key, or another one. */
 export class KeyWanted extends Error {}
@@ -83,7 +84,7 @@ const channels = [];
 /** Whether anything is asked, for who waits for it. */
 const busy = () => $("main")?.setAttribute("data-asking", String(!channels.every((one) => one.idle)));
 
-/** One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is one, `answered` where an answer is shown. */
+/** One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is one. */
 export class Status {
   constructor(place, shown) {
     Object.assign(this, { place: $(place), shown: $(shown), reasons: new Map(), answered: false });
@@ -91,7 +92,8 @@ export class Status {
 
   /** Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not typed yet. */
   set(topic, text, calm = false) {
-    if (text) this.reasons.set(topic, { text: this.answered ? `${text} Grey results belong to earlier values.` : text, calm });
+    const old = this.answered ? " Grey results belong to earlier values." : "";
+    if (text) this.reasons.set(topic, { text: text + old, calm });
     else this.reasons.delete(topic);
     // one reason is enough; what the user can mend comes first
     const first = this.reasons.get("typed") ?? [...this.reasons.values()][0];

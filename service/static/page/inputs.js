@@ -18,7 +18,10 @@ export const MODELS = {
   across: "oscillation across the sliding direction", along: "oscillation along the sliding direction",
   normal: "an oscillating normal force",
 };
-export const REGIMES = { continuous: "continuous sliding", stick_slip: "stick–slip", static: "at rest" };
+export const REGIMES = {
+  continuous: "continuous sliding", stick_slip: "stick–slip", static: "at rest", partial_slip: "partial slip",
+  reverse_slip: "slip to and fro",
+};
 
 /** What names.json says: `knows` (what the host of the page can do), the geometries of a contact, their arguments. */
 export const about = { knows: new Set(), geometries: {}, arguments: {} };
@@ -184,7 +187,7 @@ export function readInterval(name, text, unit) {
 
 const COLUMNS = [["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)/i], ["std", /^(std|±|sigma|s$|u$)/i]];
 
-/** { v0 [m/s], mu_macro, std } of points as text, one a line; or { fault }.  A first line of words names the columns. */
+/** { v0 [m/s], mu_macro, std } of points, one a line; or { fault }.  A first line of words names the columns. */
 export function readPoints(text) {
   const lines = text.split("\n").map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
   const between = ["\t", ";", ","].find((sign) => text.includes(sign)) ?? /\s+/;
@@ -248,10 +251,13 @@ export function spanOf(state, ...without) {
   return ends ? { ...caseOf(state, "k", ...without), k_range: ends } : caseOf(state, ...without);
 }
 
+/** The power, where it is known: not for a normal force that oscillates. */
+export const powerOf = ({ direction }) => (direction === "normal" ? [] : ["power"]);
+
 /** The question for the readout. */
 export function question(state) {
-  const more = about.knows.has("contact") && !endsOf(state) ? ["model"] : []; // the model of what is chosen
-  return { ...spanOf(state), include: ["groups", "limits", "stick_fraction", "power", "gradient", ...more] };
+  const model = about.knows.has("contact") ? ["model"] : []; // of a service that has several
+  return { ...spanOf(state), include: ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), ...model] };
 }
 
 /** The state as the part of an address behind "#". */

@@ -39,7 +39,8 @@ function lawRange(state, border) {
 function lawQuestion(state, border) {
   const { along, scale } = state;
   const { low, high, unit } = lawRange(state, border);
-  return { ...spanOf(state, along), along, start: toSI(along, low, unit), stop: toSI(along, high, unit), points: POINTS, scale };
+  const [start, stop] = [low, high].map((end) => toSI(along, end, unit));
+  return { ...spanOf(state, along), along, start, stop, points: POINTS, scale };
 }
 
 /** What is drawn of the answer, in the unit of the field. */
@@ -117,7 +118,8 @@ export class LawPanel {
     const law = drawn(found, state);
     Object.assign(this, { law, cursor: null });
     this.plot.redraw();
-    const at = (i) => `${show(law.mu.at(i), 4)} at ${symbolOf(state.along, law.unit)} = ${this.texts([law.values.at(i)])}`;
+    const symbol = symbolOf(state.along, law.unit);
+    const at = (i) => `${show(law.mu.at(i), 4)} at ${symbol} = ${this.texts([law.values.at(i)])}`;
     const border = law.border.length ? `; border of continuous sliding at ${this.texts(law.border)}` : "";
     $("law").setAttribute("aria-label", `Macroscopic friction from ${at(0)} to ${at(-1)}${border}.`);
   }

@@ -59,7 +59,8 @@ export class StiffnessPanel extends Panel {
       const { unit, meaning } = about.arguments[name];
       const text = unit.length > 1 || /[a-z]/i.test(unit) ? `${name} [${unit}]` : name;
       const told = make("span", { id: `about-${name}`, className: "hint" }, meaning);
-      return make("div", { className: "argument" }, make("label", { htmlFor: this.inputs[i].id }, text), this.inputs[i], told);
+      const input = this.inputs[i];
+      return make("div", { className: "argument" }, make("label", { htmlFor: input.id }, text), input, told);
     }));
   }
 
@@ -86,7 +87,8 @@ export class StiffnessPanel extends Panel {
   taken({ k, contact }) {
     const { unit } = this.state.given.k;
     const quantity = { value: Number(fromSI("k", k, unit).toPrecision(6)), unit };
-    return { given: { ...this.state.given, k: quantity }, rigid: false, ...(about.knows.has("contact") ? { contact } : {}) };
+    const kind = about.knows.has("contact") ? { contact } : {};
+    return { given: { ...this.state.given, k: quantity }, rigid: false, ...kind };
   }
 }
 
@@ -157,7 +159,8 @@ export class FitPanel extends Panel {
     return [
       axes(x, y, `v₀ [${unit}]`, "µ macro"),
       inside(x, y,
-        ...(places.length ? [band(places, levels(fitted.low), levels(fitted.high)), curve(places, levels(fitted.mu_macro), { class: "curve" })] : []),
+        places.length ? band(places, levels(fitted.low), levels(fitted.high)) : null,
+        places.length ? curve(places, levels(fitted.mu_macro), { class: "curve" }) : null,
         xs.flatMap((one, i) => [
           line(x.pixel(one), y.pixel(ends[i][0]), x.pixel(one), y.pixel(ends[i][1]), "error"),
           draw("circle", { cx: x.pixel(one), cy: y.pixel(points.mu_macro[i]), r: 3.5, class: "measured" }),

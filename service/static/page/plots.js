@@ -89,7 +89,8 @@ export const curve = (xs, ys, attributes) =>
 /** The area between two curves through points in pixels. */
 export function band(xs, lows, highs) {
   const points = [...xs.map((x, i) => [x, highs[i]]), ...xs.map((x, i) => [x, lows[i]]).reverse()];
-  return draw("path", { d: `M${points.map((place) => place.map((one) => one.toFixed(2)).join(" ")).join("L")}Z`, class: "band" });
+  const places = points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`);
+  return draw("path", { d: `M${places.join("L")}Z`, class: "band" });
 }
 
 /** What is drawn inside of both axes; nothing of it leaves them. */
@@ -106,7 +107,8 @@ export function point(x, y, out = [0, 0]) {
   return draw("path", { d: shape, class: "point", transform: `translate(${x} ${y}) rotate(${turn})` });
 }
 
-const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "font", "paint-order"];
+const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin",
+  "font", "paint-order"];
 
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
 export class Plot {
