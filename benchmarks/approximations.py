@@ -27,7 +27,7 @@ def border(surrogate: Surrogate) -> str:
     for low, high in (*RANGES, (1e-4, 1e6)):
         y = np.geomspace(low, high, 2001)
         case: dict[str, float | None] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 1.0}
-        found = border_speeds(surrogate, friction_law(surrogate, "y0", y, case), case)
+        found = border_speeds(surrogate, friction_law(surrogate, "y0", y, case))
         miss = [np.abs(found[name] / found["exact"] - 1.0) for name in names]
         cells = ["-" if np.isnan(x).all() else quantity(float(np.nanmax(x))) for x in miss]
         rows.append([f"{low:g} to {high:g}", *cells])
@@ -56,7 +56,7 @@ def ratios(surrogate: Surrogate) -> str:
     for y in np.geomspace(1e-2, 1e3, 101).tolist():
         case: dict[str, float | None] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "y0": y, "omega": 1.0}
         law = friction_law(surrogate, "v0", v, case)
-        for name, column in approximations(surrogate, law, case).items():
+        for name, column in approximations(surrogate, law).items():
             for regime in ("continuous", "stick_slip"):
                 miss = np.abs(column - law.answer.mu_macro)
                 miss[(law.answer.regime != regime) | np.isnan(miss)] = -1.0

@@ -12,6 +12,7 @@ import warnings
 import numpy as np
 
 import mumacro
+from mumacro.contact import CONTACTS
 
 
 def best(data: dict[str, np.ndarray], unknowns: tuple[str, ...], contact: str, **known: float) -> float:
@@ -29,9 +30,8 @@ def main() -> None:
     s, rig = mumacro.open(), {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
     v0 = np.geomspace(1e-3, 1.0, 30)
     rows = []
-    for contact in mumacro.element.CONTACTS:
-        said = {} if contact == "spring" else {"contact": contact}
-        mu = np.asarray(s.evaluate(mu0=0.3, k=1e6, v0=v0, **rig, **said).mu_macro)
+    for contact in CONTACTS:
+        mu = np.asarray(s.evaluate(mu0=0.3, k=1e6, v0=v0, **rig, contact=contact).mu_macro)
         data = {"v0": v0, "mu_macro": mu + np.random.default_rng(0).normal(scale=1e-3, size=30)}
         cells = [best(data, ("k", "mu0"), contact, **rig), best(data, ("k",), contact, mu0=0.3, **rig)]
         rows.append([contact, *(f"{cell:.1f}" for cell in cells)])

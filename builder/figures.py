@@ -164,7 +164,7 @@ def _dimensional_law(s: Surrogate) -> list[Panel]:
     for y0, look in ((0.6e-6, "C0-"), (4e-6, "C2-")):
         case: dict[str, float | None] = {"mu0": 0.5, "Fz": 10.0, "k": 5e6, "omega": 2.0 * np.pi * 20e3, "y0": y0}
         law = friction_law(s, "v0", v0, case)
-        paper = approximations(s, law, case)
+        paper = approximations(s, law)
         curves.append(Curve(v0, law.answer.mu_macro, look, f"exact, $y_0$ = {y0 * 1e6:g} $l_0$"))
         if y0 > 1e-6:
             curves.append(Curve(v0, paper["rigid"], "C3:", "(37)"))
@@ -172,7 +172,7 @@ def _dimensional_law(s: Surrogate) -> list[Panel]:
         curves.append(Curve(v0, paper["master_curve"], "C3--", "(28) from (38) to (40)"))
         x, y = np.array([[mark.value, mark.mu_macro] for mark in law.border]).T
         curves += [Curve(x, y, "ko", "border"), Curve(np.zeros(1), law.mu_static[:1], "ks", "static value (38)")]
-        curves.append(Curve(border_speeds(s, law, case)["eq_24"][:1], paper["critical"][:1], "C3x", "(39), (40)"))
+        curves.append(Curve(border_speeds(s, law)["eq_24"][:1], paper["critical"][:1], "C3x", "(39), (40)"))
     speed = r"$v_0$ [m/s]   ($l_0$ = 1 $\mu$m, $\omega$ = 2$\pi$ 20 kHz)"
     return [Panel((speed, 0.0, 0.25), (r"$\mu_\mathrm{macro}$", 0.0, 0.53), curves)]
 

@@ -20,16 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import check_inputs, real
 from mumacro.library import kernels
 
-__all__ = ["CONTACTS", "Element"]
+__all__ = ["Element"]
 
 Array = NDArray[np.float64]
-#: kind of contact -> springs, if not said
-CONTACTS = {"spring": 1, "ball": 32}
-MOST_SPRINGS = 100_000
+SPRINGS, MOST_SPRINGS = 32, 100_000  # of a ball, if not said, and at the most
 _KERNEL = kernels[-1]
 
 
@@ -74,10 +73,8 @@ class Element:
     def __init__(
         self, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike, contact: str = "spring", springs: int | None = None
     ) -> None:
-        if contact not in CONTACTS:
-            raise InputError("contact", contact, f"one of {', '.join(CONTACTS)}")
-        springs = CONTACTS[contact] if springs is None else springs
-        most = 1 if contact == "spring" else MOST_SPRINGS
+        usual, most = (SPRINGS, MOST_SPRINGS) if kind_of(contact).contact else (1, 1)
+        springs = usual if springs is None else springs
         if not (type(springs) is int and 1 <= springs <= most):
             raise InputError("springs", springs, f"a whole number from 1 to {most} for contact={contact!r}")
         columns = {"mu0": real("mu0", mu0), "Fz": real("Fz", Fz), "k": real("k", k)}

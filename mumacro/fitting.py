@@ -26,7 +26,7 @@ from mumacro.surrogate import Surrogate
 __all__ = ["fit"]
 
 Array = NDArray[np.float64]
-_PER_DECADE, _MOST_NODES = 16, 600  # of the sweep
+_PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
 
 
 def fit(

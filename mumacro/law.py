@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from mumacro import closed_forms
 from mumacro.answer import Answer
+from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import FIELDS, POSITIVE
+from mumacro.interval import ENDS, as_ends, middle
 from mumacro.inverse import Crossing, border_crossings, checked_case
+from mumacro.inverse.rootfinding import Sweep
 from mumacro.surrogate import Surrogate
 
 __all__ = [
@@ -59,6 +62,8 @@ EQUATIONS = {
     32: "critical", 35: "rigid", 37: "rigid", 38: "static", 39: "eq_24", 40: "critical",
 }  # fmt: skip
 _CORNER_REACH, _CORNER_TOP = 0.5, 0.7
+_BAND = ("mu_macro_low", "mu_macro_high")
+_CHORD, _HALVINGS = 1e-3, 8  # largest error of a straight line, over the law's height, and how often values are halved
 #: column of BORDERS -> formula, smallest and largest y~
 _FORMULAS = {
     "eq_23": (closed_forms.border_23, 0.0, 1.0),
@@ -82,11 +87,16 @@ class Law:
     values : ndarray
         Its values [SI], ascending, shape (n,).
     answer : Answer[Any]
-        The surrogate's results, arrays (n,).
+        The surrogate's results, arrays (n,); of an interval of k those at its geometric middle, and
+        ``mu_macro_low`` and ``mu_macro_high``.
     mu_static : ndarray
-        Static limit (v0 -> 0) of each case [-], eq. (38), shape (n,).
+        Static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,).
     border : tuple of Crossing
-        Where in the range continuous sliding begins or ends.
+        Where in the range continuous sliding, or along reverse slip, begins or ends.
+    case : dict of str to float
+        The other five inputs [SI], checked; an interval of k by its middle.
+    kind : Kind
+        Contact and direction; ``kind.names`` has them in words.
     """
 
     along: str
@@ -94,6 +104,21 @@ class Law:
     answer: Answer[Any]
     mu_static: Array
     border: tuple[Crossing, ...]
+    case: dict[str, float]
+    kind: Kind = SPRING
+
+    @property
+    def band(self) -> tuple[Array, Array] | None:
+        """Smallest and largest mu_macro over an interval of k [-], (n,) each; None where k is one number."""
+        found = tuple(getattr(self.answer, name, None) for name in _BAND)
+        return found if found[0] is not None else None
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The law as a table: column -> values (n,), the swept input first."""
+        names = ["mu_macro", *(_BAND if self.band else ()), "regime", "error_bound", "source"]
+        found = {name: getattr(self.answer, name) for name in names}
+        return {self.along: self.values, **found, "mu_static": self.mu_static}
 
     def plot(self, axes: Any = None) -> Any:
         """A picture, see :func:`mumacro.plotting.plot_law`; needs matplotlib."""
@@ -110,8 +135,8 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     InputError
         Ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
     """
-    if along not in FIELDS:
-        raise InputError("along", along, f"one of {', '.join(FIELDS)}")
+    if along not in (*FIELDS, AMPLITUDE):
+        raise InputError("along", along, f"one of {', '.join(FIELDS)}, {AMPLITUDE}")
     if scale not in SCALES:
         raise InputError("scale", scale, f"one of {', '.join(SCALES)}")
     if points < 2:
@@ -128,7 +153,10 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     return np.clip(values, start, stop)
 
 
-def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[str, float | None]) -> Law:
+def friction_law(
+    surrogate: Surrogate, along: str, values: Array, case: Mapping[str, Any], *, contact: str = "spring",
+    direction: str = "across", k_range: tuple[float, float] | None = None, refine: bool = False,
+) -> Law:  # fmt: skip
     """The friction law: mu_macro over a range of one input.
 
     Parameters
@@ -136,21 +164,29 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     surrogate : Surrogate
         The table to evaluate.
     along : str
-        The swept input: mu0, Fz, k, y0, omega or v0.
+        The swept input: mu0, Fz, k, y0, omega or v0; for direction normal Fz_amplitude in place of y0.
     values : ndarray
         Its values [SI], ascending, shape (n,), such as :func:`sweep_values` makes.
     case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
+        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``, ``k_range`` for
+        ``k``.
+    contact, direction : str
+        As in :meth:`mumacro.Surrogate.evaluate`.
+    k_range : (float, float), optional
+        Lowest and highest stiffness [N/m] in place of k: the law has a band, see :attr:`Law.band`.
+    refine : bool
+        Also values where mu_macro bends, for pictures: at the borders, and where a straight line between neighbours
+        would be wrong by more than a thousandth of the law's height.
 
     Returns
     -------
     Law
-        The results with the static limit, eq. (38), and the border of continuous sliding.
+        The results with the static limit and the borders of continuous sliding and reverse slip.
 
     Raises
     ------
     InputError
-        An input that is missing, out of bounds, or given twice.
+        An input that is missing, out of bounds, or given twice; an interval of k where k is swept.
 
     Examples
     --------
@@ -160,24 +196,59 @@ def friction_law(surrogate: Surrogate, along: str, values: Array, case: Mapping[
     >>> law.answer.mu_macro.round(4).tolist(), round(law.border[0].value, 5)
     ([0.2238, 0.24, 0.2957], 0.07105)
     """
-    known = checked_case(case, along)
-    inputs: dict[str, Any] = {**known, along: values}
-    at_rest = surrogate.evaluate({**inputs, "v0": 0.0})
-    return Law(
-        along,
-        values,
-        surrogate.evaluate(**inputs, groups=True),
-        np.broadcast_to(at_rest.mu_macro, values.shape),
-        border_crossings(surrogate, along, known, float(values[0]), float(values[-1])),
-    )
+    kind = kind_of(contact, direction)
+    case, ends = _without_interval(case if k_range is None else {**case, "k_range": k_range}, along)
+    known = checked_case(case, along, kind)
+    sweep = Sweep(surrogate, known, along, kind)
+    names = kind.names
+    border = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]), **names)
+    if refine:
+        values = _refined(sweep, np.union1d(values, [mark.value for mark in border]))
+    answer = sweep.answer(values, groups=True, illegal="raise")
+    if ends:
+        others = {name: value for name, value in known.items() if name != "k"}
+        answer = Sweep(surrogate, {**others, **ends}, along, kind).answer(values, groups=True, illegal="raise")
+    at_rest = sweep.answer(values, v0=0.0) if along != "v0" else sweep.answer(0.0)
+    return Law(along, values, answer, np.broadcast_to(at_rest.mu_macro, values.shape), border, known, kind)
 
 
-def approximations(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
+def _without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
+    """The case with the middle stiffness, and the ends of an interval of it, if there is one."""
+    if case.keys().isdisjoint(("k_range", *ENDS)):
+        return case, {}
+    given = as_ends(case)
+    if along == "k":
+        raise InputError("k_range", (given["k_low"], given["k_high"]), "left out where k is the swept input")
+    between = middle(given, "raise")[2]
+    ends = {name: given.pop(name) for name in ENDS}
+    return {**given, "k": between}, ends
+
+
+def _refined(sweep: Sweep, values: Array) -> Array:
+    """``values`` and more between them, where chords of mu_macro differ from it."""
+    mu = sweep.mu(values)
+    for _ in range(_HALVINGS):
+        # between neighbours 20 % apart and more a law is drawn over the logarithm
+        low, high = values[:-1], values[1:]
+        middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
+        inside = sweep.mu(middle)
+        bent = np.abs(inside - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
+        at = np.flatnonzero(bent & (middle > low) & (middle < high))
+        if not at.size:
+            break
+        values, mu = np.insert(values, at + 1, middle[at]), np.insert(mu, at + 1, inside[at])
+    return values
+
+
+def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the stated range.
 
-    ``case`` has the other five inputs, as in :func:`friction_law`.
+    Raises
+    ------
+    InputError
+        The law of a ball, or of an oscillation along or normal: the article has one spring, across.
     """
-    inputs: dict[str, Any] = {**checked_case(case, law.along), law.along: law.values}
+    inputs = _of_one_spring(law)
     mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
     elastic = np.isfinite(v) & np.isfinite(y)  # rigid contact has no finite v~ and y~; eq. (37) is then the result
     low, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
@@ -225,13 +296,21 @@ def borders(y: Array) -> dict[str, Array]:
         }
 
 
-def border_speeds(surrogate: Surrogate, law: Law, case: Mapping[str, float | None]) -> dict[str, Array]:
+def _of_one_spring(law: Law) -> dict[str, Any]:
+    """The inputs of a law of one spring across."""
+    if law.kind != SPRING:
+        told = " ".join(law.kind.names.values())
+        raise InputError("approximations", told, "left out: they are those of one spring, across")
+    return {**law.case, law.along: law.values}
+
+
+def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in :data:`BORDERS`; (n,).
 
     NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid contact and without
-    oscillation, which never stick.
+    oscillation, which never stick.  InputError as in :func:`approximations`.
     """
-    inputs: dict[str, Any] = {**checked_case(case, law.along), law.along: law.values}
+    inputs = _of_one_spring(law)
     y, omega = law.answer.y_tilde, inputs["omega"]
     never = (inputs["y0"] == 0.0) | (omega == 0.0) | np.isinf(inputs["k"])
     with np.errstate(all="ignore"):

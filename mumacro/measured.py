@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import NAMES, as_columns, check_inputs, real, unknown_name
 from mumacro.surrogate import Surrogate
 
-__all__ = ["HARDLY", "STD", "UNKNOWNS", "Measured", "chosen"]
+__all__ = ["HARDLY", "STD", "UNKNOWNS", "Measured"]
 
 Array = NDArray[np.float64]
 UNKNOWNS = ("k", "mu0")
@@ -54,8 +55,8 @@ class Measured:
         if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
             raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
         self.unknowns, self.contact, self.direction, self.surrogate = unknowns, contact, direction, surrogate
-        self.said = chosen(contact, direction)
-        self.amplitude = "Fz_amplitude" if direction == "normal" else "y0"
+        self.said = kind_of(contact, direction).names
+        self.amplitude = AMPLITUDE if direction == "normal" else "y0"
         self._read(self._given(data, fixed))
         self._check()
 
@@ -150,12 +151,6 @@ class Measured:
         rows = {"k": k[:, None], "mu0": mu0[:, None]}
         inputs: dict[str, Any] = {**self.columns, **self.said, **{name: rows[name] for name in self.unknowns}}
         return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
-
-
-def chosen(contact: str, direction: str) -> dict[str, Any]:
-    """What evaluate takes beside the inputs; nothing where its defaults do."""
-    said = {"contact": (contact, "spring"), "direction": (direction, "across")}
-    return {name: value for name, (value, usual) in said.items() if value != usual}
 
 
 def _refuse(name: str, column: Array, legal: NDArray[np.bool_], bound: str) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mumacro.charts import REGIMES
+from mumacro.contact import AMPLITUDE
 from mumacro.errors import InputError, MumacroError
 from mumacro.extras import missing
 from mumacro.inputs import SI
@@ -23,7 +24,11 @@ __all__ = ["ENDINGS", "plot_answer", "plot_law", "plot_map", "save"]
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
-_SYMBOLS = {"mu0": r"$\mu_0$", "Fz": "$F_z$", "k": "$k$", "y0": "$y_0$", "omega": r"$\omega$", "v0": "$v_0$"}
+_SYMBOLS = {
+    "mu0": r"$\mu_0$", "Fz": "$F_z$", "k": "$k$", "y0": "$y_0$", "omega": r"$\omega$", "v0": "$v_0$",
+    AMPLITUDE: r"$\hat F_z$",
+}  # fmt: skip
+_MARKS = {"reverse_slip": ("-.", "border of reverse slip"), "continuous": ("--", "border of continuous sliding")}
 
 
 def _loaded(name: str) -> Any:
@@ -58,7 +63,7 @@ def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
 
 
 def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None) -> Any:
-    """mu_macro along one input, with the static limit, the border of continuous sliding, and roots of a target.
+    """mu_macro along one input, with the static limit, the borders, the band of k_range, and roots of a target.
 
     Parameters
     ----------
@@ -81,14 +86,20 @@ def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target:
     axes, x = _own(axes), law.values
     axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")
     axes.plot(x, law.mu_static, ":", color="grey", label="static limit")
-    for i, crossing in enumerate(law.border):
-        axes.axvline(crossing.value, ls="--", lw=1.0, color="grey", label=None if i else "border of continuous sliding")
+    if law.band is not None:
+        axes.fill_between(x, *law.band, alpha=0.3, lw=0.0, label="interval of $k$")
+    told = set[str]()
+    for crossing in law.border:
+        line, label = next(_MARKS[name] for name in ("continuous", "reverse_slip") if name in crossing.regimes)
+        axes.axvline(crossing.value, ls=line, lw=1.0, color="grey", label=None if label in told else label)
+        told.add(label)
     if target is not None:
         axes.axhline(target, lw=0.8, color="tab:red", label=f"target {target:.6g}")
         axes.plot([*roots], [target] * len([*roots]), "o", color="tab:red")
     if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
         axes.set_xscale("log")
-    axes.set(xlabel=f"{_SYMBOLS[law.along]} [{SI[law.along][0]}]", ylabel=r"$\mu_\mathrm{macro}$ [-]")
+    unit = SI["Fz" if law.along == AMPLITUDE else law.along][0]
+    axes.set(xlabel=f"{_SYMBOLS[law.along]} [{unit}]", ylabel=r"$\mu_\mathrm{macro}$ [-]")
     axes.set_ylim(bottom=0.0)
     axes.legend()
     return axes

@@ -70,7 +70,7 @@ def law(words: Sequence[str]) -> str:
         "mu_static": found.mu_static,
     }
     if chosen.approximations:
-        columns |= approximations(surrogate, found, case)
+        columns |= approximations(surrogate, found)
     border = [{along: c.value / scale, "mu_macro": c.mu_macro} for c in found.border]
     if chosen.json:
         return as_json({"along": along, "unit": unit, **columns, "border": border, "table": command.about(surrogate)})

@@ -15,7 +15,8 @@ the angles at which stick begins and ends.  S follows from the energy that drive
 
     S = 2 pi (v~ mu~ + p),    p = <y~ cos tau u_y>, the oscillation power
 
-Both are tabulated, with bounds.
+Both are tabulated, with bounds.  The springs of a ball are independent, and S rises along the ray of their v~ and y~
+(60 rays from y~/v~ = 1e-4 to 1e6), so the middle one is the slowest: that of the smallest k, two thirds of the mean.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.surrogate import Surrogate
 
@@ -48,7 +50,8 @@ class Settling:
     time : float or ndarray
         ``periods`` in seconds; finite without oscillation, too.
     slip_path : float or ndarray
-        Path of the foot per period [l0].  exp(-slip_path) is the multiplier of a small disturbance per period.
+        Path of the foot per period [l0], of a ball that of its middle spring [1.5 l0].  exp(-slip_path) is the
+        multiplier of a small disturbance per period.
     error_bound : float or ndarray
         Bound of the error of ``periods`` that comes from the table [-]; NaN from a table without bounds of the power.
     """
@@ -70,6 +73,8 @@ def settling(
     omega: ArrayLike,
     v0: ArrayLike,
     remaining: float = 0.01,
+    contact: str = "spring",
+    direction: str = "across",
 ) -> Settling:
     """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.
 
@@ -81,6 +86,10 @@ def settling(
         The case [-, N, N/m, m, rad/s, m/s], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
         What is left of the disturbance [-], 0 < remaining < 1.
+    contact : str
+        "spring"; or "ball", whose slowest spring is answered for.
+    direction : str
+        "across" only: the decay is not derived for the other directions.
 
     Returns
     -------
@@ -92,7 +101,7 @@ def settling(
     Raises
     ------
     InputError
-        An input out of bounds.
+        An input out of bounds, another direction.
 
     Notes
     -----
@@ -109,19 +118,25 @@ def settling(
     """
     if not 0.0 < remaining < 1.0:
         raise InputError("remaining", remaining, "> 0 and < 1")
+    kind = kind_of(contact, direction)
+    if kind.direction:
+        raise InputError("direction", direction, "across: how a disturbance decays is derived for no other")
     answer = surrogate.evaluate({"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}, groups=True)
-    friction, amplitude, frequency, speed = (np.asarray(x, dtype=np.float64) for x in (mu0, y0, omega, v0))
-    v, y, l0 = answer.v_tilde, answer.y_tilde, answer.length_scale
+    amplitude, frequency, speed = (np.asarray(x, dtype=np.float64) for x in (y0, omega, v0))
+    share = 1.5 if kind.contact else 1.0  # load of the middle spring of a ball over the mean
+    v, y, l0 = answer.v_tilde / share, answer.y_tilde / share, share * answer.length_scale
     still = (amplitude == 0.0) | (frequency == 0.0)  # no oscillation: dragged only, mu~ = 1
     inside = np.isfinite(v) & np.isfinite(y) & ~still
-    power, power_bound = surrogate.power_with_bound(np.where(inside, v, 1.0), np.where(inside, y, 0.0))
+    there = np.where(inside, v, 1.0), np.where(inside, y, 0.0)
+    ratio, bound, _ = surrogate.ratio_with_bound(*there)
+    power, power_bound = surrogate.power_with_bound(*there)
     decay = math.log(1.0 / remaining)
     with np.errstate(all="ignore"):
         # slip speed of the foot in units of l0 omega; infinite for rigid contact and beyond double range
         dragged = np.where(speed == 0.0, 0.0, speed / l0 / frequency)
-        rate = np.where(inside, v * answer.mu_ratio + power, np.where(still, dragged, np.inf))
+        rate = np.where(inside, v * ratio + power, np.where(still, dragged, np.inf))
         rate = np.where(np.isnan(answer.mu_ratio), np.nan, rate)  # an illegal case of an array
-        off = np.where(inside, (v * answer.error_bound / friction + power_bound) / rate, 0.0)
+        off = np.where(inside, (v * bound + power_bound) / rate, 0.0)
         slip_path = 2.0 * math.pi * rate
         periods = decay / slip_path
         # nothing slips at rate 0, rigid contact at rest included

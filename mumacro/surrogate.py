@@ -506,19 +506,22 @@ class Surrogate:
         return mu_macro, mu_ratio, bound, int(source)
 
     def evaluate_columns(
-        self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None
-    ) -> tuple[Array, Array, Array, NDArray[np.int8]]:
+        self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None, *,
+        contact: str = "spring", direction: str = "across",
+    ) -> tuple[Array, Array, Array, NDArray[np.int8]]:  # fmt: skip
         """(mu_macro, mu~, bound of mu_macro, source code) of columns of float64, each of shape (n,) or (1,).
 
         On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` is the number of
-        cases where all columns have length 1.
+        cases where all columns have length 1.  For direction "normal" ``y0`` is the amplitude of the force [N].
         """
+        kind = kind_of(contact, direction)
         columns = [_contiguous(c) for c in (mu0, Fz, k, y0, omega, v0)]
         if n is None:
             n = max(c.size for c in columns) if all(c.size for c in columns) else 0
         if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
             raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
-        rows, source = batch.cases(self._data, [c if c.size == n else float(c[0]) for c in columns], n, 1, 3)
+        given = [c if c.size == n else float(c[0]) for c in columns]
+        rows, source = batch.cases(self._data_of(kind), given, n, 1, 3, None if kind == SPRING else kind)
         return rows[0], rows[1], rows[2], source
 
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs import RAD_PER_CYCLE, as_columns, length_scale
-from mumacro.measured import HARDLY, chosen
+from mumacro.measured import HARDLY
 from mumacro.settling import settling
 from mumacro.surrogate import Surrogate
 
@@ -73,7 +73,7 @@ def model_rows(
     >>> found["text"]
     'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
     """
-    mu = surrogate.evaluate(**case, **chosen(contact, direction)).mu_macro
+    mu = surrogate.evaluate(**case, contact=contact, direction=direction).mu_macro
     six = _six(case)
     swing = case["Fz_amplitude"] if direction == "normal" else six["y0"]
     if math.isinf(six["k"]) or six["omega"] == 0.0 or swing == 0.0:
@@ -102,7 +102,7 @@ def k_effect(
     if math.isinf(found := _six(case)["k"]):
         return 0.0
     k = found * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
-    mu = surrogate.evaluate(**{**case, "k": k}, **chosen(contact, direction)).mu_macro
+    mu = surrogate.evaluate(**{**case, "k": k}, contact=contact, direction=direction).mu_macro
     apart = float(np.abs(mu - mu[3]).max())
     return 0.0 if apart == 0.0 else apart / float(mu[3]) if mu[3] > 0.0 else math.inf
 
@@ -133,7 +133,7 @@ def _six(case: Mapping[str, Any]) -> dict[str, float]:
 def _kind(surrogate: Surrogate, case: Mapping[str, Any], mu: float, contact: str, direction: str) -> Row | None:
     other = "ball" if contact == "spring" else "spring"
     try:
-        found = surrogate.evaluate(**case, **chosen(other, direction)).mu_macro
+        found = surrogate.evaluate(**case, contact=other, direction=direction).mu_macro
     except InputError:  # a ball that oscillates along its normal is another model
         return None
     off = (found - mu) / mu if mu else math.copysign(math.inf, found) if found else 0.0

@@ -10,13 +10,14 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.contact import AMPLITUDE, SPRING
+from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import (
-    FIELDS,
     GAP,
     MOST_HZ,
     POSITIVE,
@@ -28,11 +29,13 @@ from mumacro.inputs import (
     unknown_name,
 )
 from mumacro.inputs import NAMES as INPUTS
+from mumacro.interval import BOUND, ENDS
 
 from .problems import FieldFault, Kind, RequestError, refuse
 
 __all__ = [
-    "INPUTS", "MAX_ERRORS", "Columns", "Reason", "checked", "columns_of", "faults_in", "joined", "number", "too_large",
+    "INPUTS", "LIKE", "MAX_ERRORS", "PLAIN", "Asked", "Columns", "Reason", "asked_of", "checked", "columns_of",
+    "faults_in", "joined", "names_of", "number", "stranger", "too_large",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -43,8 +46,42 @@ STATE_OMEGA = "is required: omega [rad/s], or f [Hz] in its place"
 ONE_FREQUENCY = "omega is given, too: give exactly one of omega [rad/s] and f [Hz]"
 STATE_K = f"is required: the tangential stiffness [N/m], or {RIGID}"
 LEFT_OUT = "must be left out: it is the unknown or swept input"
-_LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in INPUTS}
-_MOST = {name: MOST_HZ if name == "f" else sys.float_info.max for name in INPUTS}
+#: an input that stands for another -> that one, whose units and bounds it has
+LIKE = {AMPLITUDE: "Fz", **dict.fromkeys(ENDS, "k")}
+_INTERVAL = frozenset(("k_range", *ENDS))
+_NAMES = frozenset(INPUTS)
+_LEAST = {name: 5e-324 if LIKE.get(name, name) in POSITIVE else 0.0 for name in (*INPUTS, *LIKE)} | {AMPLITUDE: 0.0}
+_MOST = {name: MOST_HZ if name == "f" else sys.float_info.max for name in (*INPUTS, *LIKE)}
+
+
+class Asked(NamedTuple):
+    """What the cases of a request are: their contact and direction, and whether k is an interval."""
+
+    kind: ContactKind = SPRING
+    interval: bool = False
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The inputs of a case, by name and in order."""
+        found = self.kind.fields
+        return tuple(end for name in found for end in (ENDS if name == "k" else (name,))) if self.interval else found
+
+
+PLAIN = Asked()
+
+
+def asked_of(given: Iterable[str], kind: ContactKind = SPRING) -> Asked:
+    """What cases with these names are."""
+    return PLAIN if kind == SPRING and _INTERVAL.isdisjoint(given) else Asked(kind, not _INTERVAL.isdisjoint(given))
+
+
+def names_of(asked: Asked) -> tuple[str, ...]:
+    """All names that a case may have, for columns."""
+    return (
+        INPUTS
+        if asked == PLAIN
+        else tuple(n for name in asked.fields for n in ((name, "f") if name == "omega" else (name,)))
+    )
 
 
 # --- one value, one case ------------------------------------------------------------------------------
@@ -59,21 +96,27 @@ def number(name: str, value: object, null_is_rigid: bool = True) -> tuple[float,
             found = math.inf
         if _LEAST[name] <= found <= _MOST[name]:
             return found, None
-        return math.nan, refusal(name, found)
+        return math.nan, _refusal(name, found)
     if name == "k" and ((isinstance(value, str) and is_rigid(value)) or (value is None and null_is_rigid)):
         return math.inf, None
     if value is None:
         return math.nan, GAP if name == "k" else "is required"
-    return math.nan, number_hint(name, value)
+    return math.nan, number_hint("Fz" if name == AMPLITUDE else name, value)
 
 
-def faults_in(given: Iterable[str], left_out: Iterable[str] = ()) -> list[FieldFault]:
+def _refusal(name: str, value: float) -> str:
+    if name in _NAMES:
+        return refusal(name, value)
+    return "is missing" if math.isnan(value) else f"must be finite and {'>' if _LEAST[name] else '>='} 0"
+
+
+def faults_in(given: Iterable[str], left_out: Iterable[str] = (), asked: Asked = PLAIN) -> list[FieldFault]:
     """Faults between the names of the inputs that are given: missing ones, omega and f, or one that is asked for."""
     names, out = set(given), set(left_out)
     if out & {"omega", "f"}:
         out |= {"omega", "f"}
-    faults = [FieldFault.of(name, LEFT_OUT) for name in INPUTS if name in names & out]
-    for name in FIELDS:
+    faults = [FieldFault.of(name, LEFT_OUT) for name in names_of(asked) if name in names & out]
+    for name in asked.fields:
         if name in names or name in out:
             continue
         if name == "omega":
@@ -87,8 +130,9 @@ def faults_in(given: Iterable[str], left_out: Iterable[str] = ()) -> list[FieldF
 
 
 def checked(
-    given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True, known: Iterable[str] = INPUTS
-) -> tuple[dict[str, float], list[FieldFault]]:
+    given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True, known: Iterable[str] = INPUTS,
+    asked: Asked = PLAIN,
+) -> tuple[dict[str, Any], list[FieldFault]]:  # fmt: skip
     """The inputs of one case by field, with ``omega`` for ``f``, and all of its faults.
 
     ``left_out`` are the inputs that the request asks for, which must not be given.  A k of null is a rigid contact in a
@@ -96,18 +140,46 @@ def checked(
     """
     values: dict[str, float] = {}
     faults: list[FieldFault] = []
+    if asked != PLAIN:
+        given, faults = _with_ends(given)
+    names = _NAMES if asked == PLAIN else names_of(asked)
     for name, value in given.items():
-        if name not in _LEAST:
-            faults.append(FieldFault.of(name, unknown_name(name, known) if len(faults) < 100 else "unknown", value))
+        if name not in names:
+            told = stranger(name, asked, known) if len(faults) < 100 else "unknown"
+            faults.append(FieldFault.of(name, told, value))
         elif value is not None or name not in ("omega", "f"):
             values[name], reason = number(name, value, null_is_rigid)
             if reason is not None:
                 faults.append(FieldFault.of(name, reason, value))
-    if left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
-        faults += faults_in(values, left_out)
+    if asked != PLAIN or left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
+        faults += faults_in(values, left_out, asked)
     if "f" in values and not faults:
         values["omega"] = RAD_PER_CYCLE * values.pop("f")
     return values, faults
+
+
+def stranger(name: str, asked: Asked, known: Iterable[str]) -> str:
+    """Why such cases have no input of this name."""
+    if name in ("y0", AMPLITUDE):
+        amplitude = asked.kind.fields[3]
+        return f"must be left out for direction {asked.kind.names['direction']}, whose amplitude is {amplitude}"
+    return "must be left out beside an interval of it" if name == "k" else unknown_name(name, known)
+
+
+def _with_ends(given: Mapping[str, Any]) -> tuple[dict[str, Any], list[FieldFault]]:
+    """The inputs with both ends of an interval for ``k_range``, and faults."""
+    rest, faults = dict(given), list[FieldFault]()
+    if "k_range" in rest:
+        pair = rest.pop("k_range")
+        faults += [
+            FieldFault.of(end, "must be left out beside k_range") for end in ENDS if rest.pop(end, None) is not None
+        ]
+        if isinstance(pair, (list, tuple)) and len(pair) == 2:
+            rest |= zip(ENDS, pair, strict=True)
+        else:
+            faults.append(FieldFault.of("k_range", f"must be {BOUND}", pair))
+            rest |= dict.fromkeys(ENDS, 1.0)
+    return rest, faults
 
 
 # --- many cases ---------------------------------------------------------------------------------------
@@ -115,30 +187,36 @@ def checked(
 
 @dataclass
 class Columns:
-    """The six inputs of ``size`` cases."""
+    """The inputs of ``size`` cases."""
 
     size: int
-    #: in the order of FIELDS, (size,) or (1,) where one value holds for all; a value that is no number is NaN
+    #: in the order of the fields, (size,) or (1,) where one value holds for all; a value that is no number is NaN
     six: list[Array]
     #: why a case could not be read, for the first MAX_ERRORS of each column; such a case has a NaN
     reasons: dict[int, Reason] = field(default_factory=dict)
     hertz: bool = False  # whether the frequency was given as f
     listed: bool = True  # whether any input came as a list
     rows: bool = False  # whether the cases came one by one
+    asked: Asked = PLAIN
 
     def part(self, start: int, stop: int) -> list[Array]:
-        """The six columns of the cases from ``start`` to ``stop``."""
+        """The columns of the cases from ``start`` to ``stop``."""
         return [column[start:stop] if column.size > 1 else column for column in self.six]
 
     def reason(self, index: int) -> Reason:
         """Why a case is bad."""
         if index in self.reasons:
             return self.reasons[index]
-        for name, column in zip(FIELDS, self.six, strict=True):
-            value = column[index if column.size > 1 else 0].item()
+        case = {}
+        for name, column in zip(self.asked.fields, self.six, strict=True):
+            case[name] = value = column[index if column.size > 1 else 0].item()
             if not _LEAST[name] <= value <= (math.inf if name == "k" else _MOST[name]):
                 shown = "f" if name == "omega" and self.hertz else name
-                return shown, refusal(shown, value)
+                return shown, _refusal(shown, value)
+        if self.asked.interval and case["k_low"] > case["k_high"]:
+            return "k_low", f"must be <= k_high, which is {case['k_high']!r}"
+        if AMPLITUDE in case and not case[AMPLITUDE] < case["Fz"]:
+            return AMPLITUDE, f"must be below Fz, which is {case['Fz']!r}: at Fz the contact lifts off"
         return None, "is no legal case"
 
 
@@ -152,41 +230,48 @@ def too_large(max_batch: int) -> RequestError:
 
 
 def columns_of(
-    given: Mapping[str, Any], max_batch: int, known: Iterable[str] = INPUTS, faults: Iterable[FieldFault] = ()
-) -> Columns:
+    given: Mapping[str, Any], max_batch: int, known: Iterable[str] = INPUTS, faults: Iterable[FieldFault] = (),
+    kind: ContactKind = SPRING,
+) -> Columns:  # fmt: skip
     """Columns from numbers, lists and arrays of float64 by name.
 
     A bad entry of a list spoils its own case; a bad name or a bad number that holds for every case refuses the batch,
     together with the ``faults`` that were found before.
     """
-    lists = {name: value for name, value in given.items() if isinstance(value, (list, np.ndarray)) and name in _LEAST}
+    asked = asked_of(given, kind)
+    if asked != PLAIN:
+        given, more = _with_ends(given)
+        faults = [*faults, *more]
+    names = names_of(asked)
+    lists = {name: value for name, value in given.items() if isinstance(value, (list, np.ndarray)) and name in names}
     if any(len(value) > max_batch for value in lists.values()):
         raise too_large(max_batch)
     plain, more = checked(
-        {name: 1.0 if name in lists else value for name, value in given.items()}, null_is_rigid=False, known=known
-    )
+        {name: 1.0 if name in lists else value for name, value in given.items()}, null_is_rigid=False,
+        known=known, asked=asked,
+    )  # fmt: skip
     faults = [*faults, *more]
     lengths = {name: len(value) for name, value in lists.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name}: {lengths[name]}" for name in INPUTS if name in lengths)
-        first = next(lengths[name] for name in INPUTS if name in lengths)
+        told = ", ".join(f"{name}: {lengths[name]}" for name in names if name in lengths)
+        first = next(lengths[name] for name in names if name in lengths)
         faults += [
             FieldFault.of(name, f"lists must have one length; given {told}")
-            for name in INPUTS
+            for name in names
             if lengths.get(name, first) != first
         ]
     if faults:
         refuse(faults)
     reasons: dict[int, Reason] = {}
     columns = {name: np.array([value]) for name, value in plain.items()}
-    for name in INPUTS:  # in their order, so that the first bad field of a case is told
+    for name in names:  # in their order, so that the first bad field of a case is told
         if name in lists:
             columns[name] = _column(name, lists[name], reasons)
     if "f" in lists:
         with np.errstate(over="ignore"):  # infinite, which is refused
             columns["omega"] = columns["f"] * RAD_PER_CYCLE
     size = next(iter(lengths.values()), 1)
-    return Columns(size, [columns[name] for name in FIELDS], reasons, "f" in lists, bool(lists))
+    return Columns(size, [columns[name] for name in asked.fields], reasons, "f" in lists, bool(lists), asked=asked)
 
 
 def joined(name: str, parts: list[Any]) -> list[Any] | Array:

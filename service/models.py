@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, create_model
 
-from .answers import DEFAULT, QUANTITIES, Part, nested
+from .answers import DEFAULT, INTERVAL, QUANTITIES, Part, nested, of_amplitude
 
 __all__ = [
     "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
@@ -50,6 +50,12 @@ def default(listed: bool) -> dict[str, Any]:
     return {
         part.path: (_kind(part, listed, listed or part.path == "error_bound"), Field(description=part.described))
         for part in DEFAULT
+    } | {
+        part.path: (
+            _kind(part, listed, True) | None,
+            Field(None, description=f"Only for an interval. {part.described}"),
+        )
+        for part in INTERVAL
     }
 
 
@@ -57,7 +63,13 @@ def included(listed: bool) -> dict[str, Any]:
     """Members that ``include`` adds to a model of an answer."""
     fields: dict[str, Any] = {}
     for quantity in QUANTITIES.values():
-        kinds = {part.path: (_kind(part, listed, True), Field(description=part.described)) for part in quantity.parts}
+        kinds: dict[str, Any] = {}
+        for part in quantity.parts:
+            kinds[part.path] = (_kind(part, listed, True), Field(description=part.described))
+            other = of_amplitude(part)
+            if other != part:  # there is one of them
+                for one in (part, other):
+                    kinds[one.path] = (_kind(one, listed, True) | None, Field(None, description=one.described))
         for name, found in nested(kinds).items():
             if isinstance(found, dict):
                 title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
@@ -71,7 +83,21 @@ def included(listed: bool) -> dict[str, Any]:
 
 _made: Any = create_model
 Result: type[BaseModel] = _made("Result", __doc__="Answer to one case.", **default(False), **included(False))
-CaseAnswer: type[BaseModel] = _made("CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.")
+
+
+class ModelRow(BaseModel):
+    """One thing that the model leaves out, see docs/validity.md."""
+
+    row: str = Field(description="Its name")
+    text: str = Field(description="What it does here")
+    effect: float | None = Field(description="Relative change of mu_macro; null: not known")
+
+
+_about: Any = (list[ModelRow] | None, Field(None, description="Only if requested. What the model leaves out here"))
+_digits: Any = (int | None, Field(None, description="Only with model. Digits of mu_macro that k supports"))
+CaseAnswer: type[BaseModel] = _made(
+    "CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.", model=_about, digits=_digits
+)
 ColumnsAnswer: type[BaseModel] = _made(
     "ColumnsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in columns, order kept; null: a bad case.",
     **default(True), **included(True),

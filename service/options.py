@@ -14,17 +14,21 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
+from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, ContactName, DirectionName, Kind, kind_of
+from mumacro.errors import InputError
 from mumacro.inputs import BOUNDS, MOST_HZ, POSITIVE, RAD_PER_CYCLE, RIGID, SI
 from mumacro.inputs import NAMES as INPUTS
+from mumacro.interval import BOUND, ENDS
 
-from .answers import QUANTITIES
-from .case import checked
+from .answers import QUANTITIES, said
+from .case import LIKE, PLAIN, Asked, asked_of, checked
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
 
 __all__ = [
     "NO_NULL", "OPTIONS", "Case", "CaseColumns", "CaseQuery", "CaseRequest", "NotNegative", "Options", "OptionsQuery",
-    "Positive", "bounded", "example", "input_fields", "options_of", "query_of", "read_form", "relation", "split_names",
+    "Positive", "bounded", "example", "input_fields", "kind_in", "options_of", "query_of", "read_form",
+    "relation", "split_names",
 ]  # fmt: skip
 
 _NAMES = frozenset(INPUTS)
@@ -36,7 +40,11 @@ _TEXTS = {
     "omega": "Angular frequency of the oscillation; or f in its place",
     "f": "Frequency of the oscillation, in place of omega",
     "v0": "Sliding velocity",
+    AMPLITUDE: "Amplitude of the normal force, below Fz, in place of y0 for direction normal",
+    "k_low": "Lowest stiffness; with k_high in place of k",
+    "k_high": "Highest stiffness",
 }
+UNITS = {name: SI[LIKE.get(name, name)][0] for name in (*SI, *LIKE)}
 example: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 
 
@@ -59,31 +67,50 @@ def relation(name: str, reason: str) -> PydanticCustomError:
 
 
 def input_fields(
-    *, optional: Iterable[str] = ("omega", "f"), null: bool = True, listed: bool = False, shown: Iterable[str] = ()
+    *,
+    optional: Iterable[str] = ("omega", "f", "k", "y0", *LIKE),
+    null: bool = True,
+    listed: bool = False,
+    shown: Iterable[str] = (),
+    query: bool = False,
 ) -> Any:
-    """The inputs as fields of a model; those that are ``shown`` have an example."""
+    """The inputs as fields of a model; those that are ``shown`` have an example; in a query k may be low..high."""
     fields: dict[str, Any] = {}
-    for name, (unit, _) in SI.items():
-        kind: Any = Positive if name in POSITIVE else Hertz if name == "f" else NotNegative
+    for name, unit in UNITS.items():
+        kind: Any = (
+            Positive
+            if LIKE.get(name, name) in POSITIVE and name != AMPLITUDE
+            else Hertz
+            if name == "f"
+            else NotNegative
+        )
         entry: Any = float | Literal["rigid"] if name == "k" else float
         kind = kind | Literal["rigid"] if name == "k" else kind
         kind = kind | None if name in ("omega", "f") or (name == "k" and null) else kind
-        bound = BOUNDS["omega" if name == "f" else name]
-        default = None if name in optional else ...
+        bound = BOUNDS.get(name, BOUNDS["k" if name in ENDS else "omega"])
+        default = None if name in optional or name in LIKE else ...
         fields[name] = (
             kind | list[entry] if listed else kind,
             bounded(
                 bound, f"{_TEXTS[name]} [{unit}]", default, **({"examples": [example[name]]} if name in shown else {})
             ),
         )
+    if not query:
+        fields["k_range"] = (list[Positive] | None, bounded(BOUND, "In place of k: [low, high] [N/m]", None))
+    else:
+        kind, info = fields["k"]
+        fields["k"] = (kind | Annotated[str, Field(pattern=r"^.+\.\..+$")], info)
     return fields
 
 
 INCLUDE = "More to compute: " + "; ".join(f"{name} ({entry.text})" for name, entry in QUANTITIES.items())
-_INCLUDED = f"a list of names from: {', '.join(INCLUDES)}"
-Include: Any = Literal[INCLUDES]
+MODEL = "model"
+INCLUDE += f"; {MODEL} (for one case: what the model leaves out here, and the digits that k supports)"
+_INCLUDED = f"a list of names from: {', '.join((*INCLUDES, MODEL))}"
+Include: Any = Literal[(*INCLUDES, MODEL)]
 
-_std: Any = {name: (NotNegative, bounded("finite and >= 0", f"[{unit}]", 0.0)) for name, (unit, _) in SI.items()}
+_DEVIATE = {name: unit for name, unit in UNITS.items() if name not in ENDS}
+_std: Any = {name: (NotNegative, bounded("finite and >= 0", f"[{unit}]", 0.0)) for name, unit in _DEVIATE.items()}
 _InputStd: Any = create_model("_InputStd", __config__=_STRICT, **_std)
 
 
@@ -109,7 +136,13 @@ class Options(BaseModel):
 
     model_config = _STRICT
 
-    include: Annotated[list[Include], Field(max_length=2 * len(INCLUDES))] | None = bounded(_INCLUDED, INCLUDE, None)
+    include: Annotated[list[Include], Field(max_length=2 + 2 * len(INCLUDES))] | None = bounded(
+        _INCLUDED, INCLUDE, None
+    )
+    contact: ContactName = bounded(f"one of {', '.join(CONTACTS)}", "One spring, or a ball on a flat (Hertz)", "spring")
+    direction: DirectionName = bounded(
+        f"one of {', '.join(DIRECTIONS)}", "Direction of the oscillation, to that of sliding", "across"
+    )
     tolerance: Positive | None = bounded(
         "finite and > 0", "Wanted error of mu_macro/mu0 [-]: the smallest loaded table that meets it answers", None
     )
@@ -118,7 +151,32 @@ class Options(BaseModel):
     @model_validator(mode="after")
     def _std_where_asked(self) -> Self:
         check_std(self)
+        try:
+            kind = self.kind
+        except InputError as error:
+            raise relation(error.field, f"must be {error.bound}") from None
+        wrong = "y0" if kind.normal else AMPLITUDE
+        if self.deviations().get(wrong):
+            raise relation("std", f"has {wrong}, which direction {self.direction} does not have")
         return self
+
+    @property
+    def kind(self) -> Kind:
+        """Contact and direction."""
+        return kind_of(self.contact, self.direction)
+
+    def check(self, asked: Asked, one: bool = False) -> None:
+        """Refuse what ``include`` asks for and such cases do not have; ``model`` is for ``one`` case."""
+        faults = []
+        if not one and MODEL in (self.include or ()):
+            faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))
+        for word in said(asked) if asked != PLAIN else ():
+            for name in self.names():
+                if word in QUANTITIES[name].lacks:
+                    told = f"{name} is not computed for {word}: {QUANTITIES[name].lacks[word]}"
+                    faults.append(FieldFault.of("include", told, name))
+        if faults:
+            refuse(faults)
 
     def names(self) -> tuple[str, ...]:
         """Included quantities once each, in the order of the registry."""
@@ -170,23 +228,37 @@ def options_of(
         return None, rest, faults_of(error, model, known, parameter)
 
 
+def kind_in(given: Mapping[str, Any]) -> Kind:
+    """Contact and direction among checked options; raises InputError where they do not go together."""
+    return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
+
+
 @cache
 def _known(model: type[BaseModel]) -> tuple[str, ...]:
-    return *INPUTS, *model.model_fields
+    return *INPUTS, AMPLITUDE, "k_range", *ENDS, *model.model_fields
 
 
 def read_form(
-    model: type[Model], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True
-) -> tuple[Model, dict[str, float]]:
-    """The options and the case of a request; ``left_out`` are the inputs that it asks for."""
+    model: type[Model], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True,
+    one: bool = False,
+) -> tuple[Model, dict[str, Any], Asked]:  # fmt: skip
+    """The options and the case of a request, and what it is; ``left_out`` are the inputs that it asks for."""
     known = _known(model)
     form, rest, faults = options_of(model, given, known)
     if left_out:  # a null says the same
         rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
-    values, more = checked(rest, left_out, null_is_rigid, known)
+    asked = PLAIN
+    if form is not NO_OPTIONS:
+        kind = SPRING
+        with suppress(InputError):  # which is among the faults
+            kind = kind_in(given)
+        asked = asked_of(rest, kind)
+    values, more = checked(rest, left_out, null_is_rigid, known, asked)
     if form is None or more:
         refuse([*faults, *more])
-    return form, values
+    if asked != PLAIN or form.include:
+        form.check(asked, one)
+    return form, values, asked
 
 
 def split_names(names: Any) -> Any:
@@ -214,7 +286,7 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
     for key in ("std", "family"):  # objects
         fields.pop(key, None)
     if "std" in base.model_fields and not changed:
-        for key, (unit, _) in SI.items():
+        for key, unit in _DEVIATE.items():
             kind = Hertz if key == "f" else NotNegative
             told = bounded("finite and >= 0", f"Standard deviation [{unit}]", None)
             fields[f"std_{key}"] = (kind | NO_NULL, told)
@@ -223,7 +295,9 @@ def query_of(name: str, base: type[BaseModel], **changed: Any) -> Any:
 
 CaseQuery: Any = query_of(
     "CaseQuery",
-    create_model("_Case", __base__=(Options, create_model("_Given", **input_fields(null=False, shown=example)))),
+    create_model(
+        "_Case", __base__=(Options, create_model("_Given", **input_fields(null=False, shown=example, query=True)))
+    ),
 )
 OptionsQuery: Any = query_of("OptionsQuery", Options)
 _many = {**example, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}

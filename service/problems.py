@@ -133,6 +133,7 @@ class Kind(Enum):
     INVALID_VALUE = 422, "The request holds invalid values"
     HEAD_TOO_LARGE = 431, "The head is too large"
     UNEXPECTED = 500, "An unexpected error"
+    NOT_INSTALLED = 501, "This service lacks a package"
     NOT_READY = 503, "The service is not ready", 5
     OVERLOADED = 503, "The service is overloaded", 1
     OUT_OF_MEMORY = 503, "The service has too little memory", 1

@@ -11,6 +11,7 @@ from statistics import NormalDist
 import numpy as np
 
 from mumacro.charts import ROUNDING
+from mumacro.contact import SPRING
 from mumacro.inputs import FIELDS, SI
 from mumacro.settling import settling
 
@@ -28,7 +29,7 @@ _PER = {name: "-" if unit == "-" else f"1/({unit})" for name, (unit, _) in SI.it
     "Dimensionless groups; null: not finite (rigid contact, no oscillation, or beyond double range)",
     (
         Part("groups.v_tilde", "-", "v0/(l0 omega)"),
-        Part("groups.y_tilde", "-", "y0/l0"),
+        Part("groups.y_tilde", "-", "y0/l0; for direction normal Fz_amplitude/Fz"),
         Part("groups.l0", "m", "Length scale mu0 Fz/k; 0 for rigid contact"),
     ),
     cost=2,
@@ -49,6 +50,8 @@ def _groups(cases: Cases) -> Sequence[Array]:
 )
 def _limits(cases: Cases) -> Sequence[Array]:
     # Rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0, with mu_crit -> 0.
+    if cases.kind != SPRING:
+        return _limits_as(cases)
     mu0, omega, surrogate = cases.columns["mu0"], cases.columns["omega"], cases.surrogate
     y = where(cases.usable, cases.y_tilde, 1.0)
     v = surrogate.v_tilde_crit(y)
@@ -62,6 +65,18 @@ def _limits(cases: Cases) -> Sequence[Array]:
         where(rest | rigid, 0.0, speed),
         where(rest, mu0, where(rigid, 0.0, crit)),
     )
+
+
+def _limits_as(cases: Cases) -> Sequence[Array]:
+    """The same for another contact or direction."""
+    omega = cases.columns["omega"]
+    if cases.kind.names["direction"] == "along":  # where the contact begins to slide backwards
+        speed = cases.columns["y0"] * omega
+    else:
+        crit = cases.surrogate.v_tilde_crit(where(cases.usable, cases.y_tilde, 0.0), **cases.kind.names)
+        speed = where(cases.usable, cases.length_scale * crit * omega, np.nan)
+        speed = where(cases.at_rest | np.isinf(cases.columns["k"]), 0.0, speed)
+    return cases.again(v0=0.0), speed, cases.again(v0=speed)
 
 
 @register(
@@ -91,7 +106,7 @@ def _regime_certain(cases: Cases) -> Sequence[Array]:
     slopes=True,
 )
 def _gradient(cases: Cases) -> Sequence[Array]:
-    return [found[name] for found in cases.slopes() for name in FIELDS]
+    return [found[name] for found in cases.slopes() for name in cases.kind.fields]
 
 
 @cache
@@ -110,18 +125,16 @@ def _normal_samples() -> Array:
 
 def _sampled(cases: Cases) -> Array:
     """Standard deviation of mu_macro over normal inputs; samples out of bounds are left out."""
-    n = cases.mu_macro.size
-    total, squares, count = np.zeros(n), np.zeros(n), np.zeros(n)
-    deviations = np.array([cases.std.get(name, 0.0) for name in FIELDS])
+    total, squares, count = (np.zeros(cases.mu_macro.shape) for _ in range(3))
+    deviations = np.array([cases.std.get(name, 0.0) for name in cases.kind.fields])
     for point in _normal_samples():
-        pairs = zip(FIELDS, point * deviations, strict=True)
-        a, b, c, d, e, f = (np.atleast_1d(cases.columns[name] + shift) for name, shift in pairs)
-        off = cases.surrogate.evaluate_columns(a, b, c, d, e, f, n)[0] - cases.mu_macro
+        pairs = zip(cases.kind.fields, point * deviations, strict=True)
+        off = cases.again(**{name: cases.columns[name] + shift for name, shift in pairs}) - cases.mu_macro
         total += np.nan_to_num(off)
         squares += np.nan_to_num(off * off)
         count += ~np.isnan(off)
     spread: Array = np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
-    return spread.reshape(cases.mu_macro.shape)
+    return spread
 
 
 @register(
@@ -139,15 +152,16 @@ def _sampled(cases: Cases) -> Array:
     ],
     cost=SAMPLES + 6,
     slopes=True,
+    k_range="it needs one k: give k with its standard deviation, or k_range without std",
 )  # fmt: skip
 def _std(cases: Cases) -> Sequence[Array]:
     # k has no effect where contact is rigid, nor has an infinite slope where the input is exact
     exact = {
         name: (np.isinf(cases.columns["k"]) if name == "k" else False) | (cases.std.get(name, 0.0) == 0.0)
-        for name in FIELDS
+        for name in cases.kind.fields
     }
     terms, doubts = (
-        [where(exact[name], 0.0, found[name] * cases.std.get(name, 0.0)) for name in FIELDS] for found in cases.slopes()
+        [where(exact[name], 0.0, found[name] * cases.std.get(name, 0.0)) for name in exact] for found in cases.slopes()
     )
     std, doubt = (reduce(np.hypot, found, 0.0 * cases.mu_macro) for found in (terms, doubts))
     shares = [where(std > 0.0, (term / std) ** 2, 0.0) for term in terms]
@@ -169,7 +183,7 @@ def _std(cases: Cases) -> Sequence[Array]:
     cost=4,
 )
 def _stick_fraction(cases: Cases) -> Sequence[Array]:
-    value, bound = cases.surrogate.stick_fraction_with_bound(cases.v_tilde, cases.y_tilde)
+    value, bound = cases.surrogate.stick_fraction_with_bound(cases.v_tilde, cases.y_tilde, **cases.kind.names)
     # y~ below double range: the groups do not show whether such a contact sticks
     lost = (cases.y_tilde == 0.0) & (cases.v_tilde < np.inf) & ~cases.at_rest
     return value, where(lost, 1.0, bound)
@@ -185,13 +199,14 @@ def _stick_fraction(cases: Cases) -> Sequence[Array]:
         Part("power_bound.saved", "W", "Bound of the absolute error of saved"),
     ),
     cost=5,
+    normal="how far the load moves is not modelled",
 )
 def _power(cases: Cases) -> Sequence[Array]:
     columns = cases.columns
     mu0, load, omega, v0 = (columns[name] for name in ("mu0", "Fz", "omega", "v0"))
     unit = where(cases.usable, mu0 * load * (cases.length_scale * omega), np.nan)
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
-    value, bound = cases.surrogate.power_with_bound(v, y)
+    value, bound = cases.surrogate.power_with_bound(v, y, **cases.kind.names)
     saved = (mu0 - cases.mu_macro) * load * v0
     return (
         where(cases.at_rest, 0.0, value * unit),
@@ -212,6 +227,7 @@ def _power(cases: Cases) -> Sequence[Array]:
         Part("settling_bound.periods", "-", "Bound of the absolute error of periods; null also: not known"),
     ),
     cost=5,
+    **dict.fromkeys(("ball", "along", "normal"), "the decay of a disturbance is known for one spring, across"),
 )
 def _settling(cases: Cases) -> Sequence[Array]:
     found = settling(cases.surrogate, **dict(cases.columns))

@@ -1,7 +1,6 @@
 """mumacro.fit: inputs recovered within their covariance, what points do not tell, bad input."""
 
 import doctest
-import inspect
 import math
 import warnings
 
@@ -9,12 +8,11 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import InputError, Surrogate, fit, fitting
+from mumacro import InputError, fit, fitting
+from mumacro.contact import CONTACTS
 
 RIG = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
 V0 = np.geomspace(1e-3, 1.0, 20)
-KNOWS_BALL = "contact" in inspect.signature(Surrogate.evaluate).parameters
-CONTACTS = ["spring", pytest.param("ball", marks=pytest.mark.skipif(not KNOWS_BALL, reason="evaluate has no ball"))]
 
 
 @pytest.fixture(autouse=True)
@@ -27,8 +25,7 @@ def quiet():
 
 def friction(surrogate, contact="spring", **inputs):
     """mu_macro of a contact that is known."""
-    said = {} if contact == "spring" else {"contact": contact}
-    return np.asarray(surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, **said).mu_macro)
+    return np.asarray(surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, contact=contact).mu_macro)
 
 
 def noisy(surrogate, spread, seed=0, **inputs):

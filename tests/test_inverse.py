@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from comparing import close
 from mumacro import InputError
+from mumacro.contact import kind_of
 from mumacro.inputs import FIELDS
 from mumacro.inverse import border_crossings, solve_for
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
@@ -18,6 +19,17 @@ CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01
 
 def others(case, name):
     return {field: value for field, value in case.items() if field != name}
+
+
+#: every contact with every direction that it has
+PAIRS = [("spring", "across"), ("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
+every_pair = pytest.mark.parametrize("pair", PAIRS, ids=" ".join)
+
+
+def as_kind(case, pair, share=0.4):
+    """The keywords of a pair, its fields, and ``case`` with Fz_amplitude = ``share`` Fz where the pair has it."""
+    kind = kind_of(*pair)
+    return kind.names, kind.fields, kind.as_given({**case, "y0": share * case["Fz"]} if kind.normal else case)
 
 
 def only_root(solution):
@@ -35,18 +47,21 @@ cases = st.fixed_dictionaries(
 )  # fmt: skip
 
 
-@settings(max_examples=100, deadline=None)
-@given(case=cases, unknown=st.sampled_from(FIELDS))
-def test_the_forward_answer_is_inverted(surrogate, case, unknown):
-    forward = surrogate.evaluate(**case)
-    solution = solve_for(surrogate, unknown, forward.mu_macro, others(case, unknown))
+@every_pair
+@settings(max_examples=60, deadline=None)
+@given(case=cases, share=st.floats(0.001, 0.999), place=st.integers(0, 5))
+def test_the_forward_answer_is_inverted(surrogate, pair, case, share, place):
+    said, fields, case = as_kind(case, pair, share)
+    unknown = fields[place]
+    forward = surrogate.evaluate(**case, **said)
+    solution = solve_for(surrogate, unknown, forward.mu_macro, others(case, unknown), **said)
     if solution.constant or not solution.roots[0]:
         # within the surrogate's error the input has no influence here, or its end equals the limit
         edge = min(abs(forward.mu_macro - solution.reach.mu_min), abs(forward.mu_macro - solution.reach.mu_max))
         assert edge <= 4.0 * forward.error_bound + 1e-9 * case["mu0"]
         return
     for root in solution.roots[0]:
-        there = surrogate.evaluate(**{**case, unknown: root.value})
+        there = surrogate.evaluate(**{**case, unknown: root.value, **said})
         assert there.mu_macro == root.mu_macro
         assert root.mu_macro == close(forward.mu_macro, rel=1e-9, abs=2.0 * forward.error_bound)
         assert root.low <= root.value <= root.high
@@ -198,7 +213,96 @@ def test_a_bad_question_names_its_field(surrogate, field, arguments):
     assert caught.value.field == field
 
 
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize("unknown", ["k", "Fz"])
+@settings(max_examples=15, deadline=None)
+@given(v0=decade(-5, 0), share=st.floats(0.001, 0.999))
+def test_no_root_is_missed_on_a_ray(surrogate, contact, unknown, v0, share):
+    case, ray = {**CASE, "v0": v0}, CASE[unknown] * np.geomspace(1e-9, 1e9, 20_001)
+    mu = surrogate.evaluate(**{**case, unknown: ray}, contact=contact).mu_macro
+    target = float(mu[int(share * 20_000)])
+    assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))  # not on a plateau, where all are roots
+    above = mu > target * (1.0 + 1e-12)
+    found = solve_for(surrogate, unknown, target, others(case, unknown), (ray[0], ray[-1]), contact=contact).roots[0]
+    assert len(found) >= np.count_nonzero(above[1:] != above[:-1])
+    assert all(root.mu_macro == close(target, rel=1e-11) for root in found)
+    values = [root.value for root in found]
+    assert values == sorted(values)
+
+
+@pytest.mark.parametrize("unknown", ["k", "Fz"])
+def test_a_ball_folds_as_a_spring_does(surrogate, unknown):
+    case = {**CASE, "v0": 1e-4}
+    ray = CASE[unknown] * np.geomspace(*((1e-6, 1e8) if unknown == "k" else (1e-8, 1e6)), 141)
+    mu = surrogate.evaluate(**{**case, unknown: ray}, contact="ball").mu_macro
+    falling = np.diff(mu) < 0.0
+    (turns,) = np.nonzero(falling[1:] != falling[:-1])
+    assert turns.size == 2
+    rigid = mu[-1] if unknown == "k" else mu[0]
+    target = 0.5 * float(rigid + mu[turns + 1].max())
+    assert len(solve_for(surrogate, unknown, target, others(case, unknown), contact="ball").roots[0]) == 3
+
+
+@pytest.mark.parametrize("pair", [pair for pair in PAIRS if pair[1] != "across"], ids=" ".join)
+@pytest.mark.parametrize("k", [1e6, None])
+def test_along_and_normal_the_whole_friction_is_reached(surrogate, pair, k):
+    said, _, case = as_kind({**CASE, "k": k}, pair)
+    solution = solve_for(surrogate, "v0", 0.3, others(case, "v0"), **said)
+    root = only_root(solution)
+    # where the springs begin to slide all the time; the last digits before it are mu0, too
+    z = case.get("Fz_amplitude", 0.0) / case["Fz"]
+    begin = z * 3e-6 * CASE["omega"] if z and k else 5e-324 if z else CASE["y0"] * CASE["omega"]
+    assert root.value == close(begin, rel=1e-5, abs=5e-324)
+    assert root.low <= root.value <= begin * (1.0 + 1e-12)
+    assert root.high == solution.reach.high
+    assert solution.reach.max_included
+
+
+def test_the_amplitude_of_the_force_stays_below_the_force(surrogate):
+    said, _, case = as_kind(CASE, ("spring", "normal"))
+    for unknown, within in (("Fz_amplitude", (0.1, 10.0)), ("Fz", (4.0, 100.0))):
+        with pytest.raises(InputError, match=r"range must be two ascending.*Fz_amplitude below Fz"):
+            solve_for(surrogate, unknown, 0.2, others(case, unknown), within, **said)
+        reach = solve_for(surrogate, unknown, 0.2, others(case, unknown), **said).reach
+        assert reach.high < 10.0 if unknown == "Fz_amplitude" else reach.low > 4.0
+    with pytest.raises(InputError, match="Fz_amplitude must be >= 0 and below Fz"):
+        solve_for(surrogate, "v0", 0.2, {**others(case, "v0"), "Fz_amplitude": 10.0}, **said)
+    with pytest.raises(InputError, match="y0 must be left out for direction normal"):
+        solve_for(surrogate, "v0", 0.2, {**others(case, "v0"), "y0": 1e-6}, **said)
+    with pytest.raises(InputError, match="Fz_amplitude must be left out for direction across"):
+        solve_for(surrogate, "v0", 0.2, {**others(CASE, "v0"), "Fz_amplitude": 1.0})
+    with pytest.raises(InputError, match="unknown must be one of mu0, Fz, k, Fz_amplitude"):
+        solve_for(surrogate, "y0", 0.2, others(case, "Fz_amplitude"), **said)
+
+
+@pytest.mark.parametrize("interval", [{"k_range": (1e6, 2e6)}, {"k_low": 1e6, "k_high": 2e6}])
+def test_an_interval_of_k_is_refused_with_the_reason(surrogate, interval):
+    known = others(others(CASE, "v0"), "k") | interval
+    with pytest.raises(InputError, match="a target has an interval of roots; solve for both ends"):
+        solve_for(surrogate, "v0", 0.2, known)
+
+
 # --- border -------------------------------------------------------------------------------------------
+
+
+@every_pair
+@pytest.mark.parametrize("place", range(6))
+@pytest.mark.parametrize("speed", [0.01, 0.15])
+def test_the_crossings_are_all_changes_of_the_regime(surrogate, pair, place, speed):
+    said, fields, case = as_kind({**CASE, "v0": speed}, pair)
+    along = fields[place]
+    values = case[along] * np.geomspace(1e-3, 1e3, 3001)
+    if said["direction"] == "normal" and along in ("Fz", "Fz_amplitude"):
+        values = values[values > 4.0] if along == "Fz" else values[values < 10.0]
+    regime = surrogate.evaluate(**{**case, along: values}, **said).regime
+    (changes,) = np.nonzero(regime[1:] != regime[:-1])
+    marks = border_crossings(surrogate, along, others(case, along), values[0], values[-1], **said)
+    assert [mark.regimes for mark in marks] == [(regime[i], regime[i + 1]) for i in changes]
+    for mark, i in zip(marks, changes, strict=True):
+        assert values[i] < mark.value <= values[i + 1]
+        there = surrogate.evaluate(**{**case, along: np.array([np.nextafter(mark.value, 0.0), mark.value])}, **said)
+        assert tuple(there.regime) == mark.regimes
+        assert mark.mu_macro == there.mu_macro[1]
 
 
 @pytest.mark.parametrize(("along", "expected"), [("v0", 1), ("omega", 1), ("y0", 1), ("k", 2), ("Fz", 2), ("mu0", 2)])
@@ -253,14 +357,18 @@ def test_a_range_has_its_ends_exactly(scale):
     assert np.all(np.diff(sweep_values("v0", 1.0, math.nextafter(1.0, 2.0), 9, scale)) >= 0.0)
 
 
-@pytest.mark.parametrize("along", FIELDS)
-def test_a_law_is_the_surrogate_along_a_line(surrogate, along):
-    values = sweep_values(along, 0.01 * CASE[along], 100.0 * CASE[along], 41, "log")
-    law = friction_law(surrogate, along, values, others(CASE, along))
+@every_pair
+@pytest.mark.parametrize("place", range(6))
+def test_a_law_is_the_surrogate_along_a_line(surrogate, pair, place):
+    said, fields, case = as_kind(CASE, pair, 0.009)
+    along = fields[place]
+    values = sweep_values(along, 0.01 * case[along], 100.0 * case[along], 41, "log")
+    law = friction_law(surrogate, along, values, others(case, along), **said)
+    assert law.kind.names == said
     for i in (0, 17, 40):
-        alone = surrogate.evaluate(**{**CASE, along: values[i]})
+        alone = surrogate.evaluate(**{**case, along: values[i], **said})
         assert law.answer.mu_macro[i] == close(alone.mu_macro, rel=1e-15)
-        static = surrogate.evaluate(**{**CASE, along: values[i], "v0": 0.0})
+        static = surrogate.evaluate(**{**case, along: values[i], "v0": 0.0, **said})
         assert law.mu_static[i] == close(static.mu_macro, rel=1e-9, abs=1e-15)
     changes = np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1])
     assert changes == len(law.border)
@@ -270,7 +378,7 @@ def test_the_approximations_hold_where_they_should(surrogate):
     def compare(name, case, **ranges):
         values = sweep_values("v0", *ranges["v0"], 31, "log")
         law = friction_law(surrogate, "v0", values, others(case, "v0"))
-        approximation = approximations(surrogate, law, others(case, "v0"))[name]
+        approximation = approximations(surrogate, law)[name]
         return np.max(np.abs(approximation - law.answer.mu_macro)) / case["mu0"]
 
     unit = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": 1.0}
@@ -287,13 +395,13 @@ def test_the_approximations_hold_where_they_should(surrogate):
 def test_an_approximation_is_nan_outside_its_stated_range(surrogate):
     values = sweep_values("v0", 1e-3, 10.0, 11, "log")
     law = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "y0": 1e-5})  # y~ = 3.3
-    found = approximations(surrogate, law, {**others(CASE, "v0"), "y0": 1e-5})
+    found = approximations(surrogate, law)
     assert found.keys() == APPROXIMATIONS.keys()
     assert np.isnan(found["small_amplitude"]).all()
     assert np.isnan(found["corner"]).all()
     assert np.isfinite(found["rigid"]).all()
     rigid = friction_law(surrogate, "v0", values, {**others(CASE, "v0"), "k": None})
-    found = approximations(surrogate, rigid, {**others(CASE, "v0"), "k": None})
+    found = approximations(surrogate, rigid)
     assert found["rigid"] == close(rigid.answer.mu_macro, rel=1e-14)
     assert np.isnan(found["creep"]).all()
     assert np.isnan(found["continuous"]).all()
@@ -306,7 +414,7 @@ def test_an_approximation_is_nan_outside_its_stated_range(surrogate):
 def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate, along):
     values = sweep_values(along, 0.1 * CASE[along], 10.0 * CASE[along], 31, "log")
     law = friction_law(surrogate, along, values, others(CASE, along))
-    speeds = border_speeds(surrogate, law, others(CASE, along))
+    speeds = border_speeds(surrogate, law)
     assert speeds.keys() == BORDERS.keys()
     v0 = values if along == "v0" else CASE["v0"]
     assert ((v0 >= speeds["exact"]) == (law.answer.regime == "continuous")).all()
@@ -320,7 +428,7 @@ def test_what_never_sticks_has_no_border(surrogate):
     values = sweep_values("v0", 1e-3, 10.0, 5, "log")
     for changed in ({"k": None}, {"y0": 0.0}, {"omega": 0.0}):
         case = {**others(CASE, "v0"), **changed}
-        for column in border_speeds(surrogate, friction_law(surrogate, "v0", values, case), case).values():
+        for column in border_speeds(surrogate, friction_law(surrogate, "v0", values, case)).values():
             assert (column == 0.0).all()
 
 

@@ -1,7 +1,6 @@
 """What an answer says about the model: rows of docs/validity.md, effects, digits."""
 
 import doctest
-import inspect
 import math
 import re
 
@@ -9,12 +8,10 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import InputError, Surrogate, validity
+from mumacro import InputError, validity
 from mumacro.validity import ROWS, digits, k_effect, model_rows
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
-KNOWS_BALL = "contact" in inspect.signature(Surrogate.evaluate).parameters
-needs_ball = pytest.mark.skipif(not KNOWS_BALL, reason="evaluate has no ball")
 
 
 def rows(surrogate, contact="spring", **changed):
@@ -93,7 +90,6 @@ def test_nothing_is_said_where_nothing_oscillates_or_gives_way(surrogate, case) 
     assert model_rows(surrogate, {**CASE, **case}) == []
 
 
-@needs_ball
 def test_the_other_contact_is_told_with_the_difference(surrogate) -> None:
     case = {"k": 1.307e7, "y0": 0.2e-6, "v0": 0.005}
     text, effect = rows(surrogate, **case)["one spring"]

@@ -139,3 +139,22 @@ def test_an_illegal_case_affects_only_itself(surrogate) -> None:
     assert found.periods[0] == settling(surrogate, **CASE).periods
     for column in (found.periods, found.periods_any, found.time, found.slip_path, found.error_bound):
         assert np.isnan(column[1:]).all()
+
+
+@pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (1e-3, 30.0), (3.0, 0.1)])
+def test_a_ball_settles_as_its_slowest_spring(surrogate, v, y) -> None:
+    found = of(surrogate, v, y, contact="ball")
+    # a spring with the share s of the middle one's load has l0 that is 1.5 s as long
+    springs = [
+        settling(surrogate, **{**UNIT, "Fz": 1.5 * s * UNIT["Fz"]}, y0=y, v0=v) for s in np.linspace(1, 0.01, 50)
+    ]
+    assert found.periods == close(max(spring.periods for spring in springs), rel=1e-12)
+    assert found.time == close(springs[0].time, rel=1e-12)
+    assert found.slip_path == close(springs[0].slip_path, rel=1e-12)
+    assert found.periods_any == 2.0 * found.periods
+
+
+@pytest.mark.parametrize("direction", ["along", "normal"])
+def test_another_direction_is_refused_with_the_reason(surrogate, direction) -> None:
+    with pytest.raises(InputError, match="across: how a disturbance decays is derived for no other"):
+        settling(surrogate, **CASE, direction=direction)

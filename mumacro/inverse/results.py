@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from mumacro.contact import AMPLITUDE, SPRING, Kind
 from mumacro.errors import InputError
-from mumacro.inputs import FIELDS, as_columns, check_inputs
+from mumacro.inputs import as_columns, check_inputs
+from mumacro.interval import ENDS
 
 __all__ = ["Crossing", "Reach", "Root", "Solution", "checked_case"]
 
@@ -25,7 +27,7 @@ class Root(NamedTuple):
     mu_macro : float
         The surrogate's value there [-].
     regime : str
-        "continuous", "stick_slip" or "static".
+        One of :data:`mumacro.REGIMES`.
     """
 
     value: float
@@ -89,30 +91,43 @@ class Solution:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A value of the swept input at which continuous sliding begins or ends, and mu_macro there."""
+    """A value of the swept input at which the regime changes, mu_macro there, and the regimes below and above."""
 
     value: float
     mu_macro: float
+    regimes: tuple[str, str]
 
 
-def checked_case(case: Mapping[str, Any], without: str) -> dict[str, float]:
+def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
     """The five known inputs [SI]; an infinite ``k`` is rigid contact.
 
-    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.
+    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.  The amplitude is
+    ``Fz_amplitude`` [N] for direction normal, ``y0`` [m] otherwise.
 
     Raises
     ------
     InputError
-        A value is missing, not one number, out of bounds, given twice, or given for the unknown.
+        A value is missing, not one number, out of bounds, given twice, or given for the unknown; an interval of k.
     """
-    if without not in FIELDS:
-        raise InputError("unknown", without, f"one of {', '.join(FIELDS)}")
+    if without not in kind.fields:
+        raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")
+    for name in ("k_range", *ENDS):
+        if case.get(name) is not None:
+            told = "left out: over an interval of k a target has an interval of roots; solve for both ends of it"
+            raise InputError(name, case[name], told)
     given = {name: value for name, value in case.items() if value is not None or name == "k" != without}
     for name in given.keys() & ({"omega", "f"} if without == "omega" else {without}):
         raise InputError(name, given[name], f"left out, because {without} is the unknown")
-    columns = as_columns({**given, without: 1.0})
-    for name, column in columns.items():
-        if column.size != 1:
-            raise InputError(name, given.get(name, given.get("f")), "one number")
-    check_inputs(columns, given.get("f"))
+    given = kind.as_six({**given, without: 1.0})
+    try:
+        six = as_columns(given)
+        columns = kind.as_given(six)
+        for name, column in columns.items():
+            if column.size != 1:
+                raise InputError(name, given.get(name, given.get("f")), "one number")
+        check_inputs(six, given.get("f"))
+        if kind.normal and without not in ("Fz", AMPLITUDE):
+            kind.check_lift_off(six["y0"], six["Fz"])
+    except InputError as error:
+        raise kind.refused(error) from error.__cause__
     return {name: float(column.item()) for name, column in columns.items() if name != without}

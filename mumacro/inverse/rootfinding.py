@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.answer import Answer
+from mumacro.contact import SPRING, Kind
 from mumacro.surrogate import Surrogate
 
 __all__ = ["TINY", "Curve", "Sweep", "last_double"]
@@ -30,13 +31,12 @@ _PER_CALL = 512
 class Sweep:
     """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite ``k`` is rigid."""
 
-    def __init__(self, surrogate: Surrogate, case: Mapping[str, float], unknown: str) -> None:
-        self.surrogate, self.case, self.unknown = surrogate, case, unknown
+    def __init__(self, surrogate: Surrogate, case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> None:
+        self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
 
-    def answer(self, x: Array, gradient: bool = False) -> Answer[Any]:
-        """The surrogate's results at the values ``x`` (n,) of the input [SI]."""
-        inputs: dict[str, Any] = {**self.case, self.unknown: x}
-        answer: Answer[Any] = self.surrogate.evaluate(**inputs, gradient=gradient)
+    def answer(self, x: Any, **more: Any) -> Answer[Any]:
+        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``more`` as in ``evaluate``."""
+        answer: Answer[Any] = self.surrogate.evaluate(**{**self.case, self.unknown: x, **self.kind.names, **more})
         return answer
 
     def mu(self, x: Array) -> Array:
@@ -65,6 +65,12 @@ class Curve:
         low, high = sorted((float(self.mu[0]), float(self.mu[-1])))
         out: Bools = (level >= low) & (level <= high)
         return out
+
+    def end(self) -> float:
+        """Where the piece first has its last value: at its end, or where the plateau begins that ends it."""
+        at = int(np.argmax(self.mu == self.mu[-1]))
+        before, there = self.x[max(at - 1, 0) : at], self.x[at : at + 1]
+        return float(last_double(lambda x: self.sweep.mu(x) != self.mu[-1], before, there)[1][0] if at else there[0])
 
     def meet(self, level: Array, leave: ArrayLike = False) -> Array:
         """Where mu_macro reaches the levels (n,), or where ``leave`` is true goes beyond them, (n,) [SI].

@@ -1,6 +1,6 @@
 """The inverse problem: which value of one input gives a wanted mu_macro; and where a sweep of it crosses the border.
 
-What is known of mu_macro as a function of one input, the others constant:
+What is known of mu_macro as a function of one input, the others constant, for an oscillation across:
 
 =====  =====================================  ====================================================================
 input  course                                 roots
@@ -17,7 +17,9 @@ mu0    rises: it would fold only where        one
        constant r; it is 0.09 at the most
 =====  =====================================  ====================================================================
 
-The figures are those of benchmarks/folds.py, for r up to 1e8.
+The figures are those of benchmarks/folds.py, for one spring and r up to 1e8; a ball does the same, later and less.
+Along and normal every input has one root, and mu0 is reached: where the upper point never moves backwards, or the
+springs slide all the time.  There mu_macro falls with k and rises with Fz (along), and rises with both (normal).
 
 How a level is found on a monotone piece: :mod:`mumacro.inverse.rootfinding`.
 """
@@ -33,6 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.answer import Answer
+from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import POSITIVE
 from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case
@@ -44,7 +47,7 @@ __all__ = ["border_crossings", "solve_for"]
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-MONOTONE = ("v0", "y0", "omega")
+EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # searched over all their values
 HUGE = 1.7976931348623157e308
 
 # A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.  At r = 10, three
@@ -52,6 +55,9 @@ HUGE = 1.7976931348623157e308
 # Where mu_macro is monotone, samples only bracket roots, for Newton's method to finish.
 _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
 _MAX_SAMPLES = 20_001
+# Direction -> y~, for normal v~/z, of a contact as soft and as stiff as it matters.  Across, mu~ = 1 - O(y~^2), along
+# 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c = arccos(v~/y~) is 1e-8 or more.
+_ENDS = {"across": (1e-6, 1e8), "along": (1e-17, 1e30), "normal": (1e-17, 10.0)}
 # y~ where v~/v~crit(y~) is smallest on a ray: there d ln v~crit / d ln y~ = 1.  The slope falls strictly from 2 to 1/2
 # (20,001 places from 1e-6 to 1e12), so the border is crossed at most once on either side.
 _Y_CLOSEST = 1.290791
@@ -63,6 +69,9 @@ def solve_for(
     targets: ArrayLike,
     case: Mapping[str, float | None],
     within: tuple[float, float] | None = None,
+    *,
+    contact: str = "spring",
+    direction: str = "across",
 ) -> Solution:
     """Every value of one input at which mu_macro has the wanted value.
 
@@ -71,14 +80,16 @@ def solve_for(
     surrogate : Surrogate
         What is solved; a root is as good as its error bound, see :class:`Root`.
     unknown : str
-        One of mu0, Fz, k, y0, omega, v0.
+        One of mu0, Fz, k, y0, omega, v0; for direction normal Fz_amplitude in place of y0.
     targets : array_like
         Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
     case : mapping
         The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
     within : (float, float), optional
-        Search range [SI].  Left out: everywhere for v0, y0, omega; for k, Fz and mu0 from where the contact is so soft
-        that mu_macro = mu0 to where it is as good as rigid.
+        Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for k, Fz and mu0 from
+        where the contact is so soft that it does not matter to where it is as good as rigid.
+    contact, direction : str
+        As in :meth:`mumacro.Surrogate.evaluate`.
 
     Returns
     -------
@@ -88,7 +99,7 @@ def solve_for(
     Raises
     ------
     InputError
-        A value out of bounds, an unknown that is given or does not exist, an invalid range.
+        A value out of bounds, an unknown that is given or does not exist, an invalid range, an interval of k.
 
     Examples
     --------
@@ -98,24 +109,26 @@ def solve_for(
     >>> [[f"{root.value:.4e} m" for root in roots] for roots in found.roots]      # 0.4 is more than mu0
     [['2.8570e-06 m'], []]
     """
-    sweep = Sweep(surrogate, checked_case(case, unknown), unknown)
+    kind = kind_of(contact, direction)
+    sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind)
     wanted = np.asarray(targets, dtype=np.float64).ravel()
     bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
     if bad.size:
         raise InputError("target", float(wanted[bad[0]]), "finite and >= 0", int(bad[0]) if np.ndim(targets) else None)
-    low, high = _default_range(sweep, wanted) if within is None else _checked_range(within, unknown)
-    x = _samples(low, high, _PER_DECADE_MONOTONE if unknown in MONOTONE else _PER_DECADE)
+    low, high = _default_range(sweep, wanted) if within is None else _checked_range(sweep, within)
+    folds = unknown in ("k", "Fz") and direction == "across"
+    x = _samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
     answer = sweep.answer(x)
     mu, noise = answer.mu_macro, 2.0 * answer.error_bound
-    turns = _turning_points(sweep, x, mu, noise) if unknown in ("k", "Fz") else []
+    turns = _turning_points(sweep, x, mu, noise) if folds else []
     curves = _curves(sweep, [low, *turns, high], x, mu)
     if low == 0.0 and unknown != "v0" and abs(curves[0].mu[0] - mu[0]) > 1e-9 * mu[0]:
         # mu_macro = mu0 at y0 = 0 or omega = 0 even where it is another constant for every other value
         curves = [Curve(sweep, np.zeros(1), curves[0].mu[:1]), *_curves(sweep, [TINY, high], x, mu)]
     ends = np.concatenate([curve.mu[[0, -1]] for curve in curves])
     reach = Reach(low, high, float(ends.min()), float(ends.max()), True, True)
-    constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in MONOTONE else float(noise.max()))
-    if within is None and unknown in MONOTONE and not constant:
+    constant = reach.mu_max - reach.mu_min <= (0.0 if unknown in EVERYWHERE else float(noise.max()))
+    if within is None and unknown in EVERYWHERE and not constant:
         reach = _without_limit(sweep, reach)
     levels = tuple(wanted.tolist())
     found = _roots(sweep, [] if constant else curves, wanted)
@@ -124,60 +137,80 @@ def solve_for(
 
 
 def border_crossings(
-    surrogate: Surrogate, along: str, case: Mapping[str, float | None], low: float, high: float
-) -> tuple[Crossing, ...]:
-    """Where in ``low <= along <= high`` continuous sliding begins or ends: none, one, or (mu0, Fz, k) two places.
+    surrogate: Surrogate, along: str, case: Mapping[str, float | None], low: float, high: float, *,
+    contact: str = "spring", direction: str = "across",
+) -> tuple[Crossing, ...]:  # fmt: skip
+    """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends, ascending.
 
-    ``case`` holds the other five inputs.  None for rigid contact (never any stick) and without oscillation.
+    ``case`` holds the other five inputs.  Of continuous sliding none, one, or (across, over mu0, Fz or k) two places;
+    none for rigid contact (never any stick) and without oscillation.
     """
-    sweep = Sweep(surrogate, checked_case(case, along), along)
+    kind = kind_of(contact, direction)
+    sweep = Sweep(surrogate, checked_case(case, along, kind), along, kind)
     if sweep.case.get("k") == math.inf or 0.0 in sweep.case.values():
         return ()
-    middle = low if along in MONOTONE else _where(sweep, _Y_CLOSEST)
+    low = max(low, TINY)  # at 0 nothing oscillates or slides
+    middle = low if along in EVERYWHERE or direction != "across" else _where(sweep, _Y_CLOSEST)
     edges = np.array([low, middle, high] if low < middle < high else [low, high])
+    found = []
+    for regime in ("continuous", "reverse_slip"):
+        state = sweep.answer(edges).regime == regime
+        i = np.flatnonzero(state[1:] != state[:-1])
+        cuts = last_double(lambda x: (sweep.answer(x).regime == regime) == state[i, None], edges[i], edges[i + 1])  # noqa: B023
+        found += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
+    below, first = np.array(sorted(set(found))).reshape(-1, 2).T
+    after = sweep.answer(first)
+    regimes = zip(sweep.answer(below).regime.tolist(), after.regime.tolist(), strict=True)
+    return tuple(map(Crossing, first.tolist(), after.mu_macro.tolist(), regimes))
 
-    def slides(x: Array) -> Bools:
-        out: Bools = sweep.answer(x).regime == "continuous"
-        return out
 
-    state = slides(edges)
-    i = np.flatnonzero(state[1:] != state[:-1])
-    _, first = last_double(lambda x: slides(x) == state[i, None], edges[i], edges[i + 1])
-    return tuple(map(Crossing, first.tolist(), sweep.mu(first).tolist()))
+def _legal(sweep: Sweep) -> tuple[float, float]:
+    """Smallest and largest legal value of the unknown."""
+    low, high = TINY if sweep.unknown in POSITIVE else 0.0, HUGE
+    if sweep.kind.normal and sweep.unknown == "Fz":
+        low = math.nextafter(sweep.case[AMPLITUDE], math.inf)
+    return low, math.nextafter(sweep.case["Fz"], 0.0) if sweep.unknown == AMPLITUDE else high
 
 
-def _checked_range(within: tuple[float, float], unknown: str) -> tuple[float, float]:
+def _checked_range(sweep: Sweep, within: tuple[float, float]) -> tuple[float, float]:
     low, high = (float(end) for end in within)
-    if not ((low > 0.0 if unknown in POSITIVE else low >= 0.0) and low < high < math.inf):
-        bound = "two ascending, finite numbers " + ("> 0" if unknown in POSITIVE else ">= 0")
+    least, most = _legal(sweep)
+    if not least <= low < high <= most:
+        bound = "two ascending, finite numbers " + ("> 0" if sweep.unknown in POSITIVE else ">= 0")
+        bound += ", with Fz_amplitude below Fz" * sweep.kind.normal
         raise InputError("range", [low, high], bound)
     return low, high
 
 
 def _default_range(sweep: Sweep, targets: Array) -> tuple[float, float]:
-    """Everywhere; or from mu~ = 1 to its limit for rigid contact, to 1e-12 or so, and what the targets need beyond."""
-    case, unknown = sweep.case, sweep.unknown
-    if unknown in MONOTONE:
-        return 0.0, HUGE
-    if 0.0 in (case["y0"], case["omega"]):
-        return 1e-300, 1e300
-    y_high = 1e6
-    if case.get("k") != math.inf:
-        log_r = math.log(case["y0"]) + math.log(case["omega"]) - math.log(case["v0"]) if case["v0"] > 0.0 else 0.0
+    """Everywhere; or from a soft contact to a rigid one, to 1e-12 or so, and what the targets need beyond."""
+    case, unknown, (least, most) = sweep.case, sweep.unknown, _legal(sweep)
+    if unknown in EVERYWHERE:
+        return least, most
+    amplitude = case[AMPLITUDE if sweep.kind.normal else "y0"]
+    if 0.0 in (amplitude, case["omega"]):
+        return max(least, 1e-300), 1e300
+    if unknown == "Fz" and sweep.kind.normal:
+        return least, min(1e17 * amplitude, 1e300)
+    direction = sweep.kind.names["direction"]
+    soft, stiff = _ENDS[direction]
+    if direction == "across" and case.get("k") != math.inf:
+        log_r = math.log(amplitude) + math.log(case["omega"]) - math.log(case["v0"]) if case["v0"] > 0.0 else 0.0
         r = math.exp(min(log_r, 230.0))
-        y_high = max(1e8, 1e8 * r, 1e3 * r * r)
-    low, high = sorted((_where(sweep, 1e-6), _where(sweep, y_high)))
+        stiff = max(stiff, stiff * r, 1e3 * r * r)
+    low, high = sorted((_where(sweep, soft), _where(sweep, stiff)))
     if unknown == "mu0":  # mu_macro grows with it without limit
         wanted = targets[targets > 0.0]
         low, high = 0.5 * float(wanted.min(initial=2.0 * low)), 2.0 * float(wanted.max(initial=0.5 * high))
     return max(low, 1e-300), min(high, 1e300)
 
 
-def _where(sweep: Sweep, y_tilde: float) -> float:
-    """Value of k, Fz or mu0 at which y~ is ``y_tilde``, within double range; of a rigid contact any."""
-    at_one = float(sweep.surrogate.evaluate({**sweep.case, sweep.unknown: 1.0}).y_tilde)
+def _where(sweep: Sweep, place: float) -> float:
+    """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``place``, within double range; of a rigid contact any."""
+    one = sweep.answer(1.0)
+    at_one = float(one.v_tilde / one.y_tilde if sweep.kind.normal else one.y_tilde)
     scale = 1.0 if sweep.case.get("k") == math.inf else min(max(at_one, 1e-300), 1e300)
-    return y_tilde / scale if sweep.unknown == "k" else scale / y_tilde
+    return place / scale if sweep.unknown == "k" else scale / place
 
 
 def _samples(low: float, high: float, per_decade: int) -> Array:
@@ -191,7 +224,9 @@ def _samples(low: float, high: float, per_decade: int) -> Array:
 def _without_limit(sweep: Sweep, reach: Reach) -> Reach:
     """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in general not reached."""
     if sweep.unknown == "v0":
-        return replace(reach, max_included=False)
+        return replace(reach, max_included=sweep.kind.direction > 0)
+    if sweep.unknown == AMPLITUDE:
+        return reach
     vanishes = sweep.unknown == "y0" or sweep.case["k"] == math.inf
     # at rest friction takes its last value at y0 = l0, or at any frequency
     return replace(reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=sweep.case["v0"] == 0.0)
@@ -236,12 +271,12 @@ def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]
         which = np.flatnonzero(curve.holds(targets))
         if not which.size:
             continue
-        wanted, start, end = targets[which], curve.x[0], curve.x[-1]
+        wanted, start = targets[which], curve.x[0]
         # a target equal to the value at an edge has its root there; just inside, rounding may hide it
         value = np.where(wanted == curve.mu[0], start, curve.meet(wanted))
         last = wanted == curve.mu[-1]
         if last.any():
-            value = np.where(last & (sweep.mu(value) != wanted), end, value)
+            value = np.where(last & (sweep.mu(value) != wanted), curve.end(), value)
         answer, slope = sweep.with_slope(value)
         low, high = _enclosures(sweep, curve, wanted, value, answer, slope)
         columns = (value, low, high, answer.mu_macro, answer.regime)
@@ -262,6 +297,7 @@ def _enclosures(
     if not bound.all():  # at y0 = 0 mu_macro is exact, and beside it no longer
         beside = np.minimum(np.nextafter(value, HUGE), curve.x[-1])
         bound = np.maximum(bound, sweep.answer(beside).error_bound)
+    bound = np.maximum(bound, 2.0**-50 * wanted)  # a root is found to rounding, even where mu_macro is exact
     levels = np.concatenate((wanted - curve.sign * bound, wanted + curve.sign * bound))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = bound / (curve.sign * slope)

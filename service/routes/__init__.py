@@ -18,6 +18,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from mumacro.contact import AMPLITUDE
 from mumacro.inputs import NAMES as INPUTS
 
 from ..limits import SMALL_BODY, media_type_of, read_body
@@ -47,6 +48,7 @@ _WHY = {
     415: "The body has another media type",
     416: "The file has no such part",
     422: "Invalid, missing or unknown fields",
+    501: "The service was installed without a package that this needs",
     503: "Not ready or overloaded; see Retry-After",
 }
 _PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
@@ -173,6 +175,8 @@ def given_in_query(request: Request) -> dict[str, Any]:
             names.append(value)
         elif inner in place:
             twice[name] = None
+        elif name == "k" and ".." in value:
+            place["k_range"] = [_number(end) for end in value.split("..")]
         else:
             place[inner] = _number(value)
     if twice:
@@ -182,7 +186,7 @@ def given_in_query(request: Request) -> dict[str, Any]:
     return found
 
 
-_STD = frozenset(f"std_{name}" for name in INPUTS)
+_STD = frozenset(f"std_{name}" for name in (*INPUTS, AMPLITUDE))
 
 
 def _number(text: str) -> Any:

@@ -82,6 +82,7 @@ class _Answer(Response):
         options, _, faults = options_of(Options, {**self._query, **given}, OPTIONS)
         if options is None:
             refuse(faults)
+        options.check(columns.asked)
         table = self._state.tables.pick(options.tolerance, "tolerance" in self._query)
         return Batch(table, columns, options.names(), options.deviations(), count=self._state.metrics.cases)
 
@@ -98,10 +99,10 @@ class _Answer(Response):
             raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
         # Reading costs by the byte, computing by the case: a small body can request much computation.
         cost = len(text) / _BYTES_PER_UNIT
-        columns, given = await self._run(lambda: form.read(text, self._most), cost)
+        columns, given = await self._run(lambda: form.read(text, self._most, self._query), cost)
         text = bytearray()  # freed, unless the columns are views of it
         batch = self._batch(columns, given)
-        cost += columns.size * cost_of(batch.include)
+        cost += columns.size * cost_of(batch.include, columns.asked)
         pieces = _gathered(form.write(batch))
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [(b"content-type", form.media_type.encode()), (b"x-table", batch.table.id.encode("latin-1"))]
@@ -155,7 +156,7 @@ class _Answer(Response):
     def _line(self, form: Form, line: bytes, number: int) -> Iterator[bytes]:
         """Answer one line: one case, or a block of columns or a list of rows as a batch of its own."""
         try:
-            columns, given = form.read(bytearray(line), self._most) if b"[" in line else (None, {})
+            columns, given = form.read(bytearray(line), self._most, self._query) if b"[" in line else (None, {})
             if columns is not None and columns.listed:
                 yield from form.write(self._batch(columns, given))
             else:
@@ -170,9 +171,9 @@ class _Answer(Response):
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
         self._only_once(given)
-        options, case = read_form(Options, {**given, **self._query}, null_is_rigid=False)
+        options, case, asked = read_form(Options, {**given, **self._query}, null_is_rigid=False)
         table = self._state.tables.pick(options.tolerance)
-        values, source = answer_case(table.surrogate, case, options.names(), options.deviations())
+        values, source = answer_case(table.surrogate, case, options.names(), options.deviations(), asked)
         self._state.metrics.case(table, source)
         return dump({**values, **table.signature})
 

@@ -7,9 +7,14 @@ from pydantic import Field, create_model
 from starlette.requests import Request
 from starlette.responses import Response
 
+from mumacro import Surrogate
+from mumacro.interval import ENDS, middle
+from mumacro.validity import digits, k_effect, model_rows
+
 from ..answers import answer_case, cost_of
+from ..case import Asked
 from ..models import CaseAnswer
-from ..options import CaseQuery, CaseRequest, Options, read_form
+from ..options import MODEL, CaseQuery, CaseRequest, Options, read_form
 from ..problems import FieldFault, refuse
 from ..wire.json import dump
 from . import Endpoint, given_in_body, given_in_query, reply
@@ -21,18 +26,36 @@ _LARGE = 100  # cost from which one case is computed in a thread, in times of a 
 
 
 async def _answered(request: Request, given: Mapping[str, Any]) -> dict[str, Any]:
-    options, case = read_form(Options, given)
+    options, case, asked = read_form(Options, given, one=True)
     state = request.app.state
     table = state.tables.pick(options.tolerance)
     include, std = options.names(), options.deviations()
+    model = MODEL in (options.include or ())
 
     def answer() -> tuple[dict[str, Any], int]:
-        return answer_case(table.surrogate, case, include, std)
+        values, source = answer_case(table.surrogate, case, include, std, asked)
+        return {**values, **_about_model(table.surrogate, case, asked)} if model else values, source
 
-    large = bool(include) and cost_of(include) > _LARGE
+    large = model or cost_of(include, asked) > _LARGE
     values, source = await state.work.question(answer) if large else answer()
     state.metrics.case(table, source)
     return {**values, **table.signature}
+
+
+def _about_model(surrogate: Surrogate, case: dict[str, Any], asked: Asked) -> dict[str, Any]:
+    """Rows of docs/validity.md, and the digits that k supports."""
+    names: Any = asked.kind.names
+    if not asked.interval:
+        effect = k_effect(surrogate, case, **names)
+        return {"model": model_rows(surrogate, case, **names), "digits": digits(effect)}
+    found = surrogate.evaluate(**case, **names)
+    ends = {name: case[name] for name in ENDS}
+    at_middle = {name: value for name, value in case.items() if name not in ENDS} | {
+        "k": float(middle(ends, "raise")[2])
+    }
+    rows = [row for row in model_rows(surrogate, at_middle, **names) if row["row"] != "k is known"]
+    spread = 0.5 * (found.mu_macro_high - found.mu_macro_low)
+    return {"model": rows, "digits": digits(spread / found.mu_macro if spread else 0.0)}
 
 
 async def post_mu_macro(request: Request) -> Response:

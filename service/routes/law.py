@@ -11,19 +11,20 @@ from pydantic import BaseModel, BeforeValidator, Field, create_model, model_vali
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, SI
+from mumacro.contact import SPRING
+from mumacro.inputs import BOUNDS, POSITIVE
 from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 
-from ..answers import answer_columns, nested, parts_of
-from ..case import INPUTS
+from ..answers import INTERVAL, answer_columns, nested, parts_of
+from ..case import Asked
 from ..models import Answered, default, included
-from ..options import NO_NULL, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
+from ..options import NO_NULL, UNITS, NotNegative, Options, Positive, bounded, example, query_of, read_form, relation
 from ..problems import FieldFault, refuse
 from ..quantities import INCLUDES
 from ..tables import LoadedTable
 from ..wire.json import dump
 from . import Endpoint, given_in_body, given_in_query, in_thread, reply
-from .solve_for import FIVE, FIVE_QUERY, Name, in_si, per_value
+from .solve_for import FIVE, FIVE_QUERY, NAMES, Name, in_si, per_value
 
 __all__ = ["ENDPOINTS"]
 
@@ -40,7 +41,7 @@ Family = dict[Name, Annotated[list[NotNegative], Field(min_length=1, max_length=
 class LawOptions(Options):
     """What is asked beside the five other inputs."""
 
-    along: Name = bounded(f"one of {', '.join(INPUTS)}", "The swept input", "v0")
+    along: Name = bounded(f"one of {', '.join(NAMES)}", "The swept input", "v0")
     start: NotNegative = bounded("finite and >= 0", "First value [SI]; > 0 on a logarithmic scale", examples=[1e-4])
     stop: Positive = bounded("finite and > 0", "Last value [SI], > start", examples=[10.0])
     points: Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
@@ -55,6 +56,8 @@ class LawOptions(Options):
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:
+        if "approximations" in (self.include or ()) and self.kind != SPRING:
+            raise relation("include", "has approximations, which are those of one spring that oscillates across")
         if self.scale == "log" and self.start == 0.0:
             raise relation("start", "must be > 0 on a logarithmic scale; for a range from 0 set scale to linear")
         if not self.stop > self.start:
@@ -69,18 +72,18 @@ class LawOptions(Options):
         return self
 
 
-def _read(given: Mapping[str, Any]) -> tuple[LawOptions, dict[str, float]]:
+def _read(given: Mapping[str, Any]) -> tuple[LawOptions, dict[str, float], Asked]:
     """The options and the other inputs; that of the family is asked for, too."""
     family = given.get("family")
     names = [given.get("along", "v0"), *(family if isinstance(family, dict) else ())]
-    return read_form(LawOptions, given, [name for name in names if name in INPUTS])
+    return read_form(LawOptions, given, [name for name in names if name in NAMES])
 
 
 async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border; with ``family``, one curve per value."""
-    form, case = _read(await given_in_body(request))
+    form, case, asked = _read(await given_in_body(request))
     table = request.app.state.tables.pick(form.tolerance)
-    return await in_thread(request, lambda: reply(dump(_answer(table, form, case))))
+    return await in_thread(request, lambda: reply(dump(_answer(table, form, case, asked))))
 
 
 async def get_law_csv(request: Request) -> Response:
@@ -88,7 +91,7 @@ async def get_law_csv(request: Request) -> Response:
     given = given_in_query(request)
     if "family" in given:
         given["family"] = "no parameter of a query"
-    form, case = _read(given)
+    form, case, asked = _read(given)
     if form.names():
         refuse(
             [FieldFault.of("include", "must be approximations; POST /v1/law has the other quantities", form.names()[0])]
@@ -99,42 +102,48 @@ async def get_law_csv(request: Request) -> Response:
         "Cache-Control": "no-cache",
     }
     kind = "text/csv; charset=utf-8; header=present"
-    return await in_thread(request, lambda: reply(_as_csv(_answer(table, form, case)).encode(), headers, kind))
+    return await in_thread(request, lambda: reply(_as_csv(_answer(table, form, case, asked)).encode(), headers, kind))
 
 
-def _answer(table: LoadedTable, form: LawOptions, case: dict[str, float]) -> dict[str, Any]:
+def _answer(table: LoadedTable, form: LawOptions, case: dict[str, float], asked: Asked) -> dict[str, Any]:
     per = per_value(form.along)
     values = sweep_values(in_si(form.along), form.start * per, form.stop * per, form.points, form.scale)
-    swept = {"along": form.along, "unit": SI[form.along][0], "values": (values / per).tolist()}
+    swept = {"along": form.along, "unit": UNITS[form.along], "values": (values / per).tolist()}
     if not form.family:
-        return {**swept, **_curve(table, form, values, case), **table.signature}
+        return {**swept, **_curve(table, form, values, case, asked), **table.signature}
     ((name, listed),) = form.family.items()
     curves = [
-        {"value": value, **_curve(table, form, values, {**case, in_si(name): value * per_value(name)})}
+        {"value": value, **_curve(table, form, values, {**case, in_si(name): value * per_value(name)}, asked)}
         for value in listed
     ]
-    return {**swept, "family": name, "family_unit": SI[name][0], "curves": curves, **table.signature}
+    return {**swept, "family": name, "family_unit": UNITS[name], "curves": curves, **table.signature}
 
 
-def _curve(table: LoadedTable, form: LawOptions, values: Any, case: dict[str, float]) -> dict[str, Any]:
+def _curve(table: LoadedTable, form: LawOptions, values: Any, case: dict[str, float], asked: Asked) -> dict[str, Any]:
     along = in_si(form.along)
-    law = friction_law(table.surrogate, along, values, case)
+    law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
     include = form.names()
-    six = [values if name == along else np.array([case[name]]) for name in FIELDS]
-    found, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations())
-    answer = nested({part.path: part.values(found[part.path]) for part in parts_of(include)})
+    six = [values if name == along else np.array([case[name]]) for name in asked.fields]
+    found, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations(), asked)
+    answer = nested({part.path: part.values(found[part.path]) for part in parts_of(include, asked)})
     answer["mu_static"] = law.mu_static.tolist()
     answer["border"] = [{"value": mark.value / per_value(form.along), "mu_macro": mark.mu_macro} for mark in law.border]
     if "approximations" in (form.include or ()):
         for name, columns in (("approximations", approximations), ("border_speeds", border_speeds)):
-            answer[name] = {key: column.tolist() for key, column in columns(table.surrogate, law, case).items()}
+            answer[name] = {key: column.tolist() for key, column in columns(table.surrogate, law).items()}
     return answer
 
 
 def _as_csv(answer: dict[str, Any]) -> str:
     """The columns of the law; those that ``include`` adds, in order, with the path as their name."""
     columns: dict[str, list[Any]] = {f"{answer['along']} [{answer['unit']}]": answer["values"]}
-    for name in ("mu_macro", "mu_ratio", "error_bound", "mu_static"):
+    for name in (
+        "mu_macro",
+        *(part.path for part in INTERVAL if part.path in answer),
+        "mu_ratio",
+        "error_bound",
+        "mu_static",
+    ):
         columns[f"{name} [-]"] = answer[name]
     for group, prefix, unit in (("approximations", "", "-"), ("border_speeds", "border_", "m/s")):
         for name, column in answer.get(group, {}).items():

@@ -9,23 +9,25 @@ from pydantic import BaseModel, BeforeValidator, Field, create_model, model_vali
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.inputs import FIELDS, RAD_PER_CYCLE, SI
+from mumacro.contact import AMPLITUDE
+from mumacro.inputs import RAD_PER_CYCLE
 from mumacro.inverse import Solution, solve_for
 
-from ..answers import DEFAULT, answer_columns, nested, parts_of
-from ..case import INPUTS
+from ..answers import DEFAULT, REGIME_NAMES, answer_columns, nested, parts_of
+from ..case import INPUTS, Asked
 from ..models import Answered, included
-from ..options import NotNegative, Options, bounded, example, input_fields, read_form, relation
+from ..options import UNITS, NotNegative, Options, bounded, example, input_fields, read_form, relation
 from ..tables import LoadedTable
 from ..wire.json import dump
 from . import Endpoint, given_in_body, in_thread, reply
 
-__all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "Name", "in_si", "per_value"]
+__all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "NAMES", "Name", "in_si", "per_value"]
 
 MAX_TARGETS = 10_000
 _NO_LIMIT = 1e300
-Name: Any = Literal[INPUTS]
-FIVE_QUERY: Any = input_fields(optional=INPUTS, null=False, shown=["k"])
+NAMES = (*INPUTS, AMPLITUDE)
+Name: Any = Literal[NAMES]
+FIVE_QUERY: Any = input_fields(optional=INPUTS, null=False, shown=["k"], query=True)
 FIVE: Any = create_model("_Five", **input_fields(optional=INPUTS, shown=[name for name in example if name != "v0"]))
 Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
 _listed = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
@@ -34,7 +36,7 @@ _listed = BeforeValidator(lambda value: value if isinstance(value, list) else [v
 class SolveForOptions(Options):
     """What is asked beside the five known inputs."""
 
-    unknown: Name = bounded(f"one of {', '.join(INPUTS)}", "The input to solve for")
+    unknown: Name = bounded(f"one of {', '.join(NAMES)}", "The input to solve for")
     target: Annotated[Targets, _listed] = bounded(
         f"a number, finite and >= 0, or a list of 1 to {MAX_TARGETS} of them", "Wanted value [-]"
     )
@@ -55,7 +57,7 @@ class SolveForOptions(Options):
 async def post_solve_for(request: Request) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
     given = await given_in_body(request)
-    form, case = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in INPUTS else [])
+    form, case, _ = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in NAMES else [])
     table = request.app.state.tables.pick(form.tolerance)
     return await in_thread(request, lambda: reply(dump(_answer(table, form, case))))
 
@@ -74,7 +76,10 @@ def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -
     per = per_value(form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    solution = solve_for(table.surrogate, in_si(form.unknown), [x * unit for x in form.target], case, within)
+    names = form.kind.names
+    if "k_low" in case:  # which is refused, by the name that the user gave
+        case = {**case, "k_range": (case["k_low"], case["k_high"])}
+    solution = solve_for(table.surrogate, in_si(form.unknown), [x * unit for x in form.target], case, within, **names)
     more = _included(table, form, solution, case)
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
@@ -88,7 +93,7 @@ def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -
     reach = solution.reach
     return {
         "unknown": form.unknown,
-        "unit": SI[form.unknown][0],
+        "unit": UNITS[form.unknown],
         "quantity": form.quantity,
         "range": [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per],
         "reachable": {
@@ -105,11 +110,12 @@ def _included(
 ) -> Iterator[dict[str, Any]]:
     """The included quantities of every root, in order."""
     values = np.array([root.value for roots in solution.roots for root in roots])
-    parts = parts_of(form.names())[len(DEFAULT) :]
+    asked = Asked(form.kind)
+    parts = parts_of(form.names(), asked)[len(DEFAULT) :]
     if not parts or values.size == 0:
         return itertools.repeat({})
-    six = [values if name == in_si(form.unknown) else np.array([case[name]]) for name in FIELDS]
-    found, _ = answer_columns(table.surrogate, six, values.size, form.names(), form.deviations())
+    six = [values if name == in_si(form.unknown) else np.array([case[name]]) for name in asked.fields]
+    found, _ = answer_columns(table.surrogate, six, values.size, form.names(), form.deviations(), asked)
     rows = zip(*(part.values(found[part.path]) for part in parts), strict=True)
     return (nested(dict(zip((part.path for part in parts), row, strict=True))) for row in rows)
 
@@ -145,7 +151,7 @@ class _Root(BaseModel):
     low: float = Field(description="From low ...")
     high: float = Field(description="... to high, mu_macro is the target within the table's error bound")
     mu_macro: float = Field(description="Value of the table there [-]")
-    regime: Literal["continuous", "stick_slip", "static"]
+    regime: Literal[tuple(dict.fromkeys(REGIME_NAMES))]
 
 
 Root: Any = create_model("Root", __base__=_Root, __doc__=_Root.__doc__, **included(False))

@@ -35,7 +35,7 @@ class Batch:
     @property
     def parts(self) -> list[Part]:
         """The columns of the answers."""
-        return parts_of(self.include)
+        return parts_of(self.include, self.columns.asked)
 
     def slices(self, step: int) -> Iterator[tuple[int, Found, Codes]]:
         """First case, columns by path, and source codes of ``step`` cases after another; a bad case has NaN and -1.
@@ -46,7 +46,9 @@ class Batch:
         for start in range(0, max(size, 1), step):
             stop = min(start + step, size)
             six = self.columns.part(start, stop)
-            found, source = answer_columns(self.table.surrogate, six, stop - start, self.include, self.std)
+            found, source = answer_columns(
+                self.table.surrogate, six, stop - start, self.include, self.std, self.columns.asked
+            )
             self.count(self.table, source)
             for index in np.flatnonzero(source < 0).tolist():
                 self.n_errors += 1
@@ -73,8 +75,8 @@ class Form(NamedTuple):
 
     media_type: str
     aliases: tuple[str, ...]
-    #: the cases of a body and its options; raises RequestError
-    read: Callable[[bytearray, int], tuple[Columns, dict[str, Any]]]
+    #: the cases of a body with so many cases at most, and its options beside those of the query; raises RequestError
+    read: Callable[[bytearray, int, Mapping[str, Any]], tuple[Columns, dict[str, Any]]]
     #: the answer, piece by piece
     write: Callable[[Batch], Iterator[bytes]]
     body: dict[str, Any]

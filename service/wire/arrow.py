@@ -2,16 +2,18 @@
 
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from struct import error, unpack_from
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from mumacro.inputs import RIGID, unknown_name
+from mumacro.contact import Kind as ContactKind
+from mumacro.inputs import RIGID
 
-from ..case import INPUTS, Columns, columns_of, faults_in, joined, too_large
+from ..case import Columns, asked_of, columns_of, faults_in, joined, names_of, stranger, too_large
+from ..options import kind_in
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 from .json import dump
@@ -21,13 +23,14 @@ __all__ = ["FORM"]
 _SLICE = 32768  # cases of a record batch of the answer
 
 
-def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
+def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
+    kind = kind_in(query)
     parts: dict[str, list[Any]] = {}
     size = 0
     try:
         buffer = pa.py_buffer(text)
         with pa.ipc.open_stream(buffer) as reader:
-            _check(reader.schema)
+            _check(reader.schema, kind)
             parts = {name: [np.empty(0)] for name in reader.schema.names}
             if any(
                 message.type == "record batch" and _is_compressed(message.metadata)
@@ -44,20 +47,22 @@ def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OSError, ValueError) as fault:
         reason = (str(fault).splitlines() or [type(fault).__name__])[0][:200]
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}") from None
-    return columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch), {}
+    return columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch, kind=kind), {}
 
 
-def _check(schema: Any) -> None:
+def _check(schema: Any, contact: ContactKind) -> None:
     faults, names = [], schema.names
+    asked = asked_of(names, contact)
+    known = names_of(asked)
     for name in sorted(set(names)):
         kind = schema.field(name).type if names.count(name) == 1 else None
-        if name not in INPUTS:
-            faults.append(FieldFault.of(name, unknown_name(name, INPUTS)))
+        if name not in known:
+            faults.append(FieldFault.of(name, stranger(name, asked, known)))
         elif kind is None:
             faults.append(FieldFault.of(name, "is given more than once"))
         elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
             faults.append(FieldFault.of(name, f"must be a column of numbers, not of {str(kind)[:80]}"))
-    faults += faults_in(names)
+    faults += faults_in(names, asked=asked)
     if faults:
         refuse(faults)
 
@@ -136,8 +141,9 @@ FORM = Form(
         "schema": {
             "type": "string",
             "format": "binary",
-            "description": "Arrow IPC stream, uncompressed, number columns mu0, Fz, k, y0, omega or f, v0; infinity in "
-            "k is rigid contact, null is refused",
+            "description": "Arrow IPC stream, uncompressed, number columns mu0, Fz, k, y0, omega or f, v0; k_low and "
+            "k_high in place of k, Fz_amplitude in place of y0 for direction normal; infinity in k "
+            "is rigid contact, null is refused",
         }
     },
     answer={

@@ -2,16 +2,30 @@
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from mumacro.inputs import RIGID, SI, UNITS_OF, Scale, is_rigid, scale_of, split_unit, unknown_name
+from mumacro.contact import Kind as ContactKind
+from mumacro.inputs import RIGID, SI, UNITS_OF, Scale, is_rigid, scale_of, split_unit
 
-from ..case import INPUTS, MAX_ERRORS, Columns, Reason, columns_of, faults_in, joined, too_large
+from ..case import (
+    LIKE,
+    MAX_ERRORS,
+    Columns,
+    Reason,
+    asked_of,
+    columns_of,
+    faults_in,
+    joined,
+    names_of,
+    stranger,
+    too_large,
+)
+from ..options import kind_in
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
@@ -22,12 +36,13 @@ _SLICE = 4096  # lines that are read or written at a time
 _DIGITS = b"0123456789.eE+-"
 
 
-def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
+def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
+    kind = kind_in(query)
     lines = csv.reader(_lines(text, max_batch), strict=True)
     short: dict[int, Reason] = {}
     size = 0
     try:
-        names, scales = _head(next(lines, []))
+        names, scales = _head(next(lines, []), kind)
         parts: dict[str, list[Any]] = {name: [np.empty(0)] for name in names}
         while rows := list(islice(lines, _SLICE)):
             rows = [row for row in rows if row]
@@ -40,7 +55,7 @@ def _read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
             size += len(rows)
     except (UnicodeDecodeError, csv.Error) as error:
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {error}") from None
-    columns = columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch)
+    columns = columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch, kind=kind)
     columns.reasons |= dict(islice(short.items(), MAX_ERRORS))
     return columns, {}
 
@@ -60,22 +75,25 @@ def _lines(text: bytearray, max_batch: int) -> Iterator[str]:
         yield line
 
 
-def _head(cells: list[str]) -> tuple[list[str], list[Scale]]:
+def _head(cells: list[str], kind: ContactKind) -> tuple[list[str], list[Scale]]:
     """The inputs of the columns and their units."""
     faults, names, scales = [], list[str](), []
+    asked = asked_of([split_unit(cell)[0] for cell in cells[:100]], kind)
+    known = names_of(asked)
     for cell in cells[:100]:  # so many cannot all be valid, and no more faults are reported
         name, unit = split_unit(cell)
-        scale = Scale() if unit is None else scale_of(name, unit) if name in SI else None
-        if name not in SI:
-            faults.append(FieldFault.of(cell, unknown_name(name, INPUTS)))
+        like = LIKE.get(name, name)
+        scale = Scale() if unit is None else scale_of(like, unit) if like in SI else None
+        if name not in known:
+            faults.append(FieldFault.of(cell, stranger(name, asked, known)))
         elif name in names:
             faults.append(FieldFault.of(name, "is given more than once"))
         elif scale is None:
-            known = ", ".join(UNITS_OF[name])[:300]
-            faults.append(FieldFault.of(cell, f"has a unit that {name} cannot have; known are {known}"))
+            units = ", ".join(UNITS_OF[like])[:300]
+            faults.append(FieldFault.of(cell, f"has a unit that {name} cannot have; known are {units}"))
         names.append(name)
         scales.append(scale or Scale())
-    faults += faults_in(names)
+    faults += faults_in(names, asked=asked)
     if faults:
         refuse(faults)
     return names, scales
@@ -132,7 +150,8 @@ FORM = Form(
         "schema": {
             "type": "string",
             "description": "RFC 4180 with a head: mu0, Fz, k, y0, omega or f, v0, each in SI or with a unit in "
-            "brackets; the word rigid in k is rigid contact, an empty cell is refused",
+            "brackets; k_low and k_high in place of k, Fz_amplitude in place of y0 for direction normal; the "
+            "word rigid in k is rigid contact, an empty cell is refused",
         },
         "example": "mu0,Fz,k [N/mm],y0 [um],f,v0\r\n0.3,10,1000,2,20690,0.01\r\n",
     },

@@ -10,7 +10,7 @@ import math
 import re
 import secrets
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
 from operator import attrgetter
@@ -21,19 +21,21 @@ import numpy as np
 import orjson
 import simdjson
 
-from mumacro.inputs import FIELDS, RAD_PER_CYCLE
+from mumacro.contact import SPRING
+from mumacro.contact import Kind as ContactKind
+from mumacro.inputs import RAD_PER_CYCLE
 
 from ..answers import Part, nested
-from ..case import INPUTS, MAX_ERRORS, Columns, Reason, checked, columns_of, too_large
-from ..options import OPTIONS, example, options_of
+from ..case import INPUTS, LIKE, MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, names_of, too_large
+from ..options import OPTIONS, example, kind_in, options_of
 from ..options import Options as OptionsModel
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
 __all__ = ["FORMS", "decode", "dump", "read"]
 
-NAMES = (*INPUTS, *OPTIONS)
-_MEMBERS = 16  # of one object: the inputs and the options
+NAMES = (*INPUTS, *LIKE, "k_range", *OPTIONS)
+_MEMBERS = 18  # of one object: the inputs and the options
 _READ = 256 * 1024  # bytes of rows, or of a list, that are read at a time
 _SHORT = 4096  # bytes of a list that json reads
 _TOKEN = secrets.token_hex(16).encode()  # stands in place of a list; nobody else knows it
@@ -78,11 +80,13 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not JSON: {error}") from None
 
 
-def read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
+def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
     """The cases and the options of a body: columns or one case, or a list of rows."""
     _limit_values(text, max_batch)
     if bytes(text[:4096]).lstrip()[:1] == b"[":
-        return _quick_rows(text, max_batch) or _rows(decode(text, large=True), max_batch), {}
+        kind = kind_in(query)
+        quick = None if kind.normal else _quick_rows(text, max_batch, kind)
+        return quick or _rows(decode(text, large=True), max_batch, kind), {}
     given = _columns(text)
     if given is None:
         given = decode(text, large=True)
@@ -90,7 +94,8 @@ def read(text: bytearray, max_batch: int) -> tuple[Columns, dict[str, Any]]:
             refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
     _, rest, faults = options_of(OptionsModel, given, NAMES)
     options = {name: given[name] for name in OPTIONS if given.get(name) is not None}
-    return columns_of(rest, max_batch, NAMES, faults), options
+    kind = kind_in({**query, **options}) if not faults else SPRING
+    return columns_of(rest, max_batch, NAMES, faults, kind), options
 
 
 def _limit_values(text: bytearray, max_batch: int) -> None:
@@ -169,7 +174,7 @@ _decode_rows = msgspec.json.Decoder(list[_Row]).decode
 _BETWEEN = re.compile(rb"\}\s*,")
 
 
-def _quick_rows(text: bytearray, max_batch: int) -> Columns | None:
+def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns | None:
     """Rows of numbers with the same six names; None for any other text.
 
     The text is read piece by piece.  A piece that does not end between two objects is no JSON.
@@ -206,7 +211,7 @@ def _quick_rows(text: bytearray, max_batch: int) -> Columns | None:
     if hertz:
         with np.errstate(over="ignore"):
             six[4] *= RAD_PER_CYCLE
-    return Columns(size, list(six), hertz=bool(hertz), rows=True)
+    return Columns(size, list(six), hertz=bool(hertz), rows=True, asked=asked_of((), kind))
 
 
 def _arrays(rows: list[_Row], frequency: str) -> np.ndarray[Any, Any]:
@@ -222,25 +227,27 @@ def _arrays(rows: list[_Row], frequency: str) -> np.ndarray[Any, Any]:
         return np.frombuffer(flat).reshape(len(rows), 6).T
 
 
-def _rows(found: list[Any], max_batch: int) -> Columns:
-    """Rows one by one; a bad row gets the first reason."""
+def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
+    """Rows one by one, all like the first; a bad row gets the first reason."""
     if len(found) > max_batch:
         raise too_large(max_batch)
-    six = np.full((6, len(found)), np.nan)
+    asked = asked_of(found[0] if found and isinstance(found[0], dict) else (), kind)
+    fields, names = asked.fields, names_of(asked)
+    six = np.full((len(fields), len(found)), np.nan)
     reasons: dict[int, Reason] = {}
     for i, row in enumerate(found):
         if isinstance(row, dict):
-            values, faults = checked(row, null_is_rigid=False)
+            values, faults = checked(row, null_is_rigid=False, known=names, asked=asked)
             if not faults:
-                six[:, i] = [values[name] for name in FIELDS]
+                six[:, i] = [values[name] for name in fields]
                 continue
-            fault = min(faults, key=lambda fault: INPUTS.index(fault.path[0]) if fault.path[0] in INPUTS else -1)
+            fault = min(faults, key=lambda fault: names.index(fault.path[0]) if fault.path[0] in names else -1)
             reason: Reason = str(fault.path[0])[:80], fault.reason
         else:
             reason = None, "must be an object"
         if len(reasons) < MAX_ERRORS:
             reasons[i] = reason
-    return Columns(len(found), list(six), reasons, rows=True)
+    return Columns(len(found), list(six), reasons, rows=True, asked=asked)
 
 
 # --- writing ------------------------------------------------------------------------------------------
