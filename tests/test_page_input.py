@@ -212,14 +212,6 @@ def test_an_interval_of_the_stiffness_gives_an_interval_of_friction(open_page, s
         assert page.complaints() == []
 
 
-def test_a_service_that_does_not_know_them_is_not_asked(open_page):
-    page = open_page("#k=0.8..1.2N/um&contact=ball")
-    assert not page.find("fieldset[data-needs=contact]").is_displayed()
-    told = page.text("#notice-text")
-    assert "k = 0.8..1.2N/um (must be one number: this service knows no interval)" in told
-    assert "contact = ball (must be one of spring)" in told
-
-
 def test_a_link_reproduces_the_state(open_page, surrogate):
     page = open_page("#Fz=12.5&along=y0&v0=0.01m/s&range=1e-7..1e-5&digits=all")
     link = page.address()

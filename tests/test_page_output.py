@@ -10,6 +10,7 @@ import pytest
 
 from browser import KNOWING, START
 from comparing import close
+from mumacro.geometries import contact_of
 from service.routes.page import ASSETS
 
 pytestmark = pytest.mark.slow
@@ -245,6 +246,53 @@ def test_downloads(open_page, surrogate, tmp_path):
         # it looks the same without the page's style sheet
         assert all("fill:" in one.get("style") for one in picture.iter("{http://www.w3.org/2000/svg}path"))
     assert page.complaints() == []
+
+
+@pytest.mark.parametrize("direction", ["across", "along", "normal"])
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_every_contact_and_direction_is_answered(open_page, surrogate, contact, direction):
+    page = open_page(f"#contact={contact}&direction={direction}&k=0.8..1.2N/um")
+    if (contact, direction) == ("ball", "normal"):
+        page.wait_for("#status", "refuses this: .*(ball|contact)")
+        page.complaints()
+        return
+    swing = {"y0": None, "Fz_amplitude": 5.0} if direction == "normal" else {}
+    case = {name: x for name, x in {**START, **swing, "k": None}.items() if x is not None}
+    expected = surrogate.evaluate(**case, contact=contact, direction=direction, k_range=(8e5, 1.2e6))
+    told = page.wait_for("#interval", r"^(\S+) to (\S+) for k = 0.8..1.2 N/µm$")
+    ends = [expected.mu_macro_low, expected.mu_macro_high]
+    assert [float(told[1]), float(told[2])] == close(ends, abs=0.02 * (ends[1] - ends[0]) + 1e-9)
+    assert page.run("return document.querySelectorAll('#law .band').length;") == 1
+    assert (page.text("#rows") != "") is (direction != "normal")  # of a normal force k alone, which is an interval
+    assert not re.search(r"NaN|undefined|null|\[object", page.run("return document.querySelector('main').innerText;"))
+    assert page.text("#status") == page.text("#law-status") == ""
+    assert page.complaints() == []
+
+
+def test_the_panels_answer(open_page, surrogate):
+    page = open_page("#contact=ball&mu0=0.3", new=True)
+    page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+    for name, text in (("radius", "5 mm"), ("E", "210 GPa"), ("nu", "0.3")):
+        page.type(f"#argument-{name}", text, commit=False)
+    page.click("#stiffness-form button")
+    found = contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3)
+    assert page.text("#stiffness-found") == f"k = {found.k / 1e6:.4g} N/µm at Fz = 10 N; contact: ball (Hertz)"
+    v0 = np.geomspace(1e-3, 1.0, 9)
+    mu = surrogate.evaluate(**{**START, "k": 1.3e6, "v0": v0}, contact="ball").mu_macro
+    rows = "".join(
+        rf"{1e3 * speed!r};{friction!r};0.001\n" for speed, friction in zip(v0.tolist(), mu.tolist(), strict=True)
+    )
+    page.run(f"document.querySelector('#points').value = 'v0 [mm/s];mu;std\\n{rows}';")
+    page.click("#fit-form button")
+    assert page.text("#fit-status") == ""
+    assert page.text("#fit-found").startswith("k = 1.3 N/µm ± ")
+    assert page.run("return document.querySelectorAll('#fit-plot :is(.measured, .band, .curve)').length;") == 11
+    page.click("#fit-use")
+    assert float(page.value("#field-k").removesuffix(" N/µm")) == close(1.3, rel=1e-5)
+    page.type("#argument-nu", "0.7", commit=False)
+    page.click("#stiffness-form button")
+    page.wait_for("#stiffness-status", "refuses this: nu")
+    page.complaints()  # a refusal is logged by the browser
 
 
 def test_the_panels_ask_and_fill_the_form(open_page, tmp_path):

@@ -44,9 +44,10 @@ class FitOptions(Options):
 async def post_fit(request: Request) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word rigid."""
     given = await given_in_body(request)
+    std = given.pop(STD, None)  # of the points; the option of the same name is that of inputs
     form, points, faults = options_of(FitOptions, given, (*_COLUMNS, *FitOptions.model_fields))
     faults += [FieldFault.of(name, f"has no effect: {why}") for name, why in _NOT if given.get(name) is not None]
-    columns = {name: _column(name, value, faults) for name, value in points.items() if value is not None}
+    columns = {name: _column(name, value, faults) for name, value in {**points, STD: std}.items() if value is not None}
     if form is None or faults:
         refuse(faults)
     table = request.app.state.tables.pick(form.tolerance)
