@@ -96,7 +96,7 @@ def test_what_is_typed_and_asked_without_a_browser(client, repository, tmp_path)
 def test_it_fits_the_screen(open_page, width, height):
     page = open_page(width=width, height=height)
     boxes = page.run(
-        "return Object.fromEntries(['map', 'law', 'mu', 'field-mu0'].map((id) => {"
+        "return Object.fromEntries(['map', 'law', 'mu', 'inputs'].map((id) => {"
         " const { x, y, width, height } = document.getElementById(id).getBoundingClientRect();"
         " return [id, [x, y, width, height]]; }));"
     )
@@ -105,7 +105,7 @@ def test_it_fits_the_screen(open_page, width, height):
     x, y, _, tall = boxes["map"]
     assert y + tall <= height
     assert 0 < boxes["mu"][1] < height
-    assert boxes["field-mu0"][0] < x - 50 or 0 < boxes["field-mu0"][1] - (y + tall) < 150
+    assert boxes["inputs"][0] < x - 50 or 0 < boxes["inputs"][1] - (y + tall) < 150
     page = open_page("#k=rigid&digits=all&bad=1", width=width, height=height)
     assert page.run("return document.documentElement.scrollWidth;") <= width
     # no section lies on another, and controls are large enough for a finger

@@ -263,7 +263,7 @@ def test_every_contact_and_direction_is_answered(open_page, surrogate, contact, 
     ends = [expected.mu_macro_low, expected.mu_macro_high]
     assert [float(told[1]), float(told[2])] == close(ends, abs=0.02 * (ends[1] - ends[0]) + 1e-9)
     assert page.run("return document.querySelectorAll('#law .band').length;") == 1
-    assert (page.text("#rows") != "") is (direction != "normal")  # of a normal force k alone, which is an interval
+    assert (page.text("#rows") != "") is (direction != "normal")
     assert not re.search(r"NaN|undefined|null|\[object", page.run("return document.querySelector('main').innerText;"))
     assert page.text("#status") == page.text("#law-status") == ""
     assert page.complaints() == []

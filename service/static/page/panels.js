@@ -128,7 +128,7 @@ export class FitPanel extends Panel {
     if (asked.std && scatter !== null) beside.push(`reduced χ² = ${show(scatter, 3)}`);
     $("fit-found").replaceChildren(...items([...best, ...beside]));
     $("fit-warnings").replaceChildren(...items(warnings));
-    $("fit-image").hidden = false;
+    for (const id of ["fit-image", "fit-plot"]) $(id).removeAttribute("hidden");
     this.points = asked;
     this.plot.redraw();
   }
