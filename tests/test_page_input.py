@@ -73,7 +73,7 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate)
 def test_a_contact_is_rigid_by_a_switch(open_page, surrogate):
     page = open_page("#k=5e5")
     page.click("#rigid")
-    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": None}).mu_macro)
+    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": None}).mu_macro, 6)  # no k to be known
     assert not page.find("#field-k").is_enabled()
     assert "k=rigid" in page.address()
     assert (page.text("#v-tilde"), page.text("#shaker")) == ("∞", "– (rigid)")
