@@ -120,7 +120,8 @@ def test_it_fits_the_screen(open_page, width, height):
     assert overlaps == 0
     small = page.run(
         "return [...document.querySelectorAll('input, select, button, summary, nav a')].map((element) => "
-        "[element.id || element.outerHTML, (element.closest('.switch, .choice label') ?? element).getBoundingClientRect().height])"
+        "[element.id || element.outerHTML,"
+        " (element.closest('.switch, .choice label') ?? element).getBoundingClientRect().height])"
         ".filter(([, height]) => height > 0 && height < 40);"
     )
     assert small == [] or width > 760
