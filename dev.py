@@ -170,7 +170,7 @@ def page() -> int:
 def wheels() -> int:
     ensure()
     install_locks("zig")
-    return run(PYTHON, "deploy/packages.py", "dist", "--all")
+    return docs() or run(PYTHON, "deploy/packages.py", "dist", "--all")  # the wheel holds the guide
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

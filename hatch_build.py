@@ -30,6 +30,7 @@ FLAGS = ["-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidde
 FLAGS += DEBUG if os.environ.get("MUMACRO_BUILD_DEBUG") else ["-O3", "-DNDEBUG"]
 AVX2 = ["-mavx2", "-mfma"]
 AVX512 = [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx512bw", "-mprefer-vector-width=512"]
+NOT_READ = {".doctrees", "_sources", ".buildinfo", ".inv", ".map"}  # of the built documents: no page needs it
 NO_COMPILER = "No C compiler works here (tried cc, clang and gcc)"
 PROBE = "#include <math.h>\n#include <stdint.h>\nint64_t f(double x) { return (int64_t)floor(x); }\n"
 
@@ -99,8 +100,16 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
         return (Path(place) / name).replace(folder / name), platform
 
 
+def guide() -> dict[str, str]:
+    """The built documents, where there are any, and their places in the wheel: the service shows them."""
+    site = ROOT / "build" / "docs"
+    read = (path for path in site.rglob("*.*") if NOT_READ.isdisjoint((*path.relative_to(site).parts, path.suffix)))
+    files = [path for path in read if path.is_file()]
+    return {str(path): f"mumacro/service/guide/{path.relative_to(site).as_posix()}" for path in files}
+
+
 class KernelHook(BuildHookInterface[Any]):
-    """A wheel gets the shared object and a tag for its platform; an editable install has it in place."""
+    """A wheel gets the shared object, the guide and a tag for its platform; an editable install has it in place."""
 
     def dependencies(self) -> list[str]:
         """Ziglang if no compiler works here, or if another platform is asked for."""
@@ -118,6 +127,7 @@ class KernelHook(BuildHookInterface[Any]):
         self.folder = tempfile.TemporaryDirectory()
         path, platform = build(Path(self.folder.name), os.environ.get("MUMACRO_BUILD_PLATFORM"))
         build_data["force_include"][str(path)] = f"mumacro/{path.name}"
+        build_data["force_include"] |= guide()
         build_data |= {"tag": f"py3-none-{platform}", "pure_python": False}
 
 

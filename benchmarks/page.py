@@ -15,7 +15,7 @@ from benchmarks.measuring import IMAGES
 from tests import browser as driven
 from tests.serving import serving
 
-SHOWN = "#approximations=1&family=y0&curves=1um;3um&mu0.std=0.01&y0.std=5%25"
+SHOWN = "#y0=3um&v0=20mm/s"
 SIZES = {1440: 900, 1024: 768, 390: 844}
 
 

@@ -71,7 +71,7 @@ def _about(surrogate: Surrogate) -> str:
     name = html.escape(f"{surrogate.id}, tolerance {surrogate.tolerance:g}, checksum {surrogate.checksum[:12]}")
     return (
         f"Everything here is computed in this browser, from the table {name}, without a server. Not offered here: "
-        "solving for an input, uncertainties, and the approximations beside the law."
+        "solving for an input, other contacts and directions, k from materials, and the fit of measured points."
     )
 
 

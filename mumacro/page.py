@@ -1,4 +1,4 @@
-"""What the interactive page is told: the inputs and their units, the formulas, and the map of mu~ over (v~, y~).
+"""What the interactive page is told: the inputs, the geometries of a contact, and the map of mu~ over (v~, y~).
 
 The service serves it, and ``python -m builder.export_page`` writes it into a folder; the page itself is in
 ``service/static/page``.
@@ -6,13 +6,13 @@ The service serves it, and ``python -m builder.export_page`` writes it into a fo
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from mumacro.inputs import POSITIVE, SI, UNITS_OF, refusal
-from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, borders
+from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
+from mumacro.inputs import POSITIVE, SI, UNITS_OF, Scale, refusal
 from mumacro.surrogate import Surrogate
 
 __all__ = ["POLICY", "map_of", "names"]
@@ -26,31 +26,31 @@ POLICY = (
 # The range of the map [-]: from deep in creep to fast sliding, twenty points per decade.
 _PER_DECADE = 20
 _V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
-# Formulas of the paper for the border; "small_amplitude" is eq. (31) among the approximations, not among the borders.
-_PAPER_BORDERS = tuple(name for name in BORDERS if name in EQUATIONS.values() and name not in APPROXIMATIONS)
 _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coarser
 
 
 def names(knows: Iterable[str] = ()) -> dict[str, Any]:
-    """``names.json``: inputs, units, bounds, approximations, borders, and the names of what the page's host ``knows``.
+    """``names.json``: inputs, units, bounds, geometries with arguments, and what the page's host ``knows``.
 
-    The page shows what needs them only if they are there: ``service`` (everything that is computed by the service),
-    ``guide``, and ``contact``, ``direction``, ``k_range``, fields of a case.
+    The page shows what needs them only if they are there: ``service`` (what is computed by the service only),
+    ``guide``, ``stiffness`` and ``fit``; ``contact``, ``direction`` and ``k_range``, fields of a case.
     """
     inputs = {
         name: {
             "unit": SI[name][0], "bound": refusal(name, -1.0).removeprefix("must be "), "positive": name in POSITIVE,
-            "units": {unit: [scale.times, scale.over] for unit, scale in known.items()},
+            "units": _scales(known),
         }
         for name, known in UNITS_OF.items()
     }  # fmt: skip
-    about = {name: {"equations": _equations(name), "text": text} for name, text in APPROXIMATIONS.items()}
-    of_paper = {name: {"equations": _equations(name), "text": BORDERS[name]} for name in _PAPER_BORDERS}
-    return {"inputs": inputs, "approximations": about, "borders": of_paper, "knows": list(knows)}
+    geometries = {
+        name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]} for name, one in GEOMETRIES.items()
+    }
+    arguments = {name: {**one._asdict(), "units": _scales(one.units)} for name, one in ARGUMENTS.items()}
+    return {"inputs": inputs, "geometries": geometries, "arguments": arguments, "knows": list(knows)}
 
 
 def map_of(surrogate: Surrogate) -> dict[str, Any]:
-    """``map.json``: mu~ on a grid in whole numbers, rows of constant y~ from below, and borders by name."""
+    """``map.json``: mu~ on a grid in whole numbers, rows of constant y~ from below, and the border."""
     axes = {}
     for name, (low, high) in {"v_tilde": _V_DECADES, "y_tilde": _Y_DECADES}.items():
         axes[name] = {"start": 10.0**low, "stop": 10.0**high, "n": _PER_DECADE * (high - low) + 1}
@@ -58,14 +58,13 @@ def map_of(surrogate: Surrogate) -> dict[str, Any]:
     ratio = surrogate.mu_ratio(v[None, :], y[:, None])
     amplitudes = np.geomspace(y[0], y[-1], 4 * y.size)
     rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
-    lines = {name: _line(column, amplitudes) for name, column in borders(amplitudes).items() if name in _PAPER_BORDERS}
     border = _line(surrogate.v_tilde_crit(amplitudes), amplitudes)
-    return {**axes, "unit": _UNIT, "mu_ratio": rounded, "border": border, "borders": lines}
+    return {**axes, "unit": _UNIT, "mu_ratio": rounded, "border": border}
 
 
-def _equations(name: str) -> list[int]:
-    """Numbers of the paper's equations that an approximation stands for."""
-    return [number for number, found in EQUATIONS.items() if found == name]
+def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:
+    """The factor and the divisor of each unit."""
+    return {unit: [scale.times, scale.over] for unit, scale in units.items()}
 
 
 def _line(v: Any, y: Any) -> list[Any]:

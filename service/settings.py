@@ -57,6 +57,11 @@ def _default_tables() -> tuple[Path, ...]:
     return (beside,) if any(beside.glob("*.nc")) else (Path("tables"),)
 
 
+def _default_guide() -> Path | None:
+    beside = Path(__file__).resolve().parent / "guide"  # in a wheel that was built after the documents
+    return beside if (beside / "index.html").is_file() else None
+
+
 def _usable(key: SecretStr) -> SecretStr:
     # An empty variable must not count as "no key": a variable that is set shows that a key was intended.
     if not re.fullmatch(r"[!-~]{1,512}", key.get_secret_value()):
@@ -97,7 +102,9 @@ class Settings(BaseSettings):
     )
     root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
     trusted_proxies: str = Field("127.0.0.1", description="addresses or networks joined by commas, or *")
-    guide: DirectoryPath | None = Field(None, description="a directory with the built documentation")
+    guide: DirectoryPath | None = Field(
+        default_factory=_default_guide, description="a directory with the built documentation"
+    )
     log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
         "info", description="one of debug, info, warning, error, critical"
     )

@@ -11,9 +11,8 @@ import pytest
 
 from browser import KNOWING, START
 from comparing import close
-from mumacro import closed_forms
+from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs import UNITS_OF
-from mumacro.law import APPROXIMATIONS, BORDERS
 from service.routes import docs
 from service.routes import page as page_route
 from service.routes.page import ASSETS, POLICY
@@ -42,9 +41,6 @@ def test_every_part_is_served_and_names_no_other_host(client, name):
         assert imported in ASSETS
 
 
-RANGES = {"eq_23": (1e-2, 1.0), "eq_24": (1e-2, 1.0), "eq_26": (1.0, 1e3), "eq_27": (1e-2, 1e3)}  # of y~
-
-
 def test_the_map_is_the_surrogates(client, surrogate):
     response = client.get("/static/page/map.json")
     data = response.json()
@@ -53,27 +49,23 @@ def test_the_map_is_the_surrogates(client, surrogate):
     assert np.max(np.abs(grid - surrogate.mu_ratio(v[None, :], y[:, None]))) <= 0.5001 * data["unit"]
     border = np.array(data["border"])
     assert border[:, 0] == close(surrogate.v_tilde_crit(border[:, 1]), rel=1e-5)
-    for name, line in data["borders"].items():  # each formula in its stated range only
-        v, y = np.array(line).T
-        assert v == close(getattr(closed_forms, f"border_{name.removeprefix('eq_')}")(y), rel=1e-5)
-        assert (y.min(), y.max()) == close(RANGES[name], rel=0.03)
-    assert data["borders"].keys() == RANGES.keys()
     etag = response.headers["etag"]
     assert client.get("/static/page/map.json", headers={"If-None-Match": etag}).status_code == 304
 
 
-def test_units_and_approximations_are_the_librarys(client):
+def test_units_and_geometries_are_the_librarys(client):
+    def scales(units):
+        return {unit: list(scale) for unit, scale in units.items()}
+
     told = client.get("/static/page/names.json").json()
-    for name, units in UNITS_OF.items():
-        assert {unit: tuple(scale) for unit, scale in units.items()} == {
-            unit: tuple(scale) for unit, scale in told["inputs"][name]["units"].items()
-        }
-    assert {name: one["text"] for name, one in told["approximations"].items()} == APPROXIMATIONS
-    assert told["approximations"]["static"]["equations"] == [16, 38]
-    assert {name: one["equations"] for name, one in told["borders"].items()} == {
-        "eq_23": [23], "eq_24": [24, 39], "eq_26": [26], "eq_27": [27],
-    }  # fmt: skip
-    assert all(one["text"] == BORDERS[name] for name, one in told["borders"].items())
+    assert {name: scales(units) for name, units in UNITS_OF.items()} == {
+        name: one["units"] for name, one in told["inputs"].items()
+    }
+    assert {name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()} == {
+        name: (one["meaning"], one["arguments"]) for name, one in told["geometries"].items()
+    }
+    for name, one in ARGUMENTS.items():
+        assert told["arguments"][name] == {**one._asdict(), "units": scales(one.units), "choices": list(one.choices)}
 
 
 def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path, problem):
@@ -104,7 +96,7 @@ def test_what_is_typed_and_asked_without_a_browser(client, repository, tmp_path)
 def test_it_fits_the_screen(open_page, width, height):
     page = open_page(width=width, height=height)
     boxes = page.run(
-        "return Object.fromEntries(['map', 'law', 'mu', 'field-mu0'].map((id) => {"
+        "return Object.fromEntries(['map', 'law', 'mu', 'inputs'].map((id) => {"
         " const { x, y, width, height } = document.getElementById(id).getBoundingClientRect();"
         " return [id, [x, y, width, height]]; }));"
     )
@@ -113,8 +105,8 @@ def test_it_fits_the_screen(open_page, width, height):
     x, y, _, tall = boxes["map"]
     assert y + tall <= height
     assert 0 < boxes["mu"][1] < height
-    assert boxes["field-mu0"][0] < x - 50 or 0 < boxes["field-mu0"][1] - (y + tall) < 150
-    page = open_page("#approximations=1&k=rigid&family=v0&curves=0.001;0.1", width=width, height=height)
+    assert boxes["inputs"][0] < x - 50 or 0 < boxes["inputs"][1] - (y + tall) < 150
+    page = open_page("#k=rigid&digits=all&bad=1", width=width, height=height)
     assert page.run("return document.documentElement.scrollWidth;") <= width
     # no section lies on another, and controls are large enough for a finger
     overlaps = page.run(
@@ -128,7 +120,8 @@ def test_it_fits_the_screen(open_page, width, height):
     assert overlaps == 0
     small = page.run(
         "return [...document.querySelectorAll('input, select, button, summary, nav a')].map((element) => "
-        "[element.id || element.outerHTML, (element.closest('.switch') ?? element).getBoundingClientRect().height])"
+        "[element.id || element.outerHTML,"
+        " (element.closest('.switch, .choice label') ?? element).getBoundingClientRect().height])"
         ".filter(([, height]) => height > 0 && height < 40);"
     )
     assert small == [] or width > 760
@@ -158,7 +151,29 @@ def test_the_built_documentation_is_served_where_a_folder_is_named(tmp_path, tab
     assert "guide" not in knows
     # what is offered is what a request may hold
     schemas = client.get("/openapi.json").json()["components"]["schemas"]
-    assert set(knows) == {"service", *schemas["CaseRequest"]["properties"]}
+    paths = client.get("/openapi.json").json()["paths"]
+    panels = {name for name in ("stiffness", "fit") if f"/v1/{name}" in paths}
+    assert set(knows) == {"service", *schemas["CaseRequest"]["properties"], *panels}
+
+
+def test_a_wheel_holds_the_built_documents_where_there_are_any(tmp_path, monkeypatch):
+    import hatch_build
+    from service import settings
+
+    monkeypatch.setattr(hatch_build, "ROOT", tmp_path)
+    assert hatch_build.guide() == {}
+    site = tmp_path / "build" / "docs"
+    for name in ("index.html", "how-to/index.html", "_static/a.css", "_static/a.css.map", ".doctrees/index.doctree",
+                 "_sources/index.md.txt", "objects.inv", ".buildinfo"):  # fmt: skip
+        (site / name).parent.mkdir(parents=True, exist_ok=True)
+        (site / name).write_text(name)
+    places = {"index.html", "how-to/index.html", "_static/a.css"}
+    assert hatch_build.guide() == {str(site / name): f"mumacro/service/guide/{name}" for name in places}
+    # which is where the installed service looks for it
+    monkeypatch.setattr(settings, "__file__", str(tmp_path / "settings.py"))
+    assert settings.Settings().guide is None
+    site.rename(tmp_path / "guide")
+    assert settings.Settings().guide == tmp_path / "guide"
 
 
 AXE = "tests/data/axe-core/axe.min.js"
@@ -183,13 +198,19 @@ def inaccessible(page, repository):
 
 @pytest.mark.parametrize("width", [1440, 390])
 def test_the_page_is_accessible(open_page, repository, width):
-    page = open_page("#approximations=1&family=y0&curves=1e-6;3e-6&mu0.std=0.01&bad=1&v0=1e6", width=width)
+    page = open_page("#bad=1&v0=1e6&digits=all", width=width)
     page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
     assert inaccessible(page, repository) == {}
     assert page.complaints() == []
     with open_page.faked(KNOWING, "#contact=ball&direction=normal", width=width) as page:
         page.settle()
+        page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+        page.run("document.querySelector('#points').value = '0.001 0.1\\n0.1 0.2';")
+        for panel in ("stiffness", "fit"):
+            page.click(f"#{panel}-form button")
+            assert page.find(f"#{panel}-use").is_displayed()
         assert inaccessible(page, repository) == {}
+        assert page.run("return document.documentElement.scrollWidth;") <= width
 
 
 def test_the_description_is_accessible_and_leads_back(open_page, repository, surrogate):
@@ -244,8 +265,8 @@ def test_the_pages_ask_for_the_key_and_use_it(open_page, closed, tmp_path):
     page.wait_for("#mu", r"^0\.\d+$")
     page.settle()
     assert not page.find("#key-form").is_displayed()
-    page.run("await new Promise((next) => setTimeout(next, 250));")  # the address follows with a delay
-    assert "sesame" not in page.browser.current_url + page.find("#link").get_attribute("href")
+    assert "k=1N/um" in page.address()
+    assert "sesame" not in page.browser.current_url
     assert page.download("#csv", tmp_path, "friction-law-v0.csv").stat().st_size > 10_000
     page.run("sessionStorage.clear();")
     # a browser logs every response with 401; nothing else may be logged

@@ -81,13 +81,11 @@ function curve(values, along, others) {
   };
 }
 
-function law({ along, start, stop, points, scale, family, include, ...others }) {
+function law({ along, start, stop, points, scale, ...others }) {
   if (!(stop > start)) throw new Refused("The law cannot be drawn: stop must be > start.");
   if (scale === "log" && start <= 0) throw new Refused("The law cannot be drawn: start must be > 0.");
   const values = sweep({ start, stop, points, scale });
-  if (!family) return { along, values, ...curve(values, along, others), ...about };
-  const [[name, listed]] = Object.entries(family);
-  return { along, values, family: name, curves: listed.map((value) => ({ value, ...curve(values, along, { ...others, [name]: value }) })), ...about };
+  return { along, values, ...curve(values, along, others), ...about };
 }
 
 /** A file of the page itself. */

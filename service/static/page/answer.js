@@ -1,53 +1,45 @@
-// The readout: mu_macro with its uncertainty and model, what goes with it, what each input does to it; and "solve for".
-import { Channel, KeyWanted, Refused, wantKey } from "./ask.js";
+// The readout: mu_macro with its interval and model, what goes with it, what each input does to it; and "solve for".
+import { Status } from "./ask.js";
 import { Field, make } from "./form.js";
 import {
-  INPUTS, MODELS, REGIMES, caseOf, endsOf, friction, fromSI, inUnit, namesOf, readNumber, show, symbolOf, textOf,
-  valueOf, watts,
+  INPUTS, MODELS, REGIMES, caseOf, endsOf, friction, fromSI, inUnit, namesOf, powerOf, readNumber, show, symbolOf,
+  textOf, valueOf, watts,
 } from "./inputs.js";
 import { draw } from "./plots.js";
 import { post } from "./service.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** Shows the answer to a state; with the digits that the inputs support, or with all that the table supports. */
+/** Shows the answer to a state; with the digits that k supports, or with all that the table supports. */
 export function showAnswer(found, state) {
-  const { limits, groups, power, mu_macro: mu, error_bound: bound } = found;
-  const spread = found.std_first_order_enough ? found.std : found.std_sampled;
-  const known = Math.max(spread ?? 0, endsOf(state) ? (found.mu_macro_high - found.mu_macro_low) / 2 : 0);
+  const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound } = found;
+  const { limits, groups, power = { oscillation: null, saved: null } } = found;
+  const [ends, rows] = [endsOf(state), found.model ?? []];
+  const width = ends ? high - low : 0;
   const all = state.digits === "all";
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
   const kind = state.rigid ? "rigid contact" : MODELS[state.contact];
   const texts = {
-    mu: all ? friction(mu, bound, 15) : friction(mu, known), regime: REGIMES[found.regime],
+    mu: all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits),
+    regime: REGIMES[found.regime],
     ratio: all ? friction(found.mu_ratio, bound / valueOf(state, "mu0"), 15) : show(found.mu_ratio, 4),
     "peak-speed": inUnit("v0", state.direction === "normal" ? null : valueOf(state, "y0") * valueOf(state, "omega")),
     stick: found.stick_fraction === null ? "–" : `${show(100 * found.stick_fraction, 4)} %`,
     shaker: power.oscillation === null && state.rigid ? "– (rigid)" : watts(power.oscillation),
-    saved: watts(power.saved), static: show(limits.mu_static, 4), crit: inUnit("v0", limits.v0_crit), "v-tilde": group(groups.v_tilde),
-    "y-tilde": group(groups.y_tilde), bound: bound === null ? "not known" : `± ${show(bound, 2)}`, source: found.source,
+    saved: watts(power.saved), static: show(limits.mu_static, 4), crit: inUnit("v0", limits.v0_crit),
+    "v-tilde": group(groups.v_tilde), "y-tilde": group(groups.y_tilde),
+    "y-tilde-name": state.direction === "normal" ? "ỹ = ΔFz/Fz" : "ỹ = y₀/l₀",
+    bound: bound === null ? "not known" : `± ${show(bound, 2)}`, source: found.source,
     table: `${found.table.id}, tolerance ${show(found.table.tolerance)}`,
     model: `Model: ${kind}, ${MODELS[state.direction]}; not compared with measured points.`,
-    uncertainty: uncertainty(found, state),
+    interval: ends ? `${friction(low, width)} to ${friction(high, width)} for k = ${textOf(state.given.k, 4)}` : "",
   };
   for (const [id, text] of Object.entries(texts)) $(id).textContent = text;
+  $("rows").replaceChildren(...rows.map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
   showBars(found, state);
 }
 
-function uncertainty(found, state) {
-  const { std, std_sampled: sampled, mu_macro_low: low, mu_macro_high: high } = found;
-  const ends = endsOf(state) && [low, high].map((value) => friction(value, high - low)).join(" to ");
-  const parts = ends ? [`${ends} for k = ${textOf(state.given.k, 4)}`] : [];
-  if (std === null) parts.push("± not finite: the slope is infinite here");
-  else if (found.std_first_order_enough) parts.push(`± ${show(std, 2)} (one standard deviation)`);
-  else if (std !== undefined) {
-    const why = `from samples; first order, ${show(std, 2)}, is not accurate enough here`;
-    parts.push(`± ${show(sampled, 2)} (one standard deviation, ${why})`);
-  }
-  return parts.join("; ");
-}
-
-/** Per cent that mu_macro changes when an input grows by 1 %, and the input's share of the variance. */
+/** Per cent that mu_macro changes when an input grows by 1 %. */
 function showBars(found, state) {
   const names = namesOf(state);
   const shares = names.map((name) => {
@@ -55,8 +47,6 @@ function showBars(found, state) {
     return slope === null || !found.mu_macro ? null : (slope * valueOf(state, name)) / found.mu_macro;
   });
   const most = Math.max(1, ...shares.map(Math.abs));
-  const variance = found.std_share;
-  $("variance-head").hidden = !variance;
   $("bars").tBodies[0].replaceChildren(...names.map((name, i) => {
     const share = shares[i];
     const width = (50 * Math.abs(share)) / most;
@@ -65,8 +55,6 @@ function showBars(found, state) {
     const bar = draw("svg", box, draw("rect", fill), draw("path", { d: "M50 0v10" }));
     const text = share === null ? "–" : `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`;
     const cells = [make("td", {}, bar), make("td", { id: `bar-${name}` }, text)];
-    const part = variance && (variance[name] === null ? "–" : `${(100 * variance[name]).toFixed(1)} %`);
-    if (variance) cells.push(make("td", { id: `share-${name}` }, part));
     return make("tr", {}, make("th", { scope: "row" }, INPUTS[name].symbol), ...cells);
   }));
 }
@@ -76,16 +64,10 @@ function showBars(found, state) {
 export class Solver {
   /** `use(name, quantity)` takes a found value over. */
   constructor(use) {
-    this.use = use;
-    this.channel = new Channel({
-      ask: ({ request }) => post("v1/solve-for", request),
-      answer: (found, { unit }) => this.show(found, unit),
-      fail: (error) => {
-        this.say(error instanceof Refused ? error.message : `${error.message} Asking again by itself.`);
-        if (error instanceof KeyWanted) wantKey();
-      },
-    });
-    const blame = (fault) => this.say(fault ? `The target ${fault}.` : "");
+    Object.assign(this, { use, status: new Status("solve-status", "roots") });
+    const ask = ({ request }) => post("v1/solve-for", request);
+    this.channel = this.status.channel("solve", ask, (found, { unit }) => this.show(found, unit));
+    const blame = (fault) => this.status.set("typed", fault && `The target ${fault}.`);
     this.target = new Field($("target"), { read: (text) => this.read(text), use: () => {}, blame });
     $("solve-form").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -104,16 +86,12 @@ export class Solver {
     if (this.found && this.found !== JSON.stringify(caseOf(state))) this.clear();
   }
 
-  say(text) {
-    $("solve-status").textContent = text;
-    $("roots").replaceChildren();
-  }
-
   clear() {
     this.channel.cancel();
     this.found = null;
     this.target.clear();
-    this.say("");
+    this.status.clear();
+    $("roots").replaceChildren();
   }
 
   /** { value } of a typed target, or { fault }. */
@@ -131,11 +109,11 @@ export class Solver {
     this.clear();
     this.target.commit();
     if (this.target.fault) return;
-    const unknown = $("unknown").value;
+    const [unknown, include] = [$("unknown").value, powerOf(this.state)];
     const { value: target } = this.read($("target").value);
     this.found = JSON.stringify(caseOf(this.state));
     this.channel.push({
-      request: { ...caseOf(this.state, unknown), unknown, quantity: $("quantity").value, target, include: ["power"] },
+      request: { ...caseOf(this.state, unknown), unknown, quantity: $("quantity").value, target, include },
       unit: this.state.given[unknown].unit,
     });
   }
@@ -146,10 +124,9 @@ export class Solver {
     if (!roots.length) {
       const [from, to] = [min_included ? "from" : "from above", max_included ? "to" : "to below"];
       const can = `${quantity === "mu_ratio" ? "µ/µ₀" : "µ"} can be ${from} ${show(min, 4)} ${to} ${show(max, 4)} here`;
-      this.say(min === max ? reason : `No value of ${symbol} gives that: ${can}.`);
+      this.status.set("found", min === max ? reason : `No value of ${symbol} gives that: ${can}.`);
       return;
     }
-    this.say(roots.length > 1 ? `${roots.length} values give it:` : "");
     $("roots").replaceChildren(...roots.map((root) => {
       const told = `${symbol} = ${inUnit(unknown, root.value, unit, 6)}`;
       const take = make("button", { type: "button", "aria-label": `use ${told}` }, "Use");

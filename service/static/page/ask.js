@@ -1,4 +1,5 @@
-// Asking and its failures: one question in flight, the API key and its field.  Who answers is said in service.js.
+// Asking and its failures: one question in flight, what is told of it, the API key and its field.
+// Who answers is said in service.js.
 
 /** The service wants a key, or another one. */
 export class KeyWanted extends Error {}
@@ -33,6 +34,7 @@ export class Channel {
   push(question) {
     this.next = { question };
     if (!this.busy) this.run();
+    busy();
   }
 
   /** Forgets what is asked: its answer is of no use any more. */
@@ -76,10 +78,61 @@ export class Channel {
   }
 }
 
+const $ = (id) => document.getElementById(id);
+const channels = [];
+
+/** Whether anything is asked, for who waits for it. */
+const busy = () => $("main")?.setAttribute("data-asking", String(!channels.every((one) => one.idle)));
+
+/** One place of the page: its reasons by topic, shown in `place`; `shown` is grey while there is one. */
+export class Status {
+  constructor(place, shown) {
+    Object.assign(this, { place: $(place), shown: $(shown), reasons: new Map(), answered: false });
+  }
+
+  /** Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not typed yet. */
+  set(topic, text, calm = false) {
+    const old = this.answered ? " Grey results belong to earlier values." : "";
+    if (text) this.reasons.set(topic, { text: text + old, calm });
+    else this.reasons.delete(topic);
+    // one reason is enough; what the user can mend comes first
+    const first = this.reasons.get("typed") ?? [...this.reasons.values()][0];
+    if (this.place.textContent !== (first?.text ?? "")) this.place.textContent = first?.text ?? "";
+    this.place.classList.toggle("bad", first?.calm === false);
+    this.shown.classList.toggle("old", this.reasons.size > 0);
+  }
+
+  clear() {
+    for (const topic of [...this.reasons.keys()]) this.set(topic, null);
+  }
+
+  /** A channel whose failures are told here. */
+  channel(topic, ask, use) {
+    const made = new Channel({
+      ask,
+      answer: (found, asked) => {
+        this.set(topic, null);
+        use(found, asked);
+      },
+      fail: (error) => {
+        if (error instanceof KeyWanted) wantKey();
+        const text = error instanceof Unanswered ? `${error.message} Asking again by itself.` : error.message;
+        this.set(topic, error instanceof KeyWanted ? null : text, !(error instanceof Refused));
+      },
+      wait: (waiting) => {
+        if (waiting) this.set(topic, null);
+        this.set(`${topic} slow`, waiting ? "Waiting for the service." : null, true);
+        busy();
+      },
+    });
+    channels.push(made);
+    return made;
+  }
+}
+
 // --- the API key: kept for this tab, sent as a header, never part of an address ------------------------------
 
 const NAME = "mumacro-api-key";
-const $ = (id) => document.getElementById(id);
 let held = null;
 
 /** What the tab stores, or null; storage that is switched off holds nothing: the key then lives as long as the page. */

@@ -1,5 +1,5 @@
-// Typed fields, and the form of the inputs: value with unit, slider, standard deviation, contact, direction.
-import { CHOICES, INPUTS, about, fromSI, namesOf, readDeviation, readValue, si, symbolOf, textOf } from "./inputs.js";
+// Typed fields, and the form of the inputs: value with unit, slider, contact, direction.
+import { CHOICES, INPUTS, fromSI, namesOf, readValue, si, symbolOf, textOf } from "./inputs.js";
 
 const STEPS = 1000; // of a slider, a decade
 
@@ -77,12 +77,7 @@ export class Form {
   build(name) {
     const { label, range: [low, high] } = INPUTS[name];
     const fault = make("p", { id: `fault-${name}`, className: "fault" });
-    const described = { spellcheck: false, type: "text", "aria-describedby": fault.id };
-    const text = make("input", { ...described, id: `field-${name}` });
-    const spread = make("input", {
-      ...described, id: `std-${name}`, placeholder: "0",
-      "aria-label": `uncertainty of ${label}, one standard deviation, with its unit or in %`,
-    });
+    const text = make("input", { spellcheck: false, type: "text", id: `field-${name}`, "aria-describedby": fault.id });
     const range = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...range });
     slider.addEventListener("input", () => {
@@ -91,36 +86,20 @@ export class Form {
       this.settle(name);
       this.change({ given: { ...this.state.given, [name]: { value, unit } } });
     });
-    const deviation = make("label", { className: "deviation" }, "±", spread);
     const row = make("div", { className: "field" }, make("label", { htmlFor: text.id }, label), text, slider);
-    if (about.knows.has("service")) row.append(deviation);
     if (name === "k") row.append(make("label", { className: "switch" }, this.rigid, "rigid (no spring)"));
     row.append(fault);
-    this.rows[name] = { row, slider, fault, ...this.fields(name, text, spread) };
+    const value = new Field(text, {
+      read: (typed) => readValue(name, typed, this.state.given[name].unit),
+      use: (found) => this.change(found.rigid ? found : { given: { ...this.state.given, [name]: found } }),
+      blame: (why) => {
+        fault.textContent = why ? `${INPUTS[name].symbol}: ${why}.` : "";
+        fault.classList.toggle("bad", why !== null && !value.empty);
+        this.trouble();
+      },
+    });
+    this.rows[name] = { row, slider, fault, value };
     return row;
-  }
-
-  fields(name, text, spread) {
-    const blame = () => this.blame(name);
-    const unit = () => this.state.given[name].unit;
-    const use = (found) => this.change(found.rigid ? found : { given: { ...this.state.given, [name]: found } });
-    return {
-      value: new Field(text, { read: (typed) => readValue(name, typed, unit()), use, blame }),
-      deviation: new Field(spread, {
-        read: (typed) => readDeviation(name, typed, unit()),
-        use: (found) => this.change({ std: { ...this.state.std, [name]: found } }), blame,
-      }),
-    };
-  }
-
-  /** Says beside the fields of an input what is wrong with them. */
-  blame(name) {
-    const { value, deviation, fault } = this.rows[name];
-    const { symbol } = INPUTS[name];
-    fault.textContent = [[symbol, value], [`± of ${symbol}`, deviation]]
-      .filter(([, field]) => field.fault).map(([what, field]) => `${what}: ${field.fault}.`).join(" ");
-    fault.classList.toggle("bad", [value, deviation].some((field) => field.fault && !field.empty));
-    this.trouble();
   }
 
   /** Whether what is wrong is only that fields are empty. */
@@ -140,7 +119,7 @@ export class Form {
 
   /** Forgets all that is typed and not applied. */
   clear() {
-    for (const { value, deviation } of Object.values(this.rows)) for (const field of [value, deviation]) field.clear();
+    for (const { value } of Object.values(this.rows)) value.clear();
   }
 
   /** Shows a state. */
@@ -148,14 +127,13 @@ export class Form {
     this.state = state;
     this.rigid.checked = state.rigid;
     const shown = namesOf(state);
-    for (const [name, { row, slider, value, deviation }] of Object.entries(this.rows)) {
+    for (const [name, { row, slider, value }] of Object.entries(this.rows)) {
       const off = name === "k" && state.rigid;
       const quantity = state.given[name];
       const size = si(name, quantity);
       row.hidden = !shown.includes(name);
-      for (const input of [value.input, deviation.input, slider]) input.disabled = off;
+      for (const input of [value.input, slider]) input.disabled = off;
       value.show(off ? "rigid" : textOf(quantity));
-      deviation.show(state.std[name] && !off ? textOf(state.std[name]) : "");
       slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
       slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${textOf(quantity)}`);
     }

@@ -18,13 +18,16 @@ export const MODELS = {
   across: "oscillation across the sliding direction", along: "oscillation along the sliding direction",
   normal: "an oscillating normal force",
 };
-export const REGIMES = { continuous: "continuous sliding", stick_slip: "stick–slip", static: "at rest" };
+export const REGIMES = {
+  continuous: "continuous sliding", stick_slip: "stick–slip", static: "at rest", partial_slip: "partial slip",
+  reverse_slip: "slip to and fro",
+};
 
-/** What names.json says: `knows` (what the host of the page can do), the approximations and the paper's borders. */
-export const about = { knows: new Set(), approximations: {}, borders: {} };
+/** What names.json says: `knows` (what the host of the page can do), the geometries of a contact, their arguments. */
+export const about = { knows: new Set(), geometries: {}, arguments: {} };
 
 /** Takes units and bounds as names.json tells them; nothing here works before that. */
-export function setNames({ inputs, knows, approximations, borders }) {
+export function setNames({ inputs, knows, geometries, arguments: others }) {
   for (const name of ALL) {
     const { unit, units, bound, positive } = inputs[name] ?? { ...inputs.Fz, bound: inputs.y0.bound, positive: false };
     Object.assign(INPUTS[name], { si: unit, bound, positive, units: { ...units } });
@@ -34,8 +37,11 @@ export function setNames({ inputs, knows, approximations, borders }) {
   for (const [unit, [times, over]] of Object.entries(inputs.f.units)) {
     units[unit] = unit in units ? null : [times * 2 * Math.PI, over];
   }
-  Object.assign(about, { knows: new Set(knows), approximations, borders });
+  Object.assign(about, { knows: new Set(knows), geometries, arguments: others });
 }
+
+/** What is known of a quantity: an input, or an argument of a geometry. */
+const kindOf = (name) => INPUTS[name] ?? about.arguments[name];
 
 /** The inputs of a case: an oscillating normal force has its amplitude in the place of y0. */
 export function namesOf({ direction }) {
@@ -44,14 +50,14 @@ export function namesOf({ direction }) {
 
 // --- quantities: { value, unit }, or { low, high, unit } for an interval -----------------------------------
 
-const hasUnit = (name, unit) => Object.hasOwn(INPUTS[name].units, unit) && INPUTS[name].units[unit] !== null;
+const hasUnit = (name, unit) => Object.hasOwn(kindOf(name).units, unit) && kindOf(name).units[unit] !== null;
 
 export const toSI = (name, value, unit) => {
-  const [times, over] = INPUTS[name].units[unit];
+  const [times, over] = kindOf(name).units[unit];
   return (value * times) / over;
 };
 export const fromSI = (name, value, unit) => {
-  const [times, over] = INPUTS[name].units[unit];
+  const [times, over] = kindOf(name).units[unit];
   return (value * over) / times;
 };
 
@@ -133,30 +139,36 @@ function readUnit(name, text) {
   const tidy = text.replace(/[\s·[\]()]/g, "");
   const found = [tidy.replace(/[uμ](?=m)/g, "µ"), tidy].find((unit) => hasUnit(name, unit));
   if (found !== undefined) return { unit: found };
-  const { units, offered, symbol } = INPUTS[name];
+  const { units, offered = Object.keys(units), symbol = name } = kindOf(name);
   if (units[tidy] === null) return { fault: `“${text}” can be Hz or rad/s: write one of them` };
   const near = Object.keys(units).filter((unit) => unit.toLowerCase() === tidy.toLowerCase());
   if (near.length) return { fault: `“${text}” is not a unit: did you mean ${near.join(" or ")}?` };
-  const known = name === "mu0" ? "leave it out" : `give ${offered.join(", ")}`;
+  const known = offered.includes("-") ? "leave it out" : `give ${offered.join(", ")}`;
   return { fault: `“${text}” is not a unit of ${symbol}: ${known}` };
 }
 
-/** A typed value, in `unit` where none is typed: { value, unit }, { low, high, unit }, { rigid } or { fault }. */
-export function readValue(name, text, unit, positive = INPUTS[name].positive) {
+/** A typed number with its unit, `unit` where none is typed: { value, unit }, or { fault }. */
+export function readQuantity(name, text, unit) {
+  const number = readNumber(text);
+  if (number.fault) return number;
+  const named = number.unit === "" ? { unit } : readUnit(name, number.unit);
+  return named.fault ? named : { value: number.value, unit: named.unit };
+}
+
+/** A typed value of an input: { value, unit }, { low, high, unit }, { rigid } or { fault }. */
+export function readValue(name, text, unit) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return { rigid: true };
   if (name === "k" && text.includes("..")) {
     if (about.knows.has("k_range")) return readInterval(name, text, unit);
     return { fault: "must be one number: this service knows no interval" };
   }
-  const number = readNumber(text);
-  if (number.fault) return number;
-  const named = number.unit === "" ? { unit } : readUnit(name, number.unit);
-  if (named.fault) return named;
-  const { value } = number;
-  const found = toSI(name, value, named.unit);
-  const bad = !Number.isFinite(found) || found < 0 || (positive && value === 0);
-  if (bad) return { fault: `must be ${positive ? INPUTS[name].bound : "finite and >= 0"}` };
-  return found === 0 && value !== 0 ? { fault: "is too small" } : { value, unit: named.unit };
+  const read = readQuantity(name, text, unit);
+  if (read.fault) return read;
+  const { positive, bound } = INPUTS[name];
+  const found = si(name, read);
+  const bad = !Number.isFinite(found) || found < 0 || (positive && read.value === 0);
+  if (bad) return { fault: `must be ${bound}` };
+  return found === 0 && read.value !== 0 ? { fault: "is too small" } : read;
 }
 
 /** A typed interval "low..high": { low, high, unit }, or { fault }. */
@@ -173,42 +185,56 @@ export function readInterval(name, text, unit) {
   return { low: first, high: high.value, unit: high.unit };
 }
 
-/** A typed standard deviation: in the input's unit, or in %; null for none, { fault } if it is neither. */
-export function readDeviation(name, text, unit) {
-  if (text.trim() === "") return null;
-  const bare = text.replace(/^\s*±/, "");
-  const number = readNumber(bare);
-  const percent = number.unit === "%";
-  if (!percent) return readValue(name, bare, unit, false);
-  return number.value < 0 ? { fault: "must be finite and >= 0" } : number;
-}
+const COLUMNS = [["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)/i], ["std", /^(std|±|sigma|s$|u$)/i]];
 
-/** Typed values of a family of curves, separated by ";": a list of quantities, or { fault }. */
-export function readCurves(name, text, unit) {
-  const parts = text.split(";").map((part) => part.trim()).filter(Boolean);
-  if (!parts.length) return { fault: "give values, separated by ;" };
-  if (parts.length > 20) return { fault: "up to 20 values" };
-  const bare = parts.filter((part) => readNumber(part).unit === "").length;
-  if (bare > 0 && bare < parts.length) return { fault: "give a unit to every value or to none" };
-  const found = parts.map((part) => readValue(name, part, unit));
-  const wrong = found.findIndex(({ value }) => value === undefined);
-  return wrong < 0 ? found : { fault: `${parts[wrong]}: ${found[wrong].fault ?? "give a number"}` };
+/** { v0 [m/s], mu_macro, std } of points, one a line; or { fault }.  A first line of words names the columns. */
+export function readPoints(text) {
+  const lines = text.split("\n").map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
+  const between = ["\t", ";", ","].find((sign) => text.includes(sign)) ?? /\s+/;
+  const rows = lines.map((line) => line.split(between).map((cell) => cell.trim()));
+  if (!rows.length) return { fault: "paste points: v₀ and µ, one point a line" };
+  let [names, unit] = [COLUMNS.map(([name]) => name).slice(0, rows[0].length), "m/s"];
+  const headed = /^[^\d.+−-]/.test(rows[0][0]);
+  if (headed) {
+    const head = rows.shift();
+    names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
+    const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
+    if (strange >= 0) return { fault: `column “${head[strange]}” is not one of v0, mu_macro, std, each once` };
+    const named = /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1];
+    const known = named === undefined ? { unit } : readUnit("v0", named);
+    if (known.fault) return known;
+    unit = known.unit;
+  }
+  const complete = ["v0", "mu_macro"].every((name) => names.includes(name)) && (headed || rows[0].length <= 3);
+  if (!complete) return { fault: "needs two or three columns: v0, mu_macro, std" };
+  if (!rows.length) return { fault: "paste points below the names of the columns" };
+  const found = Object.fromEntries(names.map((name) => [name, []]));
+  for (const [i, cells] of rows.entries()) {
+    const line = `line ${i + 1 + headed}`;
+    if (cells.length !== names.length) return { fault: `${line} has ${cells.length} values, not ${names.length}` };
+    for (const [j, name] of names.entries()) {
+      const kind = name === "v0" ? "v0" : "mu0";
+      const read = readQuantity(kind, cells[j], kind === "v0" ? unit : "-");
+      if (read.fault) return { fault: `${line}, ${name}: ${read.fault}` };
+      found[name].push(si(kind, read));
+    }
+  }
+  return found;
 }
 
 // --- the state of the page, the case that it asks for, and its address, in the words of the command line: "y0=2um" ---
 
 export const startState = () => ({
   given: Object.fromEntries(Object.entries(INPUTS).map(([name, { start: [value, unit] }]) => [name, { value, unit }])),
-  std: {}, rigid: false, contact: "spring", direction: "across", digits: "few",
-  along: "v0", scale: "log", approximations: false, range: null, family: null, curves: [],
+  rigid: false, contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: null,
 });
 
 /** An input of the state [SI]; Infinity for the stiffness of a rigid contact. */
 export const valueOf = (state, name) => (name === "k" && state.rigid ? Infinity : si(name, state.given[name]));
 
-/** Both ends of the stiffness where it is an interval, as quantities; else null. */
+/** Both ends of the stiffness [N/m] where it is an interval; else null. */
 export function endsOf({ rigid, given: { k: { low, high, unit } } }) {
-  return rigid || low === undefined ? null : [low, high].map((value) => ({ value, unit }));
+  return rigid || low === undefined ? null : [low, high].map((value) => toSI("k", value, unit));
 }
 
 /** The inputs as the service takes them, without some of them; of an interval its middle. */
@@ -219,18 +245,19 @@ export function caseOf(state, ...without) {
   return Object.fromEntries([...given, ...choices.map(([name]) => [name, state[name]])]);
 }
 
+/** The same with an interval of k as such, unless k is left out. */
+export function spanOf(state, ...without) {
+  const ends = without.includes("k") ? null : endsOf(state);
+  return ends ? { ...caseOf(state, "k", ...without), k_range: ends } : caseOf(state, ...without);
+}
+
+/** The power, where it is known: not for a normal force that oscillates. */
+export const powerOf = ({ direction }) => (direction === "normal" ? [] : ["power"]);
+
 /** The question for the readout. */
 export function question(state) {
-  const ends = endsOf(state);
-  const request = ends ? { ...caseOf(state, "k"), k_range: ends.map((end) => si("k", end)) } : caseOf(state);
-  const include = ["groups", "limits", "stick_fraction", "power", "gradient"];
-  const std = {};
-  const single = (name) => name !== "k" || !(ends || state.rigid);
-  for (const name of namesOf(state).filter((one) => state.std[one]?.value && single(one))) {
-    const { value, unit } = state.std[name];
-    std[name] = unit === "%" ? (value / 100) * valueOf(state, name) : si(name, state.std[name]);
-  }
-  return Object.keys(std).length ? { ...request, std, include: [...include, "std"] } : { ...request, include };
+  const model = about.knows.has("contact") ? ["model"] : []; // of a service that has several
+  return { ...spanOf(state), include: ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), ...model] };
 }
 
 /** The state as the part of an address behind "#". */
@@ -240,13 +267,11 @@ export function toAddress(state) {
   const text = (quantity) => textOf(quantity).replaceAll(" ", "").replaceAll("µ", "u");
   const keyOf = (name) => (symbolOf(name, state.given[name].unit) === "f" ? "f" : name);
   const parts = names.map((name) => [keyOf(name), name === "k" && state.rigid ? "rigid" : text(state.given[name])]);
-  for (const name of names) if (state.std[name]) parts.push([`${name}.std`, text(state.std[name])]);
-  for (const key of ["contact", "direction", "digits", "along", "scale", "approximations"]) {
+  for (const key of ["contact", "direction", "digits", "along", "scale"]) {
     if (state[key] !== usual[key]) parts.push([key, state[key]]);
   }
   if (state.range) parts.push(["range", text(state.range)]);
-  if (state.family) parts.push(["family", state.family], ["curves", state.curves.map(text).join(";")]);
-  const quoted = (value) => encodeURIComponent(value).replace(/%(2F|3B)/g, decodeURIComponent);
+  const quoted = (value) => encodeURIComponent(value).replaceAll("%2F", "/");
   return `#${parts.map(([key, value]) => `${key}=${quoted(value)}`).join("&")}`;
 }
 
@@ -276,20 +301,11 @@ export function fromAddress(hash) {
   for (const name of names) take(name, (text) => readValue(name, text, INPUTS[name].si), set(name));
   if (given.has("omega") && given.has("f")) bad("f", "omega is given, too");
   else take("f", (text) => readValue("omega", text, "Hz"), set("omega"));
-  for (const name of names) {
-    take(`${name}.std`, (text) => readDeviation(name, text, INPUTS[name].si), (found) => { state.std[name] = found; });
-  }
   choice("digits", ["few", "all"], (word) => { state.digits = word; });
   choice("along", names, (name) => { state.along = name; });
   choice("scale", ["log", "linear"], (scale) => { state.scale = scale; });
-  choice("approximations", ["true", "1"], () => { state.approximations = true; });
   const { along } = state;
   take("range", (text) => readInterval(along, text, INPUTS[along].si), (range) => { state.range = range; });
-  choice("family", names.filter((name) => name !== along), (family) => {
-    const use = (curves) => Object.assign(state, { family, curves });
-    take("curves", (text) => readCurves(family, text, INPUTS[family].si), use);
-  });
-  known.add("curves");
   for (const key of given.keys()) if (!known.has(key)) bad(key, "unknown");
   return { state, faults };
 }

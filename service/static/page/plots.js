@@ -82,11 +82,15 @@ export function axes(x, y, xTitle, yTitle, grid = true) {
   ];
 }
 
-/** A curve through points in pixels; it is interrupted where `ys` is null. */
-export function curve(xs, ys, attributes) {
-  const joint = (i) => (i && ys[i - 1] !== null ? "L" : "M");
-  const pieces = ys.map((y, i) => (y === null ? "" : `${joint(i)}${xs[i].toFixed(2)} ${y.toFixed(2)}`));
-  return draw("path", { d: pieces.join(""), ...attributes });
+/** A curve through points in pixels. */
+export const curve = (xs, ys, attributes) =>
+  draw("path", { d: `M${xs.map((x, i) => `${x.toFixed(2)} ${ys[i].toFixed(2)}`).join("L")}`, ...attributes });
+
+/** The area between two curves through points in pixels. */
+export function band(xs, lows, highs) {
+  const points = [...xs.map((x, i) => [x, highs[i]]), ...xs.map((x, i) => [x, lows[i]]).reverse()];
+  const places = points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`);
+  return draw("path", { d: `M${places.join("L")}Z`, class: "band" });
 }
 
 /** What is drawn inside of both axes; nothing of it leaves them. */
@@ -103,7 +107,8 @@ export function point(x, y, out = [0, 0]) {
   return draw("path", { d: shape, class: "point", transform: `translate(${x} ${y}) rotate(${turn})` });
 }
 
-const LOOKS = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "font", "paint-order"];
+const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin",
+  "font", "paint-order"];
 
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
 export class Plot {
@@ -140,28 +145,16 @@ export class Plot {
     svg.addEventListener("pointerleave", leave);
   }
 
-  /** The plot as a PNG of twice its size, on the card's colour, with rows of { label, style, dash } below it. */
-  async picture(rows) {
+  /** The plot as an SVG file on the card's colour, with a line of text below it. */
+  picture(text) {
     const { clientWidth: width, clientHeight: height } = this.svg;
-    const whole = height + 20 * rows.length + 14;
-    const size = { width, height: whole };
-    const colour = (name) => getComputedStyle(this.svg).getPropertyValue(`--${name}`);
-    const copy = draw("svg", size, draw("rect", { ...size, fill: colour("card") }));
-    copy.append(...[...this.svg.children].map(withLooks), ...rows.flatMap(({ label: text, style, dash = "" }, i) => {
-      const y = height + 10 + 20 * i;
-      const [stroke] = style ? [style.replace(/var\(--(\w+)\)/, (_, name) => colour(name))] : [];
-      const sample = { d: `M16 ${y}h28`, stroke, "stroke-width": 2.2, "stroke-dasharray": dash };
-      const narrow = 7 * text.length > width - 60 ? { textLength: width - 60, lengthAdjust: "spacingAndGlyphs" } : {};
-      const font = { "font-family": "sans-serif", "font-size": 13, ...narrow };
-      const words = { x: style ? 52 : 16, y: y + 4, fill: colour("text"), ...font };
-      return [...(style ? [draw("path", sample)] : []), draw("text", words, text)];
-    }));
-    const image = new Image();
-    image.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(copy))}`;
-    await image.decode();
-    const canvas = Object.assign(document.createElement("canvas"), { width: 2 * width, height: 2 * whole });
-    canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
-    return new Promise((done) => { canvas.toBlob(done, "image/png"); });
+    const size = { width, height: height + 24 };
+    const looks = getComputedStyle(this.svg);
+    const narrow = 7 * text.length > width - 32 ? { textLength: width - 32, lengthAdjust: "spacingAndGlyphs" } : {};
+    const words = { x: 16, y: height + 12, fill: looks.color, "font-family": "sans-serif", "font-size": 13, ...narrow };
+    const back = draw("rect", { ...size, fill: looks.getPropertyValue("--card") });
+    const copy = draw("svg", size, back, [...this.svg.children].map(withLooks), draw("text", words, text));
+    return new Blob([new XMLSerializer().serializeToString(copy)], { type: "image/svg+xml" });
   }
 }
 
