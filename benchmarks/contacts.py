@@ -10,6 +10,7 @@ import argparse
 import functools
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
@@ -54,12 +55,13 @@ def costs() -> None:
             told = f"mixed {1e9 * mixed:7.0f} ns, {mixed / spring:6.1f} springs; median {np.median(each) / spring:6.1f}"
             print(f"{tolerance:g} {name:10} {told}, worst {max(each) / spring:6.1f}")
     s = Surrogate.open(1e-10, threads=1)
-    march_ball(1.0, 1.0, 1, 10)
-    marched = best(lambda: march_ball(0.05, 0.4, 300, 1000), 1)
+    march: Any = march_ball
+    march(1.0, 1.0, 1, 10)
+    marched = best(lambda: march(0.05, 0.4, 300, 1000), 1)
 
     def share(xi: float) -> float:
         load = 1.0 - xi * xi
-        return 1.5 * load * s.mu_ratio(0.05 / (1.5 * load), 0.4 / (1.5 * load))
+        return 1.5 * load * float(s.mu_ratio(0.05 / (1.5 * load), 0.4 / (1.5 * load)))
 
     adaptive = best(lambda: quad(share, 0.0, 1.0 - 1e-12, epsabs=1e-10, epsrel=1e-10, limit=200), 3)
     ball = best(lambda: s.ratio_with_bound(0.05, 0.4, contact="ball"))

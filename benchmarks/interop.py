@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
+from benchmarks.measuring import main, markdown, quantity  # isort: split
+
 import timeit
 from collections.abc import Callable
 from time import process_time
@@ -11,7 +12,6 @@ from typing import Any
 import jax
 import numpy as np
 import torch
-from measuring import machine, markdown, quantity
 from scipy.special import ellipk
 
 import mumacro
@@ -34,11 +34,9 @@ def loop(step: Callable[[Any], Any], start: Any) -> Any:
     return start
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="small arrays")
-    n = 10_000 if parser.parse_args().quick else 1_000_000
+def interop(quick: bool) -> str:
+    """mu~ in every library."""
+    n = 10_000 if quick else 1_000_000
     jax.config.update("jax_enable_x64", True)
     table = mumacro.open(1e-10, threads=1)
     in_jax, in_torch = InJax(table), InTorch(table)
@@ -76,8 +74,8 @@ def main() -> None:
         figures += [best(lambda: steps(0.1), 1) * 1e3] if steps else []  # noqa: B023
         rows.append([name, *map(quantity, figures), *([] if steps else ["-"])])
     header = ["mu~", "one point [us]", "1,000 points [us]", f"{n:,} points [ns a point]", f"{STEPS:,} steps [ms]"]
-    print(f"{machine('jax', 'torch', 'scipy')} Table 1e-10, one thread.\n\n{markdown(header, rows)}")
+    return f"Table 1e-10, one thread.\n\n{markdown(header, rows)}"
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, {"interop": interop}, quick=False)

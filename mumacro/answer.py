@@ -139,7 +139,7 @@ class Answer(Generic[Number]):
         return self._by_source("source", _SOURCE_NAMES)
 
     def plot(self, axes: Any = None) -> Any:
-        """The cases over (v~, y~), see :func:`mumacro.plotting.plot_answer`; needs matplotlib."""
+        """The cases over (v~, y~), see ``mumacro.plotting.plot_answer``; needs matplotlib."""
         from mumacro.plotting import plot_answer
 
         return plot_answer(self, axes)

@@ -119,7 +119,7 @@ class Surrogate:
         return html_table((), rows)
 
     def plot(self, axes: Any = None, **more: Any) -> Any:
-        """The map of mu~, see :func:`mumacro.plotting.plot_map`; needs matplotlib."""
+        """The map of mu~, see ``mumacro.plotting.plot_map``; needs matplotlib."""
         from mumacro.plotting import plot_map
 
         return plot_map(self, axes, **more)

@@ -34,7 +34,7 @@ class Server:
                 command, cwd=ROOT, env=variables, stdin=subprocess.DEVNULL, stdout=sink, stderr=subprocess.STDOUT,
                 start_new_session=True,
             )  # fmt: skip
-        while (found := re.search(r"unning on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))) is None:
+        while (found := re.search(r"(?i)running on http://[^ ]+:(\d+)[ /]", log.read_text("utf-8"))) is None:
             assert self.process.poll() is None, log.read_text("utf-8")
             self.in_time()
         self.port = int(found[1])

@@ -20,7 +20,7 @@ export const MODELS = {
 };
 export const REGIMES = {
   continuous: "continuous sliding", stick_slip: "stick–slip", static: "at rest", partial_slip: "partial slip",
-  reverse_slip: "slip to and fro",
+  reverse_slip: "slip back and forth",
 };
 
 /** What names.json says: `knows` (what the host of the page can do), the geometries of a contact, their arguments. */
