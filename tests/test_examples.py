@@ -22,7 +22,7 @@ CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
     "least_power.py", "casadi_least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py",
-    "mass_on_belt.py", "c",
+    "mass_on_belt.py", "demo.py", "friction.ipynb", "c",
 }  # fmt: skip
 
 

@@ -100,7 +100,7 @@ def test_steps_in_c_are_those_of_python(library) -> None:
 
 @pytest.mark.parametrize(
     ("bad", "error"),
-    [({"springs": 0}, -3), ({"dx": math.nan}, -3), ({"dy": math.inf}, -3), ({"mu0": -1.0}, 1), ({"Fz": -1.0}, 2),
+    [({"springs": 0}, -5), ({"dx": math.nan}, -5), ({"dy": math.inf}, -5), ({"mu0": -1.0}, 1), ({"Fz": -1.0}, 2),
      ({"Fz": math.inf}, 2), ({"k": math.inf}, 3), ({"k": math.nan}, 3)],
 )  # fmt: skip
 def test_a_bad_step_moves_nothing_and_says_why(library, bad, error) -> None:
@@ -111,8 +111,8 @@ def test_a_bad_step_moves_nothing_and_says_why(library, bad, error) -> None:
     assert (list(held), list(sums)) == ([1.0] * 4, [5.0, 6.0])
     assert library.mumacro_element_step(1, 0.3, 10.0, 1e6, 0.0, 0.0, None, sums) == -1
     said = library.mumacro_error_text(error).decode()
-    assert said.startswith({-3: "dx and dy must be finite", 1: "mu0", 2: "Fz", 3: "k"}[error])
-    assert library.mumacro_error_text(-4) == b"there is no such error"
+    assert said.startswith({-5: "dx and dy must be finite", 1: "mu0", 2: "Fz", 3: "k"}[error])
+    assert library.mumacro_error_text(-6) == b"there is no such error"
     assert library.mumacro_error_text(-1) == b"there is no place for the answer"
 
 

@@ -64,7 +64,8 @@ def compiled(texts: dict[str, str], command: list[str]) -> bytes:
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         for name, text in texts.items():
             Path(folder, name).write_text(text, "ascii")
-        words = [*command, "-o", "made"]
+        # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
+        words = [*command, f"-I{folder}", "-o", "made"]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         if done.returncode != 0:
             raise CompilerError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")

@@ -5,6 +5,11 @@
 
 #define MU_STEP 2e-3
 
+/* e^x - 1 to rounding for |x| <= 4 MU_STEP. */
+static double mu_growth(double x) {
+    return x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0)))));
+}
+
 static void mu_partials(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
                         double *along_v, double *along_y) {
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
@@ -40,7 +45,7 @@ static void mu_bend(const mumacro_data *data, int quantity, double v, double y, 
         const double at = side ? sign * i : i - 2;
         double slopes[2];
         if (weight == 0.0) continue;
-        mu_slopes_beside(data, quantity, v, y, expm1(at * step_v), expm1(at * step_y), slopes);
+        mu_slopes_beside(data, quantity, v, y, mu_growth(at * step_v), mu_growth(at * step_y), slopes);
         out[0] += weight * slopes[0];
         out[1] += weight * slopes[1];
     }
@@ -49,18 +54,25 @@ static void mu_bend(const mumacro_data *data, int quantity, double v, double y, 
 /* The direction of a step that stays on this side of the border; 0 where both do. */
 static int mu_free_side(const mumacro_data *data, double v, double y, double step_v, double step_y) {
     const int here = v < mu_border_at(data, y);
-    const int up = here == (v * exp(2.0 * step_v) < mu_border_at(data, y * exp(2.0 * step_y)));
-    const int down = here == (v * exp(-2.0 * step_v) < mu_border_at(data, y * exp(-2.0 * step_y)));
-    return up && down ? 0 : up ? 1 : -1;
+    int same[2];
+    for (int i = 0; i < 2; ++i) {
+        const double way = i ? 2.0 : -2.0;
+        const double crit = mu_border_at(data, y * (1.0 + mu_growth(way * step_y)));
+        same[i] = here == (v * (1.0 + mu_growth(way * step_v)) < crit);
+    }
+    return same[0] && same[1] ? 0 : same[1] ? 1 : -1;
 }
 
 /* d2/dv~2, d2/dv~ dy~, d2/dy~2; NaN where v~ = 0, or a point is illegal or infinite. */
 static void mu_bends_at(const mumacro_data *data, int quantity, double v, double given, double *out) {
-    /* at y~ = 0 the limit y~ -> 0; next to the corner v~ -> 0, y~ = 1 all changes over |y~ - 1| + v~^(2/3) */
-    const double y = mu_max(given, 1e-6), scale = mu_min(1.0, fabs(y - 1.0) + cbrt(v * v)), step = MU_STEP * scale;
-    double along_v[2], along_y[2], here[2];
+    /* at y~ = 0 the limit y~ -> 0; next to the corner v~ -> 0, y~ = 1 all changes over |y~ - 1| + phi^2, phi of
+     * y~ = 1, the cube root of pi v~ */
+    const double y = mu_max(given, 1e-6);
+    double along_v[2], along_y[2], here[2], phi, step;
     out[0] = out[1] = out[2] = NAN;
     if (!(v > 0.0 && v < HUGE_VAL && given >= 0.0 && given < HUGE_VAL)) return;
+    phi = mu_normal_form_root(mu_min(v, 1.0), 0.0);
+    step = MU_STEP * mu_min(1.0, fabs(y - 1.0) + 0.5 * phi * phi);
     mu_slopes_beside(data, quantity, v, y, 0.0, 0.0, here);
     mu_bend(data, quantity, v, y, MU_STEP, 0.0, mu_free_side(data, v, y, MU_STEP, 0.0), along_v);
     mu_bend(data, quantity, v, y, 0.0, step, mu_free_side(data, v, y, 0.0, step), along_y);

@@ -43,4 +43,4 @@ def wasm(table: Table) -> bytes:
     command = compiler()
     if command is None:
         raise WasmError("WebAssembly needs zig (pip install ziglang), or clang with lld; neither is installed")
-    return compiled({"mumacro.h": header_text(table)}, [*command, *_OPTIONS, str(_HERE / "module.c"), "-I."])
+    return compiled({"mumacro.h": header_text(table)}, [*command, *_OPTIONS, str(_HERE / "module.c")])
