@@ -70,7 +70,7 @@ _EXAMPLE: dict[str, Any] = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E":
 def _kind(name: str) -> Any:
     about = ARGUMENTS[name]
     kind: Any = Literal[about.choices] if about.choices else float if name.startswith("nu") else Positive
-    kind = Positive | Annotated[str, Field(pattern=RIGID)] if name in _MODULI else kind
+    kind = Positive | Annotated[str, Field(pattern=f"^{RIGID}$")] if name in _MODULI else kind
     of = [geometry for geometry, known in GEOMETRIES.items() if name in known.arguments]
     told = f"{about.meaning}{f' [{about.unit}]' if about.unit else ''}{f'; of: {chr(44).join(of)}' if of else ''}"
     return (kind, Field(description=told)) if name in ("E", "nu") else (kind | None, Field(None, description=told))
