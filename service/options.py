@@ -57,6 +57,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 _STRICT = ConfigDict(strict=True, extra="forbid")
+_NUMBER = r"[0-9]{1,9}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?"
+_RANGE = rf"^{_NUMBER}\.\.{_NUMBER}$"
 NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
 Model = TypeVar("Model", bound="Choice")
 Asking = TypeVar("Asking", bound="Options")
@@ -100,7 +102,7 @@ def input_fields(
         fields["k_range"] = (list[Positive] | None, bounded(BOUND, "In place of k: [low, high] [N/m]", None))
     else:
         kind, info = fields["k"]
-        fields["k"] = (kind | Annotated[str, Field(pattern=r"^.+\.\..+$")], info)
+        fields["k"] = (kind | Annotated[str, Field(pattern=_RANGE)], info)
     return fields
 
 
