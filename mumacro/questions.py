@@ -24,7 +24,7 @@ from mumacro.command import (
 )  # fmt: skip
 from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
-from mumacro.inputs import NAMES, RAD_PER_CYCLE, unit_of
+from mumacro.inputs import NAMES, field_of, unit_of
 from mumacro.inverse import solve_for
 from mumacro.law import approximations, friction_law, sweep_values
 
@@ -37,11 +37,6 @@ OUT = "write the result there: a picture, .png, .svg or .pdf, or .csv"
 CURVE = 400  # points of a curve in a picture
 ONE_K = "one k is needed: over an interval of it a wanted mu_macro has no single answer; solve for both ends"
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
-
-
-def _inner(name: str) -> tuple[str, float]:
-    """The input of the model behind a name, and what one unit of the name is of it."""
-    return ("omega", RAD_PER_CYCLE) if name == "f" else (name, 1.0)
 
 
 def law(words: Sequence[str]) -> str:
@@ -68,7 +63,7 @@ def law(words: Sequence[str]) -> str:
     ends = ends or [end for end in (chosen.start, chosen.stop) if end is not None]
     if len(ends) != 2:
         raise UsageError(f"give the first and the last value: --along {along} LOW HIGH")
-    (inner, scale), unit = _inner(along), unit_of(along)
+    (inner, scale), unit = field_of(along), unit_of(along)
     case = read_case([*chosen.words, *known], kind, [along])
     start, stop = (scale * end for end in command.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
@@ -113,7 +108,7 @@ def solve(words: Sequence[str]) -> str:
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     parser.add_argument("-o", "--out", type=Path, help=OUT)
     chosen = parser.parse_intermixed_args(words)
-    unknown, (inner, scale), unit = chosen.unknown, _inner(chosen.unknown), unit_of(chosen.unknown)
+    unknown, (inner, scale), unit = chosen.unknown, field_of(chosen.unknown), unit_of(chosen.unknown)
     kind = kind_in(chosen)
     if unknown not in kind.columns:
         raise UsageError(f"{unknown} does not belong to --direction {chosen.direction}: {', '.join(kind.columns)} do")

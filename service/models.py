@@ -1,15 +1,35 @@
 """Models of answers, for OpenAPI: the columns come from the registry of :mod:`service.answers`."""
 
+from collections.abc import Iterable
+from functools import cache
 from typing import Any, Literal
 
 from pydantic import BaseModel, Field, create_model
 
 from .answers import DEFAULT, INTERVAL, QUANTITIES, Part, nested, of_amplitude
+from .quantities import INCLUDES
 
 __all__ = [
     "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
-    "TableLabel", "included",
+    "TableLabel", "default", "grouped", "included", "model", "optional", "told",
 ]  # fmt: skip
+
+_create: Any = create_model
+
+
+def model(name: str, text: str, *bases: type[BaseModel], **members: Any) -> Any:
+    """A model that is described and never made."""
+    return _create(name, __base__=bases or None, __doc__=text, **members)
+
+
+def told(kind: Any, text: str) -> tuple[Any, Any]:
+    """A member with its meaning."""
+    return kind, Field(description=text)
+
+
+def optional(kind: Any, text: str) -> tuple[Any, Any]:
+    """A member that may be left out."""
+    return kind | None, Field(None, description=text)
 
 
 class TableLabel(BaseModel):
@@ -39,50 +59,46 @@ class _BatchEnd(Answered):
     n_errors: int = Field(description="Number of bad cases, listed or not")
 
 
-def _kind(part: Part, listed: bool, null: bool) -> Any:
-    kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else part.kind
+def _kind(part: Part, listed: bool, null: bool = True) -> Any:
+    kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else str if part.names else float
     kind = kind | None if null else kind
     return list[kind] if listed else kind
 
 
 def default(listed: bool) -> dict[str, Any]:
     """The default outputs as members of a model."""
-    return {
-        part.path: (_kind(part, listed, listed or part.path == "error_bound"), Field(description=part.described))
-        for part in DEFAULT
-    } | {
-        part.path: (
-            _kind(part, listed, True) | None,
-            Field(None, description=f"Only for an interval. {part.described}"),
-        )
-        for part in INTERVAL
+    members = {
+        part.path: told(_kind(part, listed, listed or part.path == "error_bound"), part.described) for part in DEFAULT
     }
+    ends = {part.path: optional(_kind(part, listed), f"Only for an interval. {part.described}") for part in INTERVAL}
+    return members | ends
 
 
-def included(listed: bool) -> dict[str, Any]:
-    """Members that ``include`` adds to a model of an answer."""
+def grouped(parts: Iterable[Part], listed: bool, text: str) -> dict[str, Any]:
+    """Columns that are there if requested as members of a model, those with a dot in their path in models of theirs."""
+    members: dict[str, Any] = {}
+    for part in parts:
+        either = {one.path: one for one in (part, of_amplitude(part))}
+        make = told if len(either) == 1 else optional  # else there is one of the two
+        members |= {path: make(_kind(one, listed), one.described) for path, one in either.items()}
     fields: dict[str, Any] = {}
-    for quantity in QUANTITIES.values():
-        kinds: dict[str, Any] = {}
-        for part in quantity.parts:
-            kinds[part.path] = (_kind(part, listed, True), Field(description=part.described))
-            other = of_amplitude(part)
-            if other != part:  # there is one of them
-                for one in (part, other):
-                    kinds[one.path] = (_kind(one, listed, True) | None, Field(None, description=one.described))
-        for name, found in nested(kinds).items():
-            if isinstance(found, dict):
-                title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
-                model: Any = create_model(title, __doc__=f"{quantity.text}.", **found)
-                fields[name] = (model | None, Field(None, description="Only if requested"))
-            else:
-                kind, told = found
-                fields[name] = (kind | None, Field(None, description=f"Only if requested. {told.description}"))
+    for name, found in nested(members).items():
+        if isinstance(found, dict):
+            title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
+            fields[name] = optional(model(title, f"{text}.", **found), "Only if requested")
+        else:
+            fields[name] = optional(found[0], f"Only if requested. {found[1].description}")
     return fields
 
 
-_made: Any = create_model
-Result: type[BaseModel] = _made("Result", __doc__="Answer to one case.", **default(False), **included(False))
+@cache
+def included(listed: bool) -> dict[str, Any]:
+    """Members that ``include`` adds to a model of an answer."""
+    found = (grouped(QUANTITIES[name].parts, listed, QUANTITIES[name].text) for name in INCLUDES)
+    return {name: member for members in found for name, member in members.items()}
+
+
+Result = model("Result", "Answer to one case.", **default(False), **included(False))
 
 
 class ModelRow(BaseModel):
@@ -93,18 +109,18 @@ class ModelRow(BaseModel):
     effect: float | None = Field(description="Relative change of mu_macro; null: not known")
 
 
-_about: Any = (list[ModelRow] | None, Field(None, description="Only if requested. What the model leaves out here"))
-_digits: Any = (int | None, Field(None, description="Only with model. Digits of mu_macro that k supports"))
-CaseAnswer: type[BaseModel] = _made(
-    "CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.", model=_about, digits=_digits
-)
-ColumnsAnswer: type[BaseModel] = _made(
-    "ColumnsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in columns, order kept; null: a bad case.",
+CaseAnswer = model(
+    "CaseAnswer", "Answer to one case.", Result, Answered,
+    model=optional(list[ModelRow], "Only if requested. What the model leaves out here"),
+    digits=optional(int, "Only with model. Digits of mu_macro that k supports"),
+)  # fmt: skip
+ColumnsAnswer = model(
+    "ColumnsAnswer", "Answer to a batch in columns, order kept; null: a bad case.", _BatchEnd,
     **default(True), **included(True),
 )  # fmt: skip
-RowsAnswer: type[BaseModel] = _made(
-    "RowsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in rows, order kept; null where a case is bad.",
-    results=(list[Result | None], ...),  # type: ignore[valid-type]
+RowsAnswer = model(
+    "RowsAnswer", "Answer to a batch in rows, order kept; null where a case is bad.", _BatchEnd,
+    results=(list[Result | None], ...),
 )  # fmt: skip
 
 

@@ -162,7 +162,7 @@ def test_what_does_not_belong_is_refused_by_name(client, problem, changed, field
 
 
 def test_included_quantities_are_the_librarys(client, surrogate):
-    include = ["groups", "limits", "gradient", "stick_fraction", "std", "regime_certain"]
+    include = ["groups", "limits", "gradient", "stick_fraction", "std"]
     for options, inputs in ASKED.values():
         if "k_low" in inputs or inputs["k"] == "rigid":
             continue

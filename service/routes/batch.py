@@ -12,10 +12,12 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
+from mumacro.errors import MumacroError
+
 from ..answers import answer_case, cost_of
 from ..case import Columns
 from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
-from ..options import OPTIONS, Options, OptionsQuery, options_of, read_form
+from ..options import Options, options_of, read_form
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..wire import Batch, Form, forms
 from ..wire.json import decode, dump
@@ -70,7 +72,7 @@ class _Answer(Response):
 
     def _options_of_query(self) -> dict[str, Any]:
         given = given_in_query(self._request)
-        _, rest, faults = options_of(Options, given, OptionsQuery.model_fields, parameter=True)
+        _, rest, faults = options_of(Options, given, parameter=True)
         faults += [FieldFault((name,), "is no option; inputs belong in the body", parameter=True) for name in rest]
         if faults:
             refuse(faults)
@@ -79,7 +81,7 @@ class _Answer(Response):
     def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
         """The batch with the options of query and body together."""
         self._only_once(given)
-        options, _, faults = options_of(Options, {**self._query, **given}, OPTIONS)
+        options, _, faults = options_of(Options, {**self._query, **given})
         if options is None:
             refuse(faults)
         options.check(columns.asked)
@@ -161,7 +163,7 @@ class _Answer(Response):
                 yield from form.write(self._batch(columns, given))
             else:
                 yield self._case(decode(line))
-        except RequestError as error:
+        except MumacroError as error:
             scope = {**self._request.scope, "path": f"{self._request.scope['path']}#line={number}"}
             yield dump(document_of(error, scope))
         yield b"\n"
@@ -218,7 +220,7 @@ _ANSWER = {
 }
 ENDPOINTS = [
     Endpoint(
-        PATH, "POST", post_mu_macro_batch, "Macroscopic friction of many cases", query=OptionsQuery,
+        PATH, "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,
         request={"required": True, "content": {form.media_type: form.body for form in forms().values()}},
         content={200: _ANSWER},
     )

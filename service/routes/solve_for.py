@@ -1,36 +1,27 @@
 """The inverse problem: ``POST /v1/solve-for``."""
 
-import itertools
-from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, Field, create_model, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.contact import AMPLITUDE
-from mumacro.inputs import RAD_PER_CYCLE
+from mumacro.inputs import field_of, unit_of
 from mumacro.inverse import Solution, solve_for
 
 from ..answers import DEFAULT, REGIME_NAMES, answer_columns, nested, parts_of
-from ..case import INPUTS, Asked
-from ..models import Answered, included
-from ..options import UNITS, NotNegative, Options, bounded, example, input_fields, read_form, relation
-from ..tables import LoadedTable
+from ..models import Answered, included, model, optional, told
+from ..options import NAMES, Five, Name, NotNegative, Options, bounded, example, relation
 from ..wire.json import dump
-from . import Endpoint, given_in_body, in_thread, reply
+from . import Asking, Endpoint, in_thread, reply
 
-__all__ = ["ENDPOINTS", "FIVE", "FIVE_QUERY", "NAMES", "Name", "in_si", "per_value"]
+__all__ = ["ENDPOINTS"]
 
 MAX_TARGETS = 10_000
 _NO_LIMIT = 1e300
-NAMES = (*INPUTS, AMPLITUDE)
-Name: Any = Literal[NAMES]
-FIVE_QUERY: Any = input_fields(optional=INPUTS, null=False, shown=["k"], query=True)
-FIVE: Any = create_model("_Five", **input_fields(optional=INPUTS, shown=[name for name in example if name != "v0"]))
-Regime: Any = Literal[tuple(dict.fromkeys(REGIME_NAMES))]
-Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
+_Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
+_Quantity = Literal["mu_macro", "mu_ratio"]
 _listed = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
 
 
@@ -38,10 +29,10 @@ class SolveForOptions(Options):
     """What is asked beside the five known inputs."""
 
     unknown: Name = bounded(f"one of {', '.join(NAMES)}", "The input to solve for")
-    target: Annotated[Targets, _listed] = bounded(
+    target: Annotated[_Targets, _listed] = bounded(
         f"a number, finite and >= 0, or a list of 1 to {MAX_TARGETS} of them", "Wanted value [-]"
     )
-    quantity: Literal["mu_macro", "mu_ratio"] = bounded(
+    quantity: _Quantity = bounded(
         "mu_macro or mu_ratio", "What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)", "mu_macro"
     )
     range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = bounded(
@@ -57,45 +48,28 @@ class SolveForOptions(Options):
 
 async def post_solve_for(request: Request) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
-    given = await given_in_body(request)
-    form, case, _ = read_form(SolveForOptions, given, [given["unknown"]] if given.get("unknown") in NAMES else [])
-    table = request.app.state.tables.pick(form.tolerance)
-    return await in_thread(request, lambda: reply(dump(_answer(table, form, case))))
+    found = await Asking.of(request, SolveForOptions, "unknown")
+    return await in_thread(request, lambda: reply(dump(_answer(found))))
 
 
-def in_si(name: str) -> str:
-    """The field of an input: omega for f."""
-    return "omega" if name == "f" else name
-
-
-def per_value(name: str) -> float:
-    """Factor from a value of this name to its field: omega [rad/s] from f [Hz]."""
-    return RAD_PER_CYCLE if name == "f" else 1.0
-
-
-def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -> dict[str, Any]:
-    per = per_value(form.unknown)
+def _answer(found: Asking) -> dict[str, Any]:
+    (table, form, case, asked), (name, per) = found, field_of(found.form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    names: Any = form.kind.names
-    given: Any = case
-    if "k_low" in case:  # which is refused, by the name that the user gave
-        given = {**case, "k_range": (case["k_low"], case["k_high"])}
-    solution = solve_for(table.surrogate, in_si(form.unknown), [x * unit for x in form.target], given, within, **names)
-    more = _included(table, form, solution, case)
+    if asked.interval:  # which is refused, by the name that the user gave
+        case = {**case, "k_range": (case["k_low"], case["k_high"])}
+    solution = solve_for(table.surrogate, name, [x * unit for x in form.target], case, within, **asked.kind.names)
+    reach, more = solution.reach, iter(_included(found, name, solution))
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
-        told = [
-            {**root._asdict(), "value": root.value / per, "low": root.low / per, "high": root.high / per, **next(more)}
-            for root in roots
-        ]
-        results.append({"target": target, "roots": told})
-        if not roots:
-            results[-1]["reason"] = _reason(form, target, solution, unit)
-    reach = solution.reach
+        in_unit = ({key: getattr(root, key) / per for key in ("value", "low", "high")} for root in roots)
+        shown = [{**root._asdict(), **ends, **next(more)} for root, ends in zip(roots, in_unit, strict=True)]
+        results.append(
+            {"target": target, "roots": shown} | ({} if roots else {"reason": _reason(form, target, solution, unit)})
+        )
     return {
         "unknown": form.unknown,
-        "unit": UNITS[form.unknown],
+        "unit": unit_of(form.unknown),
         "quantity": form.quantity,
         "range": [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per],
         "reachable": {
@@ -107,19 +81,17 @@ def _answer(table: LoadedTable, form: SolveForOptions, case: dict[str, float]) -
     }  # fmt: skip
 
 
-def _included(
-    table: LoadedTable, form: SolveForOptions, solution: Solution, case: dict[str, float]
-) -> Iterator[dict[str, Any]]:
+def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
+    (table, form, case, asked), include = found, found.form.names()
     values = np.array([root.value for roots in solution.roots for root in roots])
-    asked = Asked(form.kind)
-    parts = parts_of(form.names(), asked)[len(DEFAULT) :]
-    if not parts or values.size == 0:
-        return itertools.repeat({})
-    six = [values if name == in_si(form.unknown) else np.array([case[name]]) for name in asked.fields]
-    found, _ = answer_columns(table.surrogate, six, values.size, form.names(), form.deviations(), asked)
-    rows = zip(*(part.values(found[part.path]) for part in parts), strict=True)
-    return (nested(dict(zip((part.path for part in parts), row, strict=True))) for row in rows)
+    if not include or not values.size:
+        return [{}] * values.size
+    six = [values if name == unknown else np.array([case[name]]) for name in asked.fields]
+    answer, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations(), asked)
+    paths = [part.path for part in parts_of(include, asked)[len(DEFAULT) :]]
+    rows = zip(*(answer[path].tolist() for path in paths), strict=True)
+    return [nested(dict(zip(paths, row, strict=True))) for row in rows]
 
 
 def _reason(form: SolveForOptions, target: float, solution: Solution, unit: float) -> str:
@@ -133,64 +105,37 @@ def _reason(form: SolveForOptions, target: float, solution: Solution, unit: floa
 
 # --- models -------------------------------------------------------------------------------------------
 
-_target: Any = (
-    NotNegative | Targets,
-    Field(description=f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}"),
-)
-SolveForRequest: Any = create_model(
-    "SolveForRequest", __base__=(SolveForOptions, FIVE), __doc__="Which value of one input gives a wanted mu_macro.",
-    target=_target,
+SolveForRequest = model(
+    "SolveForRequest", "Which value of one input gives a wanted mu_macro.", SolveForOptions, Five,
+    target=told(NotNegative | _Targets, f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}"),
 )  # fmt: skip
 SolveForRequest.model_config["json_schema_extra"] = {
     "examples": [{name: value for name, value in example.items() if name != "y0"} | {"unknown": "y0", "target": 0.15}]
 }
-
-
-class _Root(BaseModel):
-    """One value of the unknown, and the answer there."""
-
-    value: float = Field(description="The unknown [SI]")
-    low: float = Field(description="From low ...")
-    high: float = Field(description="... to high, mu_macro is the target within the table's error bound")
-    mu_macro: float = Field(description="Value of the table there [-]")
-    regime: Regime
-
-
-Root: Any = create_model("Root", __base__=_Root, __doc__=_Root.__doc__, **included(False))
-
-
-class TargetAnswer(BaseModel):
-    """All values that give one target."""
-
-    target: float
-    roots: list[Root] = Field(description="Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)")
-    reason: str | None = Field(None, description="Why there is no root")
-
-
-class Reachable(BaseModel):
-    """Range of mu_macro for all values of the unknown in its range."""
-
-    min: float
-    max: float
-    min_included: bool = Field(description="false: approached, never reached")
-    max_included: bool
-
-
-class SolveForAnswer(Answered):
-    """Answer to the inverse problem."""
-
-    unknown: Name
-    unit: str
-    quantity: Literal["mu_macro", "mu_ratio"]
-    range: list[float | None] = Field(description="The searched range [SI]; null: without limit")
-    reachable: Reachable
-    results: list[TargetAnswer] = Field(description="One per target, in order")
-
-
+Root = model(
+    "Root", "One value of the unknown, and the answer there.",
+    value=told(float, "The unknown [SI]"), low=told(float, "From low ..."),
+    high=told(float, "... to high, mu_macro is the target within the table's error bound"),
+    mu_macro=told(float, "Value of the table there [-]"), regime=(Literal[tuple(dict.fromkeys(REGIME_NAMES))], ...),
+    **included(False),
+)  # fmt: skip
+TargetAnswer = model(
+    "TargetAnswer", "All values that give one target.", target=(float, ...),
+    roots=told(list[Root], "Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"),
+    reason=optional(str, "Why there is no root"),
+)  # fmt: skip
+Reachable = model(
+    "Reachable", "Range of mu_macro for all values of the unknown in its range.", min=(float, ...), max=(float, ...),
+    min_included=told(bool, "false: approached, never reached"), max_included=(bool, ...),
+)  # fmt: skip
+SolveForAnswer = model(
+    "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=(Name, ...), unit=(str, ...),
+    quantity=(_Quantity, ...), range=told(list[float | None], "The searched range [SI]; null: without limit"),
+    reachable=(Reachable, ...), results=told(list[TargetAnswer], "One per target, in order"),
+)  # fmt: skip
 ENDPOINTS = [
     Endpoint(
-        "/v1/solve-for", "POST", post_solve_for,
-        "The value of one input that gives a wanted mu_macro",
-        body=SolveForRequest, model=SolveForAnswer,
+        "/v1/solve-for", "POST", post_solve_for, "The value of one input that gives a wanted mu_macro",
+        SolveForRequest, SolveForAnswer,
     )
 ]  # fmt: skip

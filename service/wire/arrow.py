@@ -127,7 +127,7 @@ def _record(batch: Batch, found: Any, source: Any, texts: list[str | None]) -> A
             codes = np.array([names.index(name) for name in part.names], np.int8)[column]
             arrays[part.path] = pa.DictionaryArray.from_arrays(pa.array(codes, mask=bad), names)
         else:
-            arrays[part.path] = pa.array(column != 0.0 if part.kind is bool else column, mask=np.isnan(column))
+            arrays[part.path] = pa.array(column, mask=np.isnan(column))
     arrays["error"] = pa.array(texts, pa.string())
     return pa.record_batch(arrays)
 

@@ -92,7 +92,7 @@ def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Col
         given = decode(text, large=True)
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
-    _, rest, faults = options_of(OptionsModel, given, NAMES)
+    _, rest, faults = options_of(OptionsModel, given)
     options = {name: given[name] for name in OPTIONS if given.get(name) is not None}
     kind = kind_in({**query, **options}) if not faults else SPRING
     return columns_of(rest, max_batch, NAMES, faults, kind), options
@@ -307,7 +307,7 @@ def _texts(part: Part, column: Any) -> bytes:
         # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
         texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)])
         return bytes(texts.take(column).tobytes().translate(None, b"\0")[:-1])
-    return dump(column if part.kind is float else part.values(column))[1:-1]
+    return dump(column)[1:-1]
 
 
 def _refs(*names: str) -> list[dict[str, Any]]:
