@@ -142,7 +142,9 @@ def checked(
     ``left_out`` are the inputs that the request asks for, which must not be given.  A k of null is a rigid contact in a
     single case; in a batch it is a gap.  ``known`` are all names that the request may have, for the advice on others.
     """
-    values, faults, names = dict[str, float](), list[FieldFault](), _NAMES
+    values: dict[str, float] = {}
+    faults: list[FieldFault] = []
+    names = _NAMES
     if asked != PLAIN:
         names, (given, faults) = frozenset(names_of(asked)), _with_ends(given)
     for name, value in given.items():

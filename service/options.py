@@ -5,7 +5,7 @@ What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) i
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from types import NoneType
 from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 
@@ -94,7 +94,7 @@ class Choice(BaseModel):
             raise relation(error.field, f"must be {error.bound}") from None
         return self
 
-    @property
+    @cached_property
     def kind(self) -> Kind:
         """Contact and direction."""
         return kind_of(self.contact, self.direction)
@@ -176,10 +176,10 @@ def options_of(
     model: type[Model], given: Mapping[str, Any], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
     """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
-    fields, without = _known(model)
-    own = {name: value for name, value in given.items() if name in fields}
-    if not own and without is not None:
+    fields, without = _of_model(model)
+    if without is not None and fields.isdisjoint(given):
         return without, given, []
+    own = {name: value for name, value in given.items() if name in fields}
     rest = {name: value for name, value in given.items() if name not in own}
     try:
         return model.model_validate(own), rest, []
@@ -188,11 +188,18 @@ def options_of(
 
 
 @cache
-def _known(model: Any) -> tuple[frozenset[str], Any]:
-    """The names of the options, and the options of a request that has none."""
+def _of_model(model: Any) -> tuple[frozenset[str], Any]:
+    """The names of the options, and the options of a request that has none; None where it must have some."""
+    without = None
     with suppress(ValidationError):
-        return frozenset(model.model_fields), model()
-    return frozenset(model.model_fields), None
+        without = model()
+    return frozenset(model.model_fields), without
+
+
+@cache
+def _known(model: type[BaseModel]) -> tuple[str, ...]:
+    """All names that a request with these options may have."""
+    return *NAMES, "k_range", *ENDS, *model.model_fields
 
 
 def kind_in(given: Mapping[str, Any]) -> Kind:
@@ -208,12 +215,12 @@ def read_form(
     form, rest, faults = options_of(model, given)
     if left_out:  # a null says the same
         rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
-    kind = SPRING
-    with suppress(InputError):  # which is among the faults
-        kind = kind_in(given)
+    kind = form.kind if form is not None else SPRING
+    if form is None:
+        with suppress(InputError):  # which is among the faults
+            kind = kind_in(given)
     asked = asked_of(rest, kind)
-    known = (*NAMES, "k_range", *ENDS, *model.model_fields)
-    values, more = checked(rest, left_out, null_is_rigid, known, asked)
+    values, more = checked(rest, left_out, null_is_rigid, _known(model), asked)
     if form is None or more:
         refuse([*faults, *more])
     form.check(asked, one)
@@ -275,7 +282,7 @@ def query_of(base: type[BaseModel], **more: Any) -> Any:
     for key, info in base.model_fields.items():
         kinds = [kind for kind in get_args(info.annotation) if kind is not NoneType]
         null = len(kinds) < len(get_args(info.annotation))
-        kind: Any = Union[(*kinds, _NO_NULL)] if null else info.annotation  # noqa: UP007
+        kind: Any = Union[(*kinds, _NO_NULL)] if null else info.annotation
         fields[key] = (kind | _Range if key == "k" else kind, info)
         if key in ("contact", "direction"):  # without a default, which clients would send beside that of a body
             fields[key] = (kind | _NO_NULL, bounded(str(info.json_schema_extra["bound"]), "", None))  # type: ignore[index]
