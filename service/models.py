@@ -11,15 +11,16 @@ from .quantities import INCLUDES
 
 __all__ = [
     "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
-    "TableLabel", "default", "grouped", "included", "model", "optional", "told",
+    "TableLabel", "default", "grouped", "included", "many", "model", "optional", "told",
 ]  # fmt: skip
 
 _create: Any = create_model
 
 
-def model(name: str, text: str, *bases: type[BaseModel], **members: Any) -> Any:
-    """A model that is described and never made."""
-    return _create(name, __base__=bases or None, __doc__=text, **members)
+def model(name: str, text: str, /, *bases: type[BaseModel], **members: Any) -> Any:
+    """A model that is described and never made; a member is a type, or what :func:`told` or :func:`optional` gives."""
+    given = {key: member if isinstance(member, tuple) else (member, ...) for key, member in members.items()}
+    return _create(name, __base__=bases or None, __doc__=text, **given)
 
 
 def told(kind: Any, text: str) -> tuple[Any, Any]:
@@ -27,42 +28,39 @@ def told(kind: Any, text: str) -> tuple[Any, Any]:
     return kind, Field(description=text)
 
 
-def optional(kind: Any, text: str) -> tuple[Any, Any]:
+def optional(kind: Any, text: str = "") -> tuple[Any, Any]:
     """A member that may be left out."""
-    return kind | None, Field(None, description=text)
+    return kind | None, Field(None, description=text or None)
 
 
-class TableLabel(BaseModel):
-    """The table that an answer came from."""
-
-    id: str = Field(description="Name of the table")
-    tolerance: float = Field(description="The error of mu_macro/mu0 [-] that it was built to")
+def many(kind: Any) -> Any:
+    """A list of a kind, or of a model."""
+    return list[kind]
 
 
-class Answered(BaseModel):
-    """The fields of every answer."""
+TableLabel = model(
+    "TableLabel", "The table that an answer came from.", id=told(str, "Name of the table"),
+    tolerance=told(float, "The error of mu_macro/mu0 [-] that it was built to"),
+)  # fmt: skip
+Answered = model("Answered", "The fields of every answer.", table=TableLabel, api_version=str)
+BatchFault = model(
+    "BatchFault", "Why one case of a batch has no result.", index=told(int, "Position in the batch, from 0"),
+    field=told(str | None, "The bad field; null when the case as a whole is bad"), reason=str,
+)  # fmt: skip
+_BatchEnd = model(
+    "_BatchEnd", "", Answered,
+    errors=told(many(BatchFault), "One entry per bad case, in order; the first 1000 of them"),
+    n_errors=told(int, "Number of bad cases, listed or not"),
+)  # fmt: skip
 
-    table: TableLabel
-    api_version: str
 
-
-class BatchFault(BaseModel):
-    """Why one case of a batch has no result."""
-
-    index: int = Field(description="Position in the batch, from 0")
-    field: str | None = Field(description="The bad field; null when the case as a whole is bad")
-    reason: str
-
-
-class _BatchEnd(Answered):
-    errors: list[BatchFault] = Field(description="One entry per bad case, in order; the first 1000 of them")
-    n_errors: int = Field(description="Number of bad cases, listed or not")
+# --- columns ------------------------------------------------------------------------------------------
 
 
 def _kind(part: Part, listed: bool, null: bool = True) -> Any:
     kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else str if part.names else float
     kind = kind | None if null else kind
-    return list[kind] if listed else kind
+    return many(kind) if listed else kind
 
 
 def default(listed: bool) -> dict[str, Any]:
@@ -101,17 +99,13 @@ def included(listed: bool) -> dict[str, Any]:
 Result = model("Result", "Answer to one case.", **default(False), **included(False))
 
 
-class ModelRow(BaseModel):
-    """One thing that the model leaves out, see docs/validity.md."""
-
-    row: str = Field(description="Its name")
-    text: str = Field(description="What it does here")
-    effect: float | None = Field(description="Relative change of mu_macro; null: not known")
-
-
+ModelRow = model(
+    "ModelRow", "One thing that the model leaves out, see docs/validity.md.", row=told(str, "Its name"),
+    text=told(str, "What it does here"), effect=told(float | None, "Relative change of mu_macro; null: not known"),
+)  # fmt: skip
 CaseAnswer = model(
     "CaseAnswer", "Answer to one case.", Result, Answered,
-    model=optional(list[ModelRow], "Only if requested. What the model leaves out here"),
+    model=optional(many(ModelRow), "Only if requested. What the model leaves out here"),
     digits=optional(int, "Only with model. Digits of mu_macro that k supports"),
 )  # fmt: skip
 ColumnsAnswer = model(
@@ -120,54 +114,27 @@ ColumnsAnswer = model(
 )  # fmt: skip
 RowsAnswer = model(
     "RowsAnswer", "Answer to a batch in rows, order kept; null where a case is bad.", _BatchEnd,
-    results=(list[Result | None], ...),
+    results=many(Result | None),
 )  # fmt: skip
-
-
-class TableAnswer(Answered):
-    """Properties of a table."""
-
-    id: str
-    tolerance: float
-    checksum: str = Field(description="SHA-256 of the table's content")
-    file: str
-    size_bytes: int
-    max_abs_error: float | None = Field(description="Largest verified absolute error of mu_macro/mu0 [-]")
-    max_rel_error: float | None = Field(description="Largest verified relative error of mu_macro [-]")
-    attributes: dict[str, Any] = Field(description="Root attributes of the file")
-    blocks: list[dict[str, Any]]
-    loaded: list[TableLabel] = Field(description="All loaded tables, tightest first")
-    service_version: str
-
-
-class Health(BaseModel):
-    """Answer of a health endpoint."""
-
-    status: Literal["alive", "ready"]
-    tables: list[TableLabel] | None = None
-    api_version: str
-    service_version: str
-
-
-class FieldProblem(BaseModel):
-    """One bad field."""
-
-    pointer: str | None = Field(None, description="JSON pointer into the body")
-    parameter: str | None = Field(None, description="Query parameter")
-    field: str
-    value: Any = Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")
-    reason: str
-    bound: str | None = None
-
-
-class Problem(BaseModel):
-    """Problem details, RFC 9457."""
-
-    type: str
-    title: str
-    status: int
-    detail: str
-    instance: str
-    request_id: str | None = None
-    errors: list[FieldProblem] | None = None
-    n_errors: int | None = None
+TableAnswer = model(
+    "TableAnswer", "Properties of a table.", Answered, id=str, tolerance=float,
+    checksum=told(str, "SHA-256 of the table's content"), file=str, size_bytes=int,
+    max_abs_error=told(float | None, "Largest verified absolute error of mu_macro/mu0 [-]"),
+    max_rel_error=told(float | None, "Largest verified relative error of mu_macro [-]"),
+    attributes=told(dict[str, Any], "Root attributes of the file"), blocks=list[dict[str, Any]],
+    loaded=told(many(TableLabel), "All loaded tables, tightest first"), service_version=str,
+)  # fmt: skip
+Health = model(
+    "Health", "Answer of a health endpoint.", status=Literal["alive", "ready"], tables=optional(many(TableLabel)),
+    api_version=str, service_version=str,
+)  # fmt: skip
+FieldProblem = model(
+    "FieldProblem", "One bad field.", pointer=optional(str, "JSON pointer into the body"),
+    parameter=optional(str, "Query parameter"), field=str,
+    value=(Any, Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")),
+    reason=str, bound=optional(str),
+)  # fmt: skip
+Problem = model(
+    "Problem", "Problem details, RFC 9457.", type=str, title=str, status=int, detail=str, instance=str,
+    request_id=optional(str), errors=optional(many(FieldProblem)), n_errors=optional(int),
+)  # fmt: skip

@@ -197,7 +197,7 @@ def _of_model(model: Any) -> tuple[frozenset[str], Any]:
 
 
 @cache
-def _known(model: type[BaseModel]) -> tuple[str, ...]:
+def _known(model: Any) -> tuple[str, ...]:
     """All names that a request with these options may have."""
     return *NAMES, "k_range", *ENDS, *model.model_fields
 

@@ -123,8 +123,8 @@ class Routes:
         answer = methods.get(scope["method"])
         if answer is None:
             allowed = ", ".join(sorted(methods))
-            detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
-            raise HTTPException(405, detail, headers={"Allow": allowed})
+            told = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
+            raise HTTPException(405, told, {"Allow": allowed})
         response = await answer(Request(scope, receive, send))
         await response(scope, receive, send)
 
@@ -148,9 +148,7 @@ class Asking(NamedTuple):
     asked: Asked
 
     @classmethod
-    async def of(
-        cls, request: Request, model: type[Options], wanted: str = "", one: bool = False
-    ) -> "Asking":  # fmt: skip
+    async def of(cls, request: Request, model: type[Options], wanted: str = "", one: bool = False) -> "Asking":
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
         given = await given_in_body(request) if request.method == "POST" else given_in_query(request)
         name = given.get(wanted, model.model_fields[wanted].default) if wanted else None
@@ -236,10 +234,11 @@ class _File(FileResponse):
     """A file, or a part of it; a range outside the file is answered with problem details."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        size = self.headers["content-length"]
+
         async def send_checked(message: Message) -> None:
             if message.get("status") == 416:
-                size = self.headers["content-length"]
-                raise HTTPException(416, f"the file has {size} bytes", headers={"Content-Range": f"bytes */{size}"})
+                raise HTTPException(416, f"the file has {size} bytes", {"Content-Range": f"bytes */{size}"})
             if message.get("status") == 400:
                 raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
             await send(message)
@@ -248,14 +247,9 @@ class _File(FileResponse):
 
 
 def file_answer(request: Request, path: Path, headers: Mapping[str, str], **options: Any) -> Response:
-    """A file, the part of it that Range requests, or 304 if the client has it already.
+    """A file, the part of it that Range requests, or 304 if the client has it already; OSError if it is gone.
 
     The ETag is that of the headers, or is made from the size and the modification time.
-
-    Raises
-    ------
-    OSError
-        The file is gone.
     """
     answer = _File(path, headers=headers, stat_result=path.stat(), **options)
     etag = answer.headers["etag"]

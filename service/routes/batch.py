@@ -37,9 +37,8 @@ class _Answer(Response):
     background = None
 
     def __init__(self, request: Request) -> None:
-        self._request = request
+        self._request, self._state = request, request.app.state
         self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
-        self._state = request.app.state
         self._work: Work = request.app.state.work
         self._limit: int = self._state.settings.max_body_bytes
         self._most: int = self._state.settings.max_batch
@@ -50,11 +49,14 @@ class _Answer(Response):
         del scope
         try:
             async with self._work.deadline():
-                self._query = self._options_of_query()
-                known = {
-                    name: form.media_type for form in forms().values() for name in (form.media_type, *form.aliases)
-                }
-                form = forms()[media_type_of(self._given, known)]
+                self._query = given_in_query(self._request)
+                _, rest, faults = options_of(Options, self._query, parameter=True)
+                told = "is no option; inputs belong in the body"
+                if faults := [*faults, *(FieldFault((name,), told, parameter=True) for name in rest)]:
+                    refuse(faults)
+                found = forms()
+                known = {name: form.media_type for form in found.values() for name in (form.media_type, *form.aliases)}
+                form = found[media_type_of(self._given, known)]
                 await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
             if self._placed:
@@ -70,28 +72,20 @@ class _Answer(Response):
             self._place()
         return await self._work.batches.run(work, cost)
 
-    def _options_of_query(self) -> dict[str, Any]:
-        given = given_in_query(self._request)
-        _, rest, faults = options_of(Options, given, parameter=True)
-        faults += [FieldFault((name,), "is no option; inputs belong in the body", parameter=True) for name in rest]
-        if faults:
-            refuse(faults)
-        return given
-
     def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
         """The batch with the options of query and body together."""
-        self._only_once(given)
-        options, _, faults = options_of(Options, {**self._query, **given})
+        options, _, faults = options_of(Options, self._both(given))
         if options is None:
             refuse(faults)
         options.check(columns.asked)
         table = self._state.tables.pick(options.tolerance, "tolerance" in self._query)
         return Batch(table, columns, options.names(), options.deviations(), count=self._state.metrics.cases)
 
-    def _only_once(self, given: Mapping[str, Any]) -> None:
-        twice = [name for name in given if name in self._query]
-        if twice:
+    def _both(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """What the query and the body give, each name once."""
+        if twice := [name for name in given if name in self._query]:
             refuse([FieldFault.of(name, "is given in the query and in the body", given[name]) for name in twice])
+        return {**given, **self._query}
 
     # --- bodies that are read whole -------------------------------------------------------------------
 
@@ -172,8 +166,7 @@ class _Answer(Response):
         """The answer to one case of a stream, where a null is a gap."""
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
-        self._only_once(given)
-        options, case, asked = read_form(Options, {**given, **self._query}, null_is_rigid=False)
+        options, case, asked = read_form(Options, self._both(given), null_is_rigid=False)
         table = self._state.tables.pick(options.tolerance)
         values, source = answer_case(table.surrogate, case, options.names(), options.deviations(), asked)
         self._state.metrics.case(table, source)

@@ -18,7 +18,7 @@ from mumacro.inputs import RIGID, is_rigid
 from mumacro.measured import STD, UNKNOWNS
 
 from ..case import INPUTS, Asked, not_finite, stranger
-from ..models import Answered, model, optional, told
+from ..models import Answered, many, model, optional, told
 from ..options import NAMES, Choice, Positive, bounded, input_fields, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
@@ -116,39 +116,37 @@ def _curve(fit: Fit) -> dict[str, Any] | None:
 _Numbers = Annotated[list[float], Field(min_length=1, max_length=MAX_POINTS)]
 _Stiffness = float | Literal["rigid"] | None
 _inputs = input_fields(INPUTS, null=False, listed=True, shown=())
-FitRequest = model(
-    "FitRequest", "Measured points as columns: lists of one length; a plain number holds for every point.", FitOptions,
-    **{name: _inputs[name] for name in NAMES} | {
-        "v0": told(Positive | _Numbers, "Sliding velocity of each point [m/s]"),
-        "mu_macro": told(_Numbers, "Measured mu_macro of each point [-]"),
-        "std": optional(Positive | _Numbers, "Standard deviation of mu_macro [-]"),
-    },
-)  # fmt: skip
+_columns = {name: _inputs[name] for name in NAMES} | {
+    "v0": told(Positive | _Numbers, "Sliding velocity of each point [m/s]"),
+    "mu_macro": told(_Numbers, "Measured mu_macro of each point [-]"),
+    "std": optional(Positive | _Numbers, "Standard deviation of mu_macro [-]"),
+}
+_text = "Measured points as columns: lists of one length; a plain number holds for every point."
+FitRequest = model("FitRequest", _text, FitOptions, **_columns)
 _points = {"v0": [0.001, 0.003, 0.01, 0.03, 0.1, 0.3], "mu_macro": [0.225, 0.228, 0.24, 0.265, 0.291, 0.298]}
 FitRequest.model_config["json_schema_extra"] = {"examples": [{**_points, "Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}]}
 FittedCurve = model(
     "FittedCurve", "The fitted law over v0, with its 95 % band.", v0=told(list[float], "[m/s]"),
-    mu_macro=(list[float], ...), low=(list[float | None], ...), high=(list[float | None], ...),
+    mu_macro=list[float], low=list[float | None], high=list[float | None],
 )  # fmt: skip
 Interval = model(
     "Interval", "What the points say of each unknown; those that were not unknown are left out.",
-    k=(list[_Stiffness] | None, None), mu0=(list[float | None] | None, None),
+    k=optional(list[_Stiffness]), mu0=optional(list[float | None]),
 )  # fmt: skip
 FittedValues = model(
     "FittedValues", "k [N/m], or rigid, and mu0 [-], those that were unknown.",
-    k=(_Stiffness, None), mu0=(float | None, None),
+    k=optional(_Stiffness), mu0=optional(float),
 )  # fmt: skip
-Solution = model("Solution", "One minimum that the points allow.", FittedValues, chi2=(float, ...))
+Solution = model("Solution", "One minimum that the points allow.", FittedValues, chi2=float)
 FitAnswer = model(
-    "FitAnswer", "What measured points say about a contact.", Answered, values=(FittedValues, ...),
+    "FitAnswer", "What measured points say about a contact.", Answered, values=FittedValues,
     std=told(FittedValues, "Standard deviations; null: the points do not determine it, see warnings"),
     covariance=told(list[list[float | None]], "In the order of values; null: not determined"),
     interval=told(Interval, "95 % intervals [low, high]; k may be rigid, null: without bound"),
     residuals=told(list[float], "Measured minus fitted mu_macro, of each point [-]"),
-    chi2=(float, ...), reduced_chi2=told(float | None, "null: no point more than unknowns"),
-    solutions=told(list[Solution], "All minima within 95 %, best first"),
-    warnings=told(list[str], "What the points do not determine"),
-    contact=(ContactName, ...), direction=(DirectionName, ...),
+    chi2=float, reduced_chi2=told(float | None, "null: no point more than unknowns"),
+    solutions=told(many(Solution), "All minima within 95 %, best first"),
+    warnings=told(list[str], "What the points do not determine"), contact=ContactName, direction=DirectionName,
     curve=told(FittedCurve | None, "null where other inputs than v0 vary, or v0 is 0 everywhere"),
 )  # fmt: skip
 ENDPOINTS = [

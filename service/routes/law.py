@@ -14,7 +14,7 @@ from mumacro.inputs import field_of, unit_of
 from mumacro.law import APPROXIMATIONS, BORDERS, Law, approximations, border_speeds, friction_law, sweep_values
 
 from ..answers import Part, answer_columns, nested, parts_of
-from ..models import Answered, default, grouped, included, model, told
+from ..models import Answered, default, grouped, included, many, model, told
 from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes, relation
 from ..wire.json import dump
 from . import Asking, Endpoint, in_thread, reply
@@ -123,9 +123,9 @@ BorderMark = model(
 )  # fmt: skip
 LawAnswer = model(
     "LawAnswer", "A friction law in columns.", Answered,
-    along=(Name, ...), unit=(str, ...), values=told(list[float], "The swept input [SI]"),
+    along=Name, unit=str, values=told(list[float], "The swept input [SI]"),
     **default(True), **included(True), **grouped(_MORE, True, "Beside the exact values"),
-    mu_static=told(list[float], _STATIC.described), border=told(list[BorderMark], "Up to two points inside the range"),
+    mu_static=told(list[float], _STATIC.described), border=told(many(BorderMark), "Up to two points inside the range"),
 )  # fmt: skip
 _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
 ENDPOINTS = [

@@ -11,7 +11,7 @@ from mumacro.inputs import field_of, unit_of
 from mumacro.inverse import Solution, solve_for
 
 from ..answers import DEFAULT, REGIME_NAMES, answer_columns, nested, parts_of
-from ..models import Answered, included, model, optional, told
+from ..models import Answered, included, many, model, optional, told
 from ..options import NAMES, Five, Name, NotNegative, Options, bounded, example, relation
 from ..wire.json import dump
 from . import Asking, Endpoint, in_thread, reply
@@ -113,25 +113,25 @@ SolveForRequest.model_config["json_schema_extra"] = {
     "examples": [{name: value for name, value in example.items() if name != "y0"} | {"unknown": "y0", "target": 0.15}]
 }
 Root = model(
-    "Root", "One value of the unknown, and the answer there.",
-    value=told(float, "The unknown [SI]"), low=told(float, "From low ..."),
+    "Root", "One value of the unknown, and the answer there.", value=told(float, "The unknown [SI]"),
+    low=told(float, "From low ..."),
     high=told(float, "... to high, mu_macro is the target within the table's error bound"),
-    mu_macro=told(float, "Value of the table there [-]"), regime=(Literal[tuple(dict.fromkeys(REGIME_NAMES))], ...),
+    mu_macro=told(float, "Value of the table there [-]"), regime=Literal[tuple(dict.fromkeys(REGIME_NAMES))],
     **included(False),
 )  # fmt: skip
 TargetAnswer = model(
-    "TargetAnswer", "All values that give one target.", target=(float, ...),
-    roots=told(list[Root], "Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"),
+    "TargetAnswer", "All values that give one target.", target=float,
+    roots=told(many(Root), "Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"),
     reason=optional(str, "Why there is no root"),
 )  # fmt: skip
 Reachable = model(
-    "Reachable", "Range of mu_macro for all values of the unknown in its range.", min=(float, ...), max=(float, ...),
-    min_included=told(bool, "false: approached, never reached"), max_included=(bool, ...),
+    "Reachable", "Range of mu_macro for all values of the unknown in its range.", min=float, max=float,
+    min_included=told(bool, "false: approached, never reached"), max_included=bool,
 )  # fmt: skip
 SolveForAnswer = model(
-    "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=(Name, ...), unit=(str, ...),
-    quantity=(_Quantity, ...), range=told(list[float | None], "The searched range [SI]; null: without limit"),
-    reachable=(Reachable, ...), results=told(list[TargetAnswer], "One per target, in order"),
+    "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=Name, unit=str, quantity=_Quantity,
+    range=told(list[float | None], "The searched range [SI]; null: without limit"), reachable=Reachable,
+    results=told(many(TargetAnswer), "One per target, in order"),
 )  # fmt: skip
 ENDPOINTS = [
     Endpoint(

@@ -65,11 +65,11 @@ StiffnessRequest.model_config |= ConfigDict(
 )
 StiffnessAnswer = model(
     "StiffnessAnswer", "What a contact of two bodies is; ``k`` and ``contact`` are those of a case.",
-    geometry=(str, ...), k=told(float, "Tangential stiffness while everything sticks [N/m]"),
+    geometry=str, k=told(float, "Tangential stiffness while everything sticks [N/m]"),
     k_normal=told(float, "Normal stiffness [N/m]"),
     half_width=told(float, "Radius of a circular contact, half width of a line contact [m]"),
     pressure=told(float, "Largest pressure [Pa]: Hertz's, or the mean one under a flat punch"),
-    contact=(ContactName, ...), api_version=(str, ...),
+    contact=ContactName, api_version=str,
 )  # fmt: skip
 ENDPOINTS = [
     Endpoint(
