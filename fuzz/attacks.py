@@ -23,7 +23,7 @@ from tests.serving import CASE, Server, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
 BATCH = "/v1/mu-macro/batch"
-EVERYTHING = ["groups", "limits", "regime_certain", "gradient", "stick_fraction", "power", "settling"]
+EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
 
 
 def connect(server: Server) -> socket.socket:

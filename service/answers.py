@@ -135,13 +135,12 @@ _COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 40.0}  # in t
 QUANTITIES: dict[str, Quantity] = {}
 
 
-def register(
-    name: str, text: str, parts: Sequence[Part], cost: float, slopes: bool = False, **lacks: str
-) -> Callable[[Any], Any]:
-    """Add the quantity that the decorated function computes."""
+def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
+    """Add the quantity that the decorated function computes: by its name, with its docstring as the text."""
 
     def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
-        QUANTITIES[name] = Quantity(name, text, tuple(parts), compute, cost, slopes, lacks)
+        name, text = compute.__name__, (compute.__doc__ or "").removesuffix(".")
+        QUANTITIES[name] = Quantity(name, text, parts, compute, cost, slopes, lacks)
         return compute
 
     return add
@@ -158,7 +157,7 @@ def of_amplitude(part: Part) -> Part:
     if not part.path.endswith(".y0"):
         return part
     path, text = part.path.removesuffix("y0") + AMPLITUDE, part.text.replace("y0", AMPLITUDE)
-    return replace(part, path=path, text=text, unit=part.unit.replace("(m)", "(N)"))
+    return replace(part, path=path, text=text, unit=part.unit.replace("m", "N"))
 
 
 def said(asked: Asked) -> list[str]:

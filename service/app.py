@@ -25,7 +25,7 @@ from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .observe import Metrics, Observe
 from .options import Case, CaseColumns
 from .problems import problem_of
-from .routes import Routes, batch, case, docs, fit, health, law, page, solve_for, stiffness, table
+from .routes import Routes, batch, case, contact, docs, health, page, questions, table
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 from .wire.json import dump
@@ -33,9 +33,7 @@ from .wire.json import dump
 __all__ = ["Application", "create_app"]
 
 ENDPOINTS = [
-    endpoint
-    for module in (case, batch, solve_for, law, stiffness, fit, table, health, docs, page)
-    for endpoint in module.ENDPOINTS
+    endpoint for module in (case, batch, questions, contact, table, health, docs, page) for endpoint in module.ENDPOINTS
 ]
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and oscillates across the "

@@ -267,14 +267,11 @@ def columns_of(
 
 def joined(name: str, parts: list[Any]) -> list[Any] | Array:
     """The parts of a column, arrays and lists, as one array, or as a list if one is a list."""
-    if any(isinstance(part, list) for part in parts):
-        lists = (part if isinstance(part, list) else _listed(name, part) for part in parts)
-        return list(chain.from_iterable(lists))
-    return parts[1] if len(parts) == 2 else np.concatenate(parts)
-
-
-def _listed(name: str, part: Array) -> list[Any]:
-    return [RIGID if name == "k" and value == math.inf else value for value in part.tolist()]
+    if not any(isinstance(part, list) for part in parts):
+        return parts[1] if len(parts) == 2 else np.concatenate(parts)
+    words = {math.inf: RIGID} if name == "k" else {}
+    lists = (part if isinstance(part, list) else [words.get(x, x) for x in part.tolist()] for part in parts)
+    return list(chain.from_iterable(lists))
 
 
 def _column(name: str, values: list[Any] | Array, reasons: dict[int, Reason]) -> Array:

@@ -1,26 +1,35 @@
-"""Models of answers, for OpenAPI: the columns come from the registry of :mod:`service.answers`."""
+"""Models for OpenAPI, and those of answers: the columns come from the registry of :mod:`service.answers`."""
 
 from collections.abc import Iterable
 from functools import cache
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from .answers import DEFAULT, INTERVAL, QUANTITIES, Part, nested, of_amplitude
 from .quantities import INCLUDES
 
 __all__ = [
-    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
-    "TableLabel", "default", "grouped", "included", "many", "model", "optional", "told",
+    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "Strict",
+    "TableAnswer", "TableLabel", "default", "grouped", "included", "many", "model", "optional", "told",
 ]  # fmt: skip
 
 _create: Any = create_model
 
 
-def model(name: str, text: str, /, *bases: type[BaseModel], **members: Any) -> Any:
-    """A model that is described and never made; a member is a type, or what :func:`told` or :func:`optional` gives."""
+class Strict(BaseModel):
+    """What has its own members only, of their own types."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
+def model(name: str, text: str, /, *bases: type[BaseModel], example: Any = None, **members: Any) -> Any:
+    """A model; a member is a type, or what :func:`told` or :func:`optional` gives."""
     given = {key: member if isinstance(member, tuple) else (member, ...) for key, member in members.items()}
-    return _create(name, __base__=bases or None, __doc__=text, **given)
+    found = _create(name, __base__=bases or None, __doc__=text, **given)
+    if example is not None:
+        found.model_config["json_schema_extra"] = {"examples": [example]}
+    return found
 
 
 def told(kind: Any, text: str) -> tuple[Any, Any]:

@@ -9,7 +9,7 @@ from functools import cache, cached_property
 from types import NoneType
 from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
@@ -21,13 +21,14 @@ from mumacro.interval import BOUND, ENDS
 
 from .answers import QUANTITIES, said
 from .case import LEAST, PLAIN, Asked, asked_of, bound_of, checked
+from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
 
 __all__ = [
     "MODEL", "NAMES", "OPTIONS", "Case", "CaseColumns", "CaseRequest", "Choice", "Five", "Name", "NotNegative",
     "Options", "Positive", "bounded", "example", "includes", "input_fields", "kind_in", "options_of", "query_of",
-    "read_form", "relation", "split_names",
+    "read_form", "relation",
 ]  # fmt: skip
 
 _TEXTS = {
@@ -56,11 +57,9 @@ def bounded(bound: str, text: str = "", default: Any = ..., **more: Any) -> Any:
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
-_STRICT = ConfigDict(strict=True, extra="forbid")
 _NUMBER = r"[0-9]{1,9}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?"
 _Range = Annotated[str, Field(pattern=rf"^{_NUMBER}\.\.{_NUMBER}$")]
 _NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
-_made: Any = create_model
 Model = TypeVar("Model", bound="Choice")
 Asking = TypeVar("Asking", bound="Options")
 
@@ -73,10 +72,8 @@ def relation(name: str, reason: str) -> PydanticCustomError:
 # --- options ------------------------------------------------------------------------------------------
 
 
-class Choice(BaseModel):
+class Choice(Strict):
     """Which contact and which table."""
-
-    model_config = _STRICT
 
     contact: ContactName = bounded(f"one of {', '.join(CONTACTS)}", "One spring, or a ball on a flat (Hertz)", "spring")
     direction: DirectionName = bounded(
@@ -112,7 +109,7 @@ _DEVIATE = [*INPUTS, AMPLITUDE]
 _std: Any = {name: (NotNegative, bounded("finite and >= 0", f"[{unit_of(name)}]", 0.0)) for name in _DEVIATE}
 
 
-class InputStd(_made("_InputStd", __config__=_STRICT, **_std)):  # type: ignore[misc]
+class InputStd(model("_InputStd", "", Strict, **_std)):  # type: ignore[misc]
     """Standard deviations of the inputs, in their units; independent errors are assumed; omega or f."""
 
     @model_validator(mode="after")
@@ -125,7 +122,7 @@ class InputStd(_made("_InputStd", __config__=_STRICT, **_std)):  # type: ignore[
 _include: Any = includes(MODEL, "for one case: what the model leaves out here, and the digits that k supports")
 
 
-class Options(_made("_Including", __base__=Choice, include=_include)):  # type: ignore[misc]
+class Options(model("_Including", "", Choice, include=_include)):  # type: ignore[misc]
     """The options of a request: everything but its cases."""
 
     std: InputStd | None = bounded("an object of numbers", "Standard deviations of the inputs, for include=std", None)
@@ -220,16 +217,11 @@ def read_form(
         with suppress(InputError):  # which is among the faults
             kind = kind_in(given)
     asked = asked_of(rest, kind)
-    values, more = checked(rest, left_out, null_is_rigid, _known(model), asked)
+    values, more = checked(rest, left_out, null_is_rigid, _known(model), asked)  # type: ignore[arg-type]
     if form is None or more:
         refuse([*faults, *more])
     form.check(asked, one)
     return form, values, asked
-
-
-def split_names(names: Any) -> Any:
-    """``include=a,b`` and ``include=a&include=b`` are the same."""
-    return [part.strip() for name in names for part in name.split(",")]
 
 
 # --- models of cases ----------------------------------------------------------------------------------
@@ -255,26 +247,21 @@ def input_fields(
     return fields
 
 
-Case: Any = _made(
-    "Case", __config__=ConfigDict(**_STRICT, json_schema_extra={"examples": [example]}),
-    __doc__="One case, in SI units; omega or f, exactly one of them.", **input_fields(),
-)  # fmt: skip
-CaseRequest: Any = _made(
-    "CaseRequest", __base__=(Options, Case), __doc__="One case and the options of its answer; omega or f."
+Case = model(
+    "Case", "One case, in SI units; omega or f, exactly one of them.", Strict, example=example, **input_fields()
 )
+CaseRequest = model("CaseRequest", "One case and the options of its answer; omega or f.", Options, Case)
 #: the inputs of a question about one of them, which is left out
-Five: Any = _made("Five", **input_fields(INPUTS, shown=[name for name in example if name != "v0"]))
-CaseColumns: Any = _made(
-    "CaseColumns", __base__=Options, __doc__="Cases as columns: lists of one length; a plain number holds for every "
-    "case.", **input_fields(null=False, listed=True, shown=()),
+Five = model("Five", "", **input_fields(INPUTS, shown=[name for name in example if name != "v0"]))
+CaseColumns = model(
+    "CaseColumns", "Cases as columns: lists of one length; a plain number holds for every case.", Options,
+    example={**example, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]},
+    **input_fields(null=False, listed=True, shown=()),
 )  # fmt: skip
-CaseColumns.model_config["json_schema_extra"] = {
-    "examples": [{**example, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]}]
-}
 
 
-def query_of(base: type[BaseModel], **more: Any) -> Any:
-    """The model of a query with the same members as a body, and ``more``.
+def query_of(base: type[BaseModel]) -> Any:
+    """The model of a query with the same members as a body.
 
     ``std`` becomes std_mu0, std_Fz, ...; k may be low..high in place of k_range; there is no null.
     """
@@ -291,4 +278,4 @@ def query_of(base: type[BaseModel], **more: Any) -> Any:
         for key in _DEVIATE:
             told = bounded("finite and >= 0", f"Standard deviation [{unit_of(key)}]", None)
             fields[f"std_{key}"] = ((_Hertz if key == "f" else NotNegative) | _NO_NULL, told)
-    return _made(f"{base.__name__.removesuffix('Request')}Query", __config__=_STRICT, **fields, **more)
+    return model(f"{base.__name__.removesuffix('Request')}Query", "", Strict, **fields)

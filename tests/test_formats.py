@@ -235,7 +235,7 @@ def test_eval_answers_files_of_every_format(tmp_path: Path, expected: list[Row],
 
 # --- what include adds ----------------------------------------------------------------------------------
 
-INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "regime_certain", "std"]
+INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
 
 
 def flat(document: Any, path: str = "") -> Row:
@@ -282,7 +282,7 @@ def value_of(cell: str, like: Any) -> Any:
     """A cell of CSV as the type of a value."""
     if cell == "" or isinstance(like, str):
         return cell or None
-    return cell.lower() == "true" if isinstance(like, bool) else float(cell)
+    return float(cell)
 
 
 # --- units ----------------------------------------------------------------------------------------------

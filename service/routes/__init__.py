@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..case import Asked
 from ..limits import SMALL_BODY, media_type_of, read_body
-from ..options import NAMES, Options, query_of, read_form, split_names
+from ..options import NAMES, Options, query_of, read_form
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import decode
@@ -189,7 +189,7 @@ def given_in_query(request: Request) -> dict[str, Any]:
     if twice:
         refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
     if names:
-        found["include"] = split_names(names)
+        found["include"] = [part.strip() for name in names for part in name.split(",")]
     return found
 
 

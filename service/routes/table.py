@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.errors import TableError
 
 from .. import __version__
-from ..models import TableAnswer
+from ..models import Strict, TableAnswer, model
 from ..options import Positive, bounded
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
@@ -19,12 +19,8 @@ from . import Endpoint, file_answer, given_in_query, reply
 __all__ = ["ENDPOINTS"]
 
 
-class Table(BaseModel):
-    """Choice of a table; without a tolerance, the tightest."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-    tolerance: Positive | None = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
+_tolerance = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
+Table = model("Table", "Choice of a table; the tightest by default.", Strict, tolerance=(Positive | None, _tolerance))
 
 
 def _chosen(request: Request) -> LoadedTable:

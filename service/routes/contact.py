@@ -1,8 +1,9 @@
-"""k and mu0 from measured points: ``POST /v1/fit``."""
+"""A contact: ``POST /v1/stiffness``, from materials and geometry; ``POST /v1/fit``, from measured points."""
 
 import math
 import warnings
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -14,11 +15,13 @@ import mumacro
 from mumacro.contact import AMPLITUDE, ContactName, DirectionName
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
+from mumacro.geometries import ARGUMENTS, GEOMETRIES, contact_of
 from mumacro.inputs import RIGID, is_rigid
 from mumacro.measured import STD, UNKNOWNS
 
+from .. import API_VERSION
 from ..case import INPUTS, Asked, not_finite, stranger
-from ..models import Answered, many, model, optional, told
+from ..models import Answered, Strict, many, model, optional, told
 from ..options import NAMES, Choice, Positive, bounded, input_fields, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
@@ -26,6 +29,51 @@ from ..wire.json import dump
 from . import Endpoint, given_in_body, in_thread, reply
 
 __all__ = ["ENDPOINTS"]
+
+_MODULI = ("E", "E2")  # which the word rigid may stand for
+
+
+async def post_stiffness(request: Request) -> Response:
+    """Return k, and the contact to ask for with it; the arguments of a geometry in SI."""
+    given = {name: value for name, value in (await given_in_body(request)).items() if value is not None}
+    geometry = given.pop("geometry", None)
+    rigid = {name: math.inf for name in _MODULI if isinstance(given.get(name), str) and is_rigid(given[name])}
+    numbers = [name for name in given if name in ARGUMENTS and name not in rigid and not ARGUMENTS[name].choices]
+    faults = [fault for name in numbers if (fault := not_finite(name, given[name]))]
+    if not isinstance(geometry, str):
+        faults.append(FieldFault.of("geometry", f"must be one of {', '.join(GEOMETRIES)}", geometry))
+    if faults:
+        refuse(faults)
+    found = asdict(contact_of(str(geometry), **{**given, **rigid}))
+    return reply(dump({"geometry": geometry, **found, "api_version": API_VERSION}))
+
+
+def _member(name: str) -> Any:
+    about = ARGUMENTS[name]
+    kind: Any = Literal[about.choices] if about.choices else float if name.startswith("nu") else Positive
+    kind = Positive | Annotated[str, Field(pattern=f"^{RIGID}$")] if name in _MODULI else kind
+    of = ", ".join(geometry for geometry, known in GEOMETRIES.items() if name in known.arguments)
+    text = f"{about.meaning}{f' [{about.unit}]' if about.unit else ''}{f'; of: {of}' if of else ''}"
+    return (told if name in ("E", "nu") else optional)(kind, text)
+
+
+_MEANINGS = "; ".join(f"{name}: {about.meaning}" for name, about in GEOMETRIES.items())
+StiffnessRequest = model(
+    "StiffnessRequest", "Two bodies in contact.", Strict,
+    example={"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3},
+    geometry=told(Literal[tuple(GEOMETRIES)], _MEANINGS), **{name: _member(name) for name in ARGUMENTS},
+)  # fmt: skip
+StiffnessAnswer = model(
+    "StiffnessAnswer", "What a contact of two bodies is; ``k`` and ``contact`` are those of a case.",
+    geometry=str, k=told(float, "Tangential stiffness while everything sticks [N/m]"),
+    k_normal=told(float, "Normal stiffness [N/m]"),
+    half_width=told(float, "Radius of a circular contact, half width of a line contact [m]"),
+    pressure=told(float, "Largest pressure [Pa]: Hertz's, or the mean one under a flat punch"),
+    contact=ContactName, api_version=str,
+)  # fmt: skip
+
+
+# --- measured points -----------------------------------------------------------------------------------
 
 MAX_POINTS = 1000  # which scipy answers within seconds
 _CURVE = 200  # points of the fitted law
@@ -111,8 +159,6 @@ def _curve(fit: Fit) -> dict[str, Any] | None:
     return {"v0": fine, "mu_macro": mu, "low": np.maximum(mu - width, 0.0), "high": mu + width}
 
 
-# --- models -------------------------------------------------------------------------------------------
-
 _Numbers = Annotated[list[float], Field(min_length=1, max_length=MAX_POINTS)]
 _Stiffness = float | Literal["rigid"] | None
 _inputs = input_fields(INPUTS, null=False, listed=True, shown=())
@@ -122,9 +168,9 @@ _columns = {name: _inputs[name] for name in NAMES} | {
     "std": optional(Positive | _Numbers, "Standard deviation of mu_macro [-]"),
 }
 _text = "Measured points as columns: lists of one length; a plain number holds for every point."
-FitRequest = model("FitRequest", _text, FitOptions, **_columns)
 _points = {"v0": [0.001, 0.003, 0.01, 0.03, 0.1, 0.3], "mu_macro": [0.225, 0.228, 0.24, 0.265, 0.291, 0.298]}
-FitRequest.model_config["json_schema_extra"] = {"examples": [{**_points, "Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}]}
+_EXAMPLE = {**_points, "Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
+FitRequest = model("FitRequest", _text, FitOptions, example=_EXAMPLE, **_columns)
 FittedCurve = model(
     "FittedCurve", "The fitted law over v0, with its 95 % band.", v0=told(list[float], "[m/s]"),
     mu_macro=list[float], low=list[float | None], high=list[float | None],
@@ -150,5 +196,9 @@ FitAnswer = model(
     curve=told(FittedCurve | None, "null where other inputs than v0 vary, or v0 is 0 everywhere"),
 )  # fmt: skip
 ENDPOINTS = [
-    Endpoint("/v1/fit", "POST", post_fit, "k and mu0 from measured points", FitRequest, FitAnswer, statuses=(501,))
-]
+    Endpoint(
+        "/v1/stiffness", "POST", post_stiffness, "The stiffness of a contact from materials and geometry",
+        StiffnessRequest, StiffnessAnswer,
+    ),
+    Endpoint("/v1/fit", "POST", post_fit, "k and mu0 from measured points", FitRequest, FitAnswer, statuses=(501,)),
+]  # fmt: skip
