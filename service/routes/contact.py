@@ -31,6 +31,7 @@ from . import Endpoint, given_in_body, in_thread, reply
 __all__ = ["ENDPOINTS"]
 
 _MODULI = ("E", "E2")  # which the word rigid may stand for
+_Poisson = Annotated[float, Field(gt=-1.0, le=0.5)]
 
 
 async def post_stiffness(request: Request) -> Response:
@@ -50,7 +51,7 @@ async def post_stiffness(request: Request) -> Response:
 
 def _member(name: str) -> Any:
     about = ARGUMENTS[name]
-    kind: Any = Literal[about.choices] if about.choices else float if name.startswith("nu") else Positive
+    kind: Any = Literal[about.choices] if about.choices else _Poisson if name.startswith("nu") else Positive
     kind = Positive | Annotated[str, Field(pattern=f"^{RIGID}$")] if name in _MODULI else kind
     of = ", ".join(geometry for geometry, known in GEOMETRIES.items() if name in known.arguments)
     text = f"{about.meaning}{f' [{about.unit}]' if about.unit else ''}{f'; of: {of}' if of else ''}"
