@@ -27,6 +27,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
+_USED = ("mu_macro", "error_bound", "v_tilde", "y_tilde", "length_scale")  # of an answer, by the quantities
 #: name of the regime of every source code
 REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
 
@@ -70,10 +71,8 @@ class Cases:
 
     def __post_init__(self) -> None:
         self.columns = {name: _of_numpy(column) for name, column in self.columns.items()}
-        answer = self.answer
-        self.mu_macro, self.error_bound = _of_numpy(answer.mu_macro), _of_numpy(answer.error_bound)
-        self.v_tilde, self.y_tilde = _of_numpy(answer.v_tilde), _of_numpy(answer.y_tilde)
-        self.length_scale = _of_numpy(answer.length_scale)
+        found = (_of_numpy(getattr(self.answer, name)) for name in _USED)
+        self.mu_macro, self.error_bound, self.v_tilde, self.y_tilde, self.length_scale = found
         self.at_rest = (self.columns[self.kind.fields[3]] == 0.0) | (self.columns["omega"] == 0.0)
         self.rigid = np.isinf(self.columns["k"])
         #: elastic, oscillating, with groups within double range
@@ -195,8 +194,7 @@ def answer_case(
     found, more = _evaluated(surrogate, case, include, std, asked)
     code = found.source_code
     values = found.mu_macro, found.mu_ratio, REGIME_NAMES[code], found.error_bound, SOURCES[code]
-    answer = dict(zip(_NAMES, values, strict=True))
-    return (answer | nested({path: float(value) for path, value in more.items()}) if more else answer), code
+    return dict(zip(_NAMES, values, strict=True)) | nested({path: float(value) for path, value in more.items()}), code
 
 
 def answer_columns(

@@ -222,11 +222,8 @@ class Columns:
 
 def too_large(max_batch: int) -> RequestError:
     """The error for a batch with more cases than the settings allow."""
-    return RequestError(
-        Kind.BATCH_TOO_LARGE,
-        f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON",
-        max_batch=max_batch,
-    )
+    told = f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON"
+    return RequestError(Kind.BATCH_TOO_LARGE, told, max_batch=max_batch)
 
 
 def columns_of(
@@ -247,12 +244,8 @@ def columns_of(
     alone = {name: 1.0 if name in lists else value for name, value in given.items()}
     plain, of_values = checked(alone, null_is_rigid=False, known=known, asked=asked)
     size = len(next(iter(lists.values()), "1"))
-    told = ", ".join(f"{name}: {len(value)}" for name, value in lists.items())
-    of_lengths = [
-        FieldFault.of(name, f"lists must have one length; given {told}")
-        for name, value in lists.items()
-        if len(value) != size
-    ]
+    told = "lists must have one length; given " + ", ".join(f"{name}: {len(value)}" for name, value in lists.items())
+    of_lengths = [FieldFault.of(name, told) for name, value in lists.items() if len(value) != size]
     if found := [*faults, *of_ends, *of_values, *of_lengths]:
         refuse(found)
     reasons: dict[int, Reason] = {}

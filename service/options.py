@@ -173,7 +173,7 @@ def options_of(
     model: type[Model], given: Mapping[str, Any], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
     """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
-    fields, without = _of_model(model)
+    fields, _, without = _of_model(model)
     if without is not None and fields.isdisjoint(given):
         return without, given, []
     own = {name: value for name, value in given.items() if name in fields}
@@ -185,18 +185,12 @@ def options_of(
 
 
 @cache
-def _of_model(model: Any) -> tuple[frozenset[str], Any]:
-    """The names of the options, and the options of a request that has none; None where it must have some."""
+def _of_model(model: Any) -> tuple[frozenset[str], tuple[str, ...], Any]:
+    """The names of the options; of all that a request may have; the options of a request that has none, if it may."""
     without = None
     with suppress(ValidationError):
         without = model()
-    return frozenset(model.model_fields), without
-
-
-@cache
-def _known(model: Any) -> tuple[str, ...]:
-    """All names that a request with these options may have."""
-    return *NAMES, "k_range", *ENDS, *model.model_fields
+    return frozenset(model.model_fields), (*NAMES, "k_range", *ENDS, *model.model_fields), without
 
 
 def kind_in(given: Mapping[str, Any]) -> Kind:
@@ -217,7 +211,7 @@ def read_form(
         with suppress(InputError):  # which is among the faults
             kind = kind_in(given)
     asked = asked_of(rest, kind)
-    values, more = checked(rest, left_out, null_is_rigid, _known(model), asked)  # type: ignore[arg-type]
+    values, more = checked(rest, left_out, null_is_rigid, _of_model(model)[1], asked)  # type: ignore[arg-type]
     if form is None or more:
         refuse([*faults, *more])
     form.check(asked, one)
@@ -247,9 +241,8 @@ def input_fields(
     return fields
 
 
-Case = model(
-    "Case", "One case, in SI units; omega or f, exactly one of them.", Strict, example=example, **input_fields()
-)
+_text = "One case, in SI units; omega or f, exactly one of them."
+Case = model("Case", _text, Strict, example=example, **input_fields())
 CaseRequest = model("CaseRequest", "One case and the options of its answer; omega or f.", Options, Case)
 #: the inputs of a question about one of them, which is left out
 Five = model("Five", "", **input_fields(INPUTS, shown=[name for name in example if name != "v0"]))

@@ -31,7 +31,6 @@ __all__ = [
 ]  # fmt: skip
 
 _JSON = "application/json"
-_JSON_ONLY = {_JSON: _JSON}
 _WHY = {
     400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
     401: "The service needs an API key, and none or a wrong one was sent",
@@ -47,8 +46,6 @@ _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()  # of a query t
 _PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
 _ID = {"X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}}
 _RETRY = {"description": "Seconds after which to send the request again", "schema": {"type": "integer"}}
-
-
 _STD = frozenset(f"std_{name}" for name in NAMES)
 
 
@@ -87,9 +84,8 @@ class Endpoint:
         async def answer(request: Request, **_: Any) -> Response:
             return await self.answer(request)
 
-        keyword = inspect.Parameter.KEYWORD_ONLY
         answer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [inspect.Parameter(name, keyword, annotation=kind) for name, kind in asked.items()]
+            [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=asked[name]) for name in asked]
         )
         app.add_api_route(
             self.path, answer, methods=[self.method], summary=self.summary, operation_id=self.answer.__name__,
@@ -101,10 +97,7 @@ class Endpoint:
 
 
 class Routes:
-    """Finds the endpoint of a path and a method, and answers; other paths go to ``others``.
-
-    Paths have no parameters, so a look-up finds them.
-    """
+    """Finds the endpoint of a path, which has no parameters, and of a method; other paths go to ``others``."""
 
     def __init__(self, endpoints: Iterable[Endpoint], others: ASGIApp) -> None:
         self._others = others
@@ -131,9 +124,7 @@ class Routes:
 
 def path_of(scope: Scope) -> str:
     """The path within this application: without the prefix of a proxy."""
-    path: str = scope["path"]
-    root: str = scope.get("root_path", "")
-    return path.removeprefix(root) if root else path
+    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
 
 
 # --- requests -------------------------------------------------------------------------------------------
@@ -160,7 +151,7 @@ async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
     if headers.get(b"content-type") != _JSON.encode() or b"content-encoding" in headers:
-        media_type_of(headers, _JSON_ONLY)
+        media_type_of(headers, {_JSON: _JSON})
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):

@@ -25,7 +25,6 @@ from . import Endpoint, given_in_query
 
 __all__ = ["ENDPOINTS"]
 
-PATH = "/v1/mu-macro/batch"
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
@@ -207,14 +206,11 @@ async def post_mu_macro_batch(request: Request) -> Response:
     return _Answer(request)
 
 
-_ANSWER = {
-    "description": "The answers, in the form of the request",
-    "content": {form.media_type: form.answer for form in forms().values()},
-}
+_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in forms().values()} for part in ("body", "answer"))
 ENDPOINTS = [
     Endpoint(
-        PATH, "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,
-        request={"required": True, "content": {form.media_type: form.body for form in forms().values()}},
-        content={200: _ANSWER},
+        "/v1/mu-macro/batch", "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,
+        request={"required": True, "content": _BODIES},
+        content={200: {"description": "The answers, in the form of the request", "content": _ANSWERS}},
     )
 ]  # fmt: skip

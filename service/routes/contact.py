@@ -108,19 +108,19 @@ async def post_fit(request: Request) -> Response:
 
 def _column(name: str, value: Any, faults: list[FieldFault]) -> Any:
     """Numbers as an array, of no dimension for one number; the word rigid is an infinite k."""
-    if name not in _COLUMNS:
-        faults.append(FieldFault.of(name, f"unknown field; allowed: {', '.join(_COLUMNS)}"))
-    elif isinstance(value, list) and len(value) > MAX_POINTS:
-        told = f"may have up to {MAX_POINTS} points, this has {len(value)}: average them"
-        faults.append(FieldFault.of(name, told))
-    elif name == "k" and isinstance(value, str) and is_rigid(value):
+    if name == "k" and isinstance(value, str) and is_rigid(value):
         return math.inf
-    else:
-        entries = [(value, ())] if not isinstance(value, list) else [(entry, (i,)) for i, entry in enumerate(value)]
-        if bad := next(filter(None, (not_finite(name, entry, *place) for entry, place in entries)), None):
-            faults.append(bad)
-        else:
-            return np.array(value, np.float64)
+    places = [(i,) for i in range(len(value))] if isinstance(value, list) else [()]
+    entries = value if isinstance(value, list) else [value]
+    bad = (not_finite(name, entry, *place) for entry, place in zip(entries, places, strict=True))
+    fault = next(filter(None, bad), None)
+    if name not in _COLUMNS:
+        fault = FieldFault.of(name, f"unknown field; allowed: {', '.join(_COLUMNS)}")
+    elif len(entries) > MAX_POINTS:
+        fault = FieldFault.of(name, f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them")
+    if fault is None:
+        return np.array(value, np.float64)
+    faults.append(fault)
     return None
 
 
