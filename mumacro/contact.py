@@ -95,7 +95,9 @@ class Kind(NamedTuple):
 
 
 SPRING = Kind(0, 0)
-_KINDS = {(word, way): Kind(i, j) for i, word in enumerate(CONTACTS) for j, way in enumerate(DIRECTIONS)}
+_KINDS: dict[tuple[str, str], Kind] = {
+    (word, way): Kind(i, j) for i, word in enumerate(CONTACTS) for j, way in enumerate(DIRECTIONS)
+}
 del _KINDS["ball", "normal"]
 
 

@@ -371,9 +371,10 @@ class Surrogate:
         if name not in charts.QUANTITY_NAMES:
             raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
         kind = kind_of(contact, direction)
-        if kind == SPRING and {type(v_tilde), type(y_tilde)} <= _NUMBERS:
+        point: Any = v_tilde, y_tilde
+        if kind == SPRING and set(map(type, point)) <= _NUMBERS:
             with suppress(OverflowError):  # a whole number beyond double range
-                one = _ONE.value(self._with(name), _CODES[name], v_tilde, y_tilde)
+                one = _ONE.value(self._with(name), _CODES[name], *point)
                 if one[2] >= 0:
                     return one
         if kind.normal and name == "power":

@@ -5,7 +5,6 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro.interval import ENDS, middle
 from mumacro.validity import digits, k_effect, model_rows
 
 from ..answers import answer_case, cost_of
@@ -29,30 +28,21 @@ class TextOptions(Options):
 
 async def _answered(request: Request, asking: type[Options] = Options) -> tuple[Any, dict[str, Any]]:
     """The options and the answer."""
-    table, form, case, asked = found = await Asking.of(request, asking, one=True)
+    table, form, case, asked = await Asking.of(request, asking, one=True)
     include, state, told = form.names(), request.app.state, MODEL in (form.include or ())
 
     def answer() -> tuple[dict[str, Any], int]:
         values, source = answer_case(table.surrogate, case, include, form.deviations(), asked)
-        return {**values, **_about_model(found)} if told else values, source
+        if told:  # rows of docs/validity.md, and the digits that k supports
+            words, surrogate = asked.kind.names, table.surrogate
+            values["model"] = model_rows(surrogate, case, **words)
+            values["digits"] = digits(k_effect(surrogate, case, **words))
+        return values, source
 
     large = told or cost_of(include, asked) > _LARGE
     values, source = await state.work.question(answer) if large else answer()
     state.metrics.case(table, source)
     return form, {**values, **table.signature}
-
-
-def _about_model(found: Asking) -> dict[str, Any]:
-    """Rows of docs/validity.md, and the digits that k supports."""
-    surrogate, case, names = found.table.surrogate, found.case, found.asked.kind.names
-    if not found.asked.interval:
-        return {"model": model_rows(surrogate, case, **names), "digits": digits(k_effect(surrogate, case, **names))}
-    answer = surrogate.evaluate(**case, **names)
-    at_middle = {name: value for name, value in case.items() if name not in ENDS}
-    at_middle["k"] = middle(case, "raise")[2].item()
-    rows = [row for row in model_rows(surrogate, at_middle, **names) if row["row"] != "k is known"]
-    spread = 0.5 * (answer.mu_macro_high - answer.mu_macro_low)
-    return {"model": rows, "digits": digits(spread / answer.mu_macro if spread else 0.0)}
 
 
 async def post_mu_macro(request: Request) -> Response:
