@@ -164,6 +164,7 @@ _Numbers = Annotated[list[float], Field(min_length=1, max_length=MAX_POINTS)]
 _Stiffness = float | Literal["rigid"] | None
 _inputs = input_fields(INPUTS, null=False, listed=True, shown=())
 _columns = {name: _inputs[name] for name in NAMES} | {
+    "k": (Positive | Literal["rigid"] | _Numbers | None, _inputs["k"][1]),  # the word stands alone
     "v0": told(Positive | _Numbers, "Sliding velocity of each point [m/s]"),
     "mu_macro": told(_Numbers, "Measured mu_macro of each point [-]"),
     "std": optional(Positive | _Numbers, "Standard deviation of mu_macro [-]"),
