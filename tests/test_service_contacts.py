@@ -133,6 +133,11 @@ def test_lift_off_spoils_only_its_row(client):
     (fault,) = answer["errors"]
     assert (fault["index"], fault["field"]) == (1, "Fz_amplitude")
     assert "lifts off" in fault["reason"]
+    lines = "\n".join(json.dumps({**given, "Fz_amplitude": force}) for force in (10.0, 3.0))
+    reply = client.post(BATCH, content=lines, headers={"Content-Type": "application/x-ndjson"})
+    refused, good = map(json.loads, reply.text.splitlines())  # a bad line does not end the stream
+    assert "lifts off" in refused["errors"][0]["reason"]
+    assert good["mu_macro"] == answer["mu_macro"][0]
 
 
 @pytest.mark.parametrize(

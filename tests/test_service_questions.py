@@ -171,6 +171,12 @@ def test_the_table_for_spreadsheets_is_the_law(client):
     assert response.text.count("\r\n") == 34
 
 
+def test_the_table_for_spreadsheets_has_what_is_included(client):
+    law = client.post("/v1/law", json={**LAW, "include": ["power"]}).json()
+    header, *rows = csv.reader(io.StringIO(client.get("/v1/law.csv", params=law_query(include="power")).text))
+    assert [float(row[header.index("power.saved [W]")]) for row in rows] == law["power"]["saved"]
+
+
 def test_a_head_of_the_table_has_no_body(client):
     response = client.head("/v1/law.csv", params=law_query())
     assert (response.status_code, response.content) == (200, b"")
