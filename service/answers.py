@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mumacro import Surrogate
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.contact import AMPLITUDE, SPRING, Kind
+from mumacro.inputs import FIELDS
 from mumacro.interval import middle
 
 from .case import PLAIN, Asked
@@ -191,6 +192,9 @@ def answer_case(
     std: Mapping[str, float] | None = None, asked: Asked = PLAIN,
 ) -> tuple[dict[str, Any], int]:  # fmt: skip
     """The answer to one case as plain Python values, and the code of its source; InputError where it is not legal."""
+    if not include and asked is PLAIN:
+        macro, ratio, bound, code = surrogate.evaluate_case(*(case[name] for name in FIELDS))
+        return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)), code
     found, more = _evaluated(surrogate, case, include, std, asked)
     code = found.source_code
     values = found.mu_macro, found.mu_ratio, REGIME_NAMES[code], found.error_bound, SOURCES[code]
@@ -219,8 +223,6 @@ def _evaluated(
     asked: Asked,
 ) -> tuple[Any, dict[str, Any]]:  # fmt: skip
     """The library's answer, and the columns beside the default ones by path."""
-    if asked == PLAIN and not include:
-        return surrogate.evaluate(**cases), {}
     slopes = any(QUANTITIES[name].slopes for name in include)
     words: dict[str, Any] = asked.kind.names
     found = surrogate.evaluate(**cases, **words, gradient=slopes, groups=bool(include))

@@ -73,7 +73,8 @@ PLAIN = Asked()
 
 def asked_of(given: Iterable[str], kind: ContactKind = SPRING) -> Asked:
     """What cases with these names are."""
-    return Asked(kind, not _INTERVAL.isdisjoint(given))
+    interval = not _INTERVAL.isdisjoint(given)
+    return Asked(kind, interval) if interval or kind != SPRING else PLAIN
 
 
 def names_of(asked: Asked) -> tuple[str, ...]:
@@ -145,7 +146,7 @@ def checked(
     values: dict[str, float] = {}
     faults: list[FieldFault] = []
     names = _NAMES
-    if asked != PLAIN:
+    if asked is not PLAIN:
         names, (given, faults) = frozenset(names_of(asked)), _with_ends(given)
     for name, value in given.items():
         if name not in names:
@@ -155,7 +156,7 @@ def checked(
             values[name], reason = number(name, value, null_is_rigid)
             if reason is not None:
                 faults.append(FieldFault.of(name, reason, value))
-    if asked != PLAIN or left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
+    if asked is not PLAIN or left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
         faults += faults_in(values, left_out, asked)
     if "f" in values and not faults:
         values["omega"] = RAD_PER_CYCLE * values.pop("f")
