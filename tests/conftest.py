@@ -26,8 +26,6 @@ from tests.serving import Server
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from starlette.testclient import TestClient
 
-    from service.app import Application
-
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
@@ -44,21 +42,21 @@ def tables_dir(repository: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def app(tables_dir: Path) -> "Application":
-    """An application on the committed tables, with default settings."""
+def started(tables_dir: Path) -> "Callable[..., TestClient]":
+    """A client of an application on the committed tables with these settings; as a context it starts and ends it."""
+    from starlette.testclient import TestClient
+
     from service.app import create_app
     from service.settings import Settings
 
-    return create_app(Settings(tables=(tables_dir,)))
+    return lambda **settings: TestClient(create_app(Settings(**{"tables": (tables_dir,), **settings})))
 
 
 @pytest.fixture(scope="session")
-def client(app: "Application") -> "Iterator[TestClient]":
-    """A client of that application, after its start."""
-    from starlette.testclient import TestClient
-
-    with TestClient(app) as started:
-        yield started
+def client(started: "Callable[..., TestClient]") -> "Iterator[TestClient]":
+    """A client of one with default settings, after its start."""
+    with started() as made:
+        yield made
 
 
 @pytest.fixture(scope="session")

@@ -14,10 +14,10 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
 from comparing import close  # noqa: E402
+from forms import BATCH, WRITERS, Row, as_arrow, as_csv, as_table, asked, number, posted, read  # noqa: E402
 from mumacro import InputError, Surrogate  # noqa: E402
 from mumacro.__main__ import main  # noqa: E402
 
-Row = dict[str, Any]
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 COLUMNS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 CASE: Row = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -38,12 +38,6 @@ BAD: dict[str, tuple[str, str]] = {  # JSON of the value, and the reason
 }  # fmt: skip
 ROWS = (*GOOD[:4], *({**CASE, name: json.loads(value)} for name, (value, _) in BAD.items()), *GOOD[4:])
 REASONS = [None] * 4 + [f"{name}: {reason}" for name, (_, reason) in BAD.items()] + [None] * (len(GOOD) - 4)
-BATCH = "/v1/mu-macro/batch"
-TYPES = {"csv": "text/csv", "ndjson": "application/x-ndjson", "arrow": "application/vnd.apache.arrow.stream"}
-
-
-def number(value: Any) -> float | None:
-    return math.inf if value == "rigid" else value
 
 
 @pytest.fixture(scope="module")
@@ -64,30 +58,7 @@ def expected(surrogate: Surrogate) -> list[Row]:
     return found
 
 
-# --- how the cases are written, and what is read back ---------------------------------------------------
-
-
-def as_csv(rows: tuple[Row, ...], names: tuple[str, ...] = NAMES) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(names)
-    writer.writerows(["" if value is None else value for value in row.values()] for row in rows)
-    return text.getvalue()
-
-
-def as_lines(rows: tuple[Row, ...]) -> str:
-    return "".join(json.dumps(row) + "\n" for row in rows)
-
-
-def as_table(rows: tuple[Row, ...]) -> Any:
-    return pa.table({name: pa.array([number(row[name]) for row in rows], pa.float64()) for name in NAMES})
-
-
-def as_stream(rows: tuple[Row, ...]) -> bytes:
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, as_table(rows).schema) as writer:
-        writer.write_table(as_table(rows))
-    return bytes(sink.getvalue())
+# --- what is read back ----------------------------------------------------------------------------------
 
 
 def typed(row: Row) -> Row:
@@ -149,27 +120,23 @@ def by_columns(client: Any) -> list[Row]:
 
 
 def by_lines(client: Any) -> list[Row]:
-    reply = client.post(BATCH, content=as_lines(ROWS), headers={"content-type": TYPES["ndjson"]})
-    lines = [json.loads(line) for line in reply.text.splitlines()]
     empty = dict.fromkeys(COLUMNS)
     return [
         {**empty, "error": of_problem(line)} if "errors" in line else {**{n: line[n] for n in COLUMNS}, "error": None}
-        for line in lines
+        for line in asked(client, "ndjson", ROWS)
     ]
 
 
 def by_csv(client: Any) -> list[Row]:
-    reply = client.post(BATCH, content=as_csv(ROWS), headers={"content-type": TYPES["csv"]})
-    found = list(csv.DictReader(io.StringIO(reply.text)))
+    found = asked(client, "csv", ROWS)
     assert tuple(found[0]) == (*COLUMNS, "error")
     return list(map(typed, found))
 
 
 def by_arrow(client: Any) -> list[Row]:
-    reply = client.post(BATCH, content=as_stream(ROWS), headers={"content-type": TYPES["arrow"]})
-    table = pa.ipc.open_stream(reply.content).read_all()
-    assert tuple(table.schema.names) == (*COLUMNS, "error")
-    return list(table.to_pylist())
+    found = asked(client, "arrow", ROWS)
+    assert tuple(found[0]) == (*COLUMNS, "error")
+    return found
 
 
 @pytest.mark.parametrize("way", [by_post, by_get, by_rows, by_columns, by_lines, by_csv, by_arrow])
@@ -214,7 +181,7 @@ def test_eval_answers_files_of_every_format(tmp_path: Path, expected: list[Row],
     if given == "parquet":
         pq.write_table(as_table(ROWS), source)
     else:
-        source.write_text({"csv": as_csv, "ndjson": as_lines}[given](ROWS), "utf-8")
+        source.write_text(str(WRITERS[given](ROWS)), "utf-8")
     assert main(["eval", str(source), "-o", str(out)]) == 3  # some rows are rejected
     if made == "parquet":
         found = pq.read_table(out).to_pylist()
@@ -250,24 +217,27 @@ def flat(document: Any, path: str = "") -> Row:
 
 def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any) -> None:
     good, std = list(GOOD), {"v0": 1e-3, "mu0": 0.01}
-    asked = {"include": INCLUDED, "std": std}
-    single = [flat(client.post("/v1/mu-macro", json={**row, **asked}).json()) for row in good]
+    asked_for = {"include": INCLUDED, "std": std}
+    single = [flat(client.post("/v1/mu-macro", json={**row, **asked_for}).json()) for row in good]
     names = [name for name in single[0] if not name.startswith(("table", "api"))]
     assert names[: len(COLUMNS)] == list(COLUMNS)
     assert len(names) > 30
     single = [{name: row[name] for name in names} for row in single]
-    columns = client.post(BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **asked}).json()
+    columns = client.post(BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **asked_for}).json()
     listed = {name: values for name, values in flat(columns).items() if name in names}
     assert [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)] == single
-    words = "&".join([f"include={','.join(INCLUDED)}", *(f"std_{name}={value}" for name, value in std.items())])
-    reply = client.post(f"{BATCH}?{words}", json=good).json()
+    query = {"include": ",".join(INCLUDED), **{f"std_{name}": value for name, value in std.items()}}
+    assert flat(client.get("/v1/mu-macro", params={**CASE, **query}).json()) == flat(
+        client.post("/v1/mu-macro", json={**CASE, **asked_for}).json()
+    )
+    reply = client.post(BATCH, params=query, json=good).json()
     assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
-    reply = client.post(f"{BATCH}?{words}", content=as_stream(GOOD), headers={"content-type": TYPES["arrow"]})
-    table = pa.ipc.open_stream(reply.content).read_all()
-    assert table.schema.names == [*names, "error"]
-    assert [{name: finite(row[name]) for name in names} for row in table.to_pylist()] == single
-    reply = client.post(f"{BATCH}?{words}", content=as_csv(GOOD), headers={"content-type": TYPES["csv"]})
-    rows = list(csv.DictReader(io.StringIO(reply.text)))
+    rows = read("arrow", posted(client, "arrow", as_arrow(GOOD), **query))
+    assert list(rows[0]) == [*names, "error"]
+    assert [{name: finite(row[name]) for name in names} for row in rows] == single
+    lines = read("ndjson", posted(client, "ndjson", WRITERS["ndjson"](GOOD), **query))
+    assert [{name: flat(line)[name] for name in names} for line in lines] == single
+    rows = read("csv", posted(client, "csv", as_csv(GOOD), **query))
     assert list(rows[0]) == [*names, "error"]
     for row, one in zip(rows, single, strict=True):
         assert {name: finite(value_of(row[name], one[name])) for name in names} == one
@@ -296,8 +266,7 @@ def test_units_in_heads_and_the_frequency_mean_the_same_everywhere(client: Any, 
     )
     heads = ("mu0", "Fz", "k [N/mm]", "y0 [um]", "f [kHz]", "v0 [mm/s]")
     text = f"{','.join(heads)}\n0.3,10,1000,2,{f / 1e3},10\n"
-    reply = client.post(BATCH, content=text, headers={"content-type": TYPES["csv"]})
-    (row,) = csv.DictReader(io.StringIO(reply.text))
+    (row,) = read("csv", posted(client, "csv", text))
     assert float(row["mu_macro"]) == close(plain["mu_macro"], rel=1e-14)
     (tmp_path / "cases.csv").write_text(text, "utf-8")
     assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / "out.csv")]) == 0

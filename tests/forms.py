@@ -1,0 +1,80 @@
+"""Cases written in every form of a batch, and the answers read back."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+Row = dict[str, Any]
+BATCH = "/v1/mu-macro/batch"
+TYPES = {
+    "json": "application/json", "csv": "text/csv", "ndjson": "application/x-ndjson",
+    "arrow": "application/vnd.apache.arrow.stream",
+}  # fmt: skip
+
+
+def number(value: Any) -> Any:
+    """A rigid contact is infinite where only numbers are."""
+    return math.inf if value == "rigid" else value
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """A head with the names of the first row, and the rows; None is an empty cell."""
+    text = io.StringIO()
+    csv.writer(text).writerows([list(rows[0]), *(["" if x is None else x for x in row.values()] for row in rows)])
+    return text.getvalue()
+
+
+def as_ndjson(rows: Sequence[Row]) -> str:
+    """One case per line."""
+    return "".join(json.dumps(row) + "\n" for row in rows)
+
+
+def as_table(rows: Sequence[Row]) -> Any:
+    """Columns of pyarrow."""
+    import pyarrow as pa
+
+    return pa.table({name: pa.array([number(row[name]) for row in rows], pa.float64()) for name in rows[0]})
+
+
+def stream_of(table: Any, **options: Any) -> bytes:
+    """A table or a record batch of pyarrow as a stream."""
+    import pyarrow as pa
+
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, table.schema, options=pa.ipc.IpcWriteOptions(**options)) as writer:
+        writer.write(table)
+    return bytes(sink.getvalue())
+
+
+def as_arrow(rows: Sequence[Row]) -> bytes:
+    """An Arrow stream."""
+    return stream_of(as_table(rows))
+
+
+WRITERS = {"csv": as_csv, "ndjson": as_ndjson, "arrow": as_arrow}
+
+
+def posted(client: Any, form: str, body: Any, **params: Any) -> Any:
+    """The response to a batch in a form."""
+    return client.post(BATCH, content=body, params=params, headers={"Content-Type": TYPES[form]})
+
+
+def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
+    """The answers to cases, one by one: texts in CSV, else values."""
+    response = posted(client, form, WRITERS[form](rows), **params)
+    assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), response.text
+    return read(form, response)
+
+
+def read(form: str, response: Any) -> list[Row]:
+    """The cases of an answer."""
+    if form == "arrow":
+        import pyarrow as pa
+
+        return list(pa.ipc.open_stream(response.content).read_all().to_pylist())
+    if form == "csv":
+        return list(csv.DictReader(io.StringIO(response.text, newline="")))
+    return list(map(json.loads, response.text.splitlines()))
