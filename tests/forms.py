@@ -63,7 +63,7 @@ def posted(client: Any, form: str, body: Any, **params: Any) -> Any:
 
 
 def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
-    """The answers to cases, one by one: texts in CSV, else values."""
+    """The answers to cases, one by one."""
     response = posted(client, form, WRITERS[form](rows), **params)
     assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), response.text
     return read(form, response)
@@ -75,6 +75,19 @@ def read(form: str, response: Any) -> list[Row]:
         import pyarrow as pa
 
         return list(pa.ipc.open_stream(response.content).read_all().to_pylist())
+    return rows_of(form, response.text)
+
+
+def rows_of(form: str, text: str) -> list[Row]:
+    """The rows of a text; a cell of CSV is a number or a truth value where it can be one, None where empty."""
     if form == "csv":
-        return list(csv.DictReader(io.StringIO(response.text, newline="")))
-    return list(map(json.loads, response.text.splitlines()))
+        rows = csv.DictReader(io.StringIO(text, newline=""))
+        return [{name: _value(cell) for name, cell in row.items()} for row in rows]
+    return list(map(json.loads, text.splitlines()))
+
+
+def _value(cell: str) -> Any:
+    try:
+        return float(cell)
+    except ValueError:
+        return {"": None, "True": True, "False": False}.get(cell, cell)

@@ -1,7 +1,5 @@
 """One table of cases through every way of asking: values, names, order, units, gaps, rigid contact, f, reasons."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Callable
@@ -14,7 +12,7 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
 from comparing import close  # noqa: E402
-from forms import BATCH, WRITERS, Row, as_arrow, as_csv, as_table, asked, number, posted, read  # noqa: E402
+from forms import BATCH, WRITERS, Row, as_table, asked, number, posted, rows_of  # noqa: E402
 from mumacro import InputError, Surrogate  # noqa: E402
 from mumacro.__main__ import main  # noqa: E402
 
@@ -58,100 +56,67 @@ def expected(surrogate: Surrogate) -> list[Row]:
     return found
 
 
-# --- what is read back ----------------------------------------------------------------------------------
+# --- the service ----------------------------------------------------------------------------------------
 
 
-def typed(row: Row) -> Row:
-    """A row of CSV with numbers as floats and empty cells as None."""
-    return {
-        name: None if text == "" else text if name in ("regime", "source", "error", "k") else float(text)
-        for name, text in row.items()
-    }
-
-
-def of_problem(document: Row) -> str:
-    (error,) = document["errors"]
-    assert document["detail"] == f"{error['field']}: {error['reason']}"
-    return str(document["detail"])
-
-
-def of_one(reply: Any) -> Row:
-    """A response to one case."""
-    document = reply.json()
-    if reply.status_code == 422:
-        return {**dict.fromkeys(COLUMNS), "error": of_problem(document)}
+def of_one(document: Row) -> Row:
+    """An answer to one case, or its refusal."""
+    if "errors" in document:
+        (error,) = document["errors"]
+        assert document["detail"] == f"{error['field']}: {error['reason']}"
+        return {**dict.fromkeys(COLUMNS), "error": document["detail"]}
     assert tuple(document) == (*COLUMNS, "table", "api_version")
     return {**{name: document[name] for name in COLUMNS}, "error": None}
 
 
-def with_errors(columns: Row, errors: list[Row]) -> list[Row]:
-    reasons = {error["index"]: f"{error['field']}: {error['reason']}" for error in errors}
+def with_errors(columns: Row, document: Row) -> list[Row]:
+    assert tuple(document)[-4:] == ("errors", "n_errors", "table", "api_version")
+    assert document["n_errors"] == len(BAD)
+    reasons = {error["index"]: f"{error['field']}: {error['reason']}" for error in document["errors"]}
     rows = zip(*(columns[name] for name in COLUMNS), strict=True)
     return [{**dict(zip(COLUMNS, row, strict=True)), "error": reasons.get(i)} for i, row in enumerate(rows)]
 
 
-# --- the service ----------------------------------------------------------------------------------------
-
-
-def by_post(client: Any) -> list[Row]:
-    return [of_one(client.post("/v1/mu-macro", json=row)) for row in ROWS]
-
-
-def by_get(client: Any) -> list[Row]:
-    def query(row: Row) -> str:
-        return "&".join(f"{name}={'' if value is None else value}" for name, value in row.items())
-
-    return [of_one(client.get(f"/v1/mu-macro?{query(row)}")) for row in ROWS]
+def by_get(client: Any, row: Row) -> Row:
+    query = "&".join(f"{name}={'' if value is None else value}" for name, value in row.items())
+    return of_one(client.get(f"/v1/mu-macro?{query}").json())
 
 
 def by_rows(client: Any) -> list[Row]:
     document = client.post(BATCH, json=list(ROWS)).json()
-    assert tuple(document) == ("results", "errors", "n_errors", "table", "api_version")
-    assert document["n_errors"] == len(BAD)
     assert all(row is None or tuple(row) == COLUMNS for row in document["results"])
-    columns = {name: [row and row[name] for row in document["results"]] for name in COLUMNS}
-    return with_errors(columns, document["errors"])
+    return with_errors({name: [row and row[name] for row in document["results"]] for name in COLUMNS}, document)
 
 
 def by_columns(client: Any) -> list[Row]:
     document = client.post(BATCH, json={name: [row[name] for row in ROWS] for name in NAMES}).json()
-    assert tuple(document) == (*COLUMNS, "errors", "n_errors", "table", "api_version")
-    return with_errors(document, document["errors"])
+    assert tuple(document)[:-4] == COLUMNS
+    return with_errors(document, document)
 
 
-def by_lines(client: Any) -> list[Row]:
-    empty = dict.fromkeys(COLUMNS)
-    return [
-        {**empty, "error": of_problem(line)} if "errors" in line else {**{n: line[n] for n in COLUMNS}, "error": None}
-        for line in asked(client, "ndjson", ROWS)
-    ]
+WAYS: dict[str, Callable[[Any], list[Row]]] = {
+    "POST": lambda client: [of_one(client.post("/v1/mu-macro", json=row).json()) for row in ROWS],
+    "GET": lambda client: [by_get(client, row) for row in ROWS],
+    "rows": by_rows,
+    "columns": by_columns,
+    "lines": lambda client: list(map(of_one, asked(client, "ndjson", ROWS))),
+    "CSV": lambda client: asked(client, "csv", ROWS),
+    "Arrow": lambda client: asked(client, "arrow", ROWS),
+}
 
 
-def by_csv(client: Any) -> list[Row]:
-    found = asked(client, "csv", ROWS)
-    assert tuple(found[0]) == (*COLUMNS, "error")
-    return list(map(typed, found))
-
-
-def by_arrow(client: Any) -> list[Row]:
-    found = asked(client, "arrow", ROWS)
-    assert tuple(found[0]) == (*COLUMNS, "error")
-    return found
-
-
-@pytest.mark.parametrize("way", [by_post, by_get, by_rows, by_columns, by_lines, by_csv, by_arrow])
-def test_the_service_answers_in_every_format_what_the_library_does(
-    client: Any, expected: list[Row], way: Callable[[Any], list[Row]]
-) -> None:
-    found = way(client)
+@pytest.mark.parametrize("way", WAYS)
+def test_the_service_answers_in_every_format_what_the_library_does(client: Any, expected: list[Row], way: str) -> None:
+    found = WAYS[way](client)
     i = REASONS.index(f"k: {GAP}")
-    if way is by_post:  # null is rigid contact in a single case, which has no gaps
+    if way == "POST":  # null is rigid contact in a single case, which has no gaps
         assert found[i] == expected[1]
-    if way is by_get:  # an empty value is no number there
+    if way == "GET":  # an empty value is no number there
         assert found[i]["error"]
-    if way in (by_post, by_get):
+    if way in ("POST", "GET"):
         found[i] = expected[i]
     assert found == expected
+    assert {tuple(row) for row in found} == {(*COLUMNS, "error")}
 
 
 # --- the library and the command -----------------------------------------------------------------------
@@ -183,20 +148,14 @@ def test_eval_answers_files_of_every_format(tmp_path: Path, expected: list[Row],
     else:
         source.write_text(str(WRITERS[given](ROWS)), "utf-8")
     assert main(["eval", str(source), "-o", str(out)]) == 3  # some rows are rejected
-    if made == "parquet":
-        found = pq.read_table(out).to_pylist()
-    else:
-        text = out.read_text("utf-8")
-        lines = text.splitlines()
-        found = list(map(typed, csv.DictReader(io.StringIO(text)))) if made == "csv" else list(map(json.loads, lines))
+    found = pq.read_table(out).to_pylist() if made == "parquet" else rows_of(made, out.read_text("utf-8"))
     assert all(tuple(row) == (*NAMES, *COLUMNS) for row in found)
     good = [row for row in expected if row["error"] is None]
     assert [{name: row[name] for name in COLUMNS} for row in found] == [
         {name: row[name] for name in COLUMNS} for row in good
     ]
-    assert [float(row["mu0"]) for row in found] == [row["mu0"] for row in GOOD]
-    with (tmp_path / f"out.{made}.rejects.csv").open(encoding="utf-8") as stream:
-        rejected = list(csv.DictReader(stream))
+    assert [row["mu0"] for row in found] == [row["mu0"] for row in GOOD]
+    rejected = rows_of("csv", (tmp_path / f"out.{made}.rejects.csv").read_text("utf-8"))
     assert [f"{row['field']}: {row['reason']}" for row in rejected] == [reason for reason in REASONS if reason]
 
 
@@ -232,15 +191,10 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     )
     reply = client.post(BATCH, params=query, json=good).json()
     assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
-    rows = read("arrow", posted(client, "arrow", as_arrow(GOOD), **query))
-    assert list(rows[0]) == [*names, "error"]
-    assert [{name: finite(row[name]) for name in names} for row in rows] == single
-    lines = read("ndjson", posted(client, "ndjson", WRITERS["ndjson"](GOOD), **query))
-    assert [{name: flat(line)[name] for name in names} for line in lines] == single
-    rows = read("csv", posted(client, "csv", as_csv(GOOD), **query))
-    assert list(rows[0]) == [*names, "error"]
-    for row, one in zip(rows, single, strict=True):
-        assert {name: finite(value_of(row[name], one[name])) for name in names} == one
+    for form in ("arrow", "csv", "ndjson"):
+        rows = asked(client, form, GOOD, **query)
+        assert form == "ndjson" or list(rows[0]) == [*names, "error"]
+        assert [{name: finite(row[name]) for name in names} for row in map(flat, rows)] == single
 
 
 def finite(value: Any) -> Any:
@@ -248,28 +202,16 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def value_of(cell: str, like: Any) -> Any:
-    """A cell of CSV as the type of a value."""
-    if cell == "" or isinstance(like, str):
-        return cell or None
-    return cell.lower() == "true" if isinstance(like, bool) else float(cell)
-
-
 # --- units ----------------------------------------------------------------------------------------------
 
 
-def test_units_in_heads_and_the_frequency_mean_the_same_everywhere(client: Any, tmp_path: Path) -> None:
+def test_units_in_heads_and_the_frequency_mean_the_same_everywhere(client: Any, surrogate: Any, tmp_path: Path) -> None:
     f = 20690.14
-    plain = client.post("/v1/mu-macro", json={**{n: v for n, v in CASE.items() if n != "omega"}, "f": f}).json()
-    assert (
-        plain["mu_macro"] == client.post("/v1/mu-macro", json={**CASE, "omega": 2.0 * math.pi * f}).json()["mu_macro"]
-    )
-    heads = ("mu0", "Fz", "k [N/mm]", "y0 [um]", "f [kHz]", "v0 [mm/s]")
-    text = f"{','.join(heads)}\n0.3,10,1000,2,{f / 1e3},10\n"
-    (row,) = read("csv", posted(client, "csv", text))
-    assert float(row["mu_macro"]) == close(plain["mu_macro"], rel=1e-14)
+    plain = surrogate.evaluate({**CASE, "omega": 2.0 * math.pi * f}).mu_macro
+    given = {**{name: x for name, x in CASE.items() if name != "omega"}, "f": f}
+    assert client.post("/v1/mu-macro", json=given).json()["mu_macro"] == plain
+    text = f"mu0,Fz,k [N/mm],y0 [um],f [kHz],v0 [mm/s]\n0.3,10,1000,2,{f / 1e3},10\n"
     (tmp_path / "cases.csv").write_text(text, "utf-8")
     assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / "out.csv")]) == 0
-    with (tmp_path / "out.csv").open() as stream:
-        (row,) = csv.DictReader(stream)
-    assert float(row["mu_macro"]) == close(plain["mu_macro"], rel=1e-14)
+    for answer in (posted(client, "csv", text).text, (tmp_path / "out.csv").read_text("utf-8")):
+        assert rows_of("csv", answer)[0]["mu_macro"] == close(plain, rel=1e-14)

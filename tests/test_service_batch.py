@@ -72,7 +72,7 @@ def test_a_gap_in_k_is_never_a_rigid_contact(client, case, gap):
     first, second, third = asked(client, "ndjson", rows)
     assert (first["source"], second["status"], third["source"]) == ("stick_slip_low", 422, "rigid")
     assert second["errors"][0]["field"] == "k"
-    assert [row["error"][:2] for row in asked(client, "csv", rows)] == ["", "k:", ""]
+    assert [row["error"] and row["error"][:2] for row in asked(client, "csv", rows)] == [None, "k:", None]
 
 
 def test_explicit_nulls_are_read_like_absent_names(client, case):
@@ -221,7 +221,7 @@ def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client, case):
     rows = read("csv", posted(client, "csv", as_csv([case] * 2).replace("\r\n", ",7\r\n").replace("v0,7", "v0", 1)))
     assert [row["error"] for row in rows] == ["case: has 7 cells where the head has 6"] * 2
     good = read("csv", posted(client, "csv", "\ufeff" + as_csv([case])))
-    assert float(good[0]["mu_macro"]) == one(client, case)["mu_macro"]
+    assert good[0]["mu_macro"] == one(client, case)["mu_macro"]
 
 
 def test_arrow_keeps_order_over_record_batches_and_names_its_table(started, case, surrogate):
@@ -277,4 +277,4 @@ def test_a_damaged_arrow_stream_is_answered_or_refused(client, case):
 def test_a_head_of_csv_may_have_any_unit_of_its_column(client, case):
     head, f = "mu0 [%],Fz (kN),k [N/um],y0 [um],f [kHz],v0 [mm/s]", case["omega"] / (2e3 * math.pi)
     (row,) = read("csv", posted(client, "csv", f"{head}\r\n30,0.01,1,2,{f!r},10\r\n"))
-    assert float(row["mu_macro"]) == close(one(client, case)["mu_macro"], rel=1e-13)
+    assert row["mu_macro"] == close(one(client, case)["mu_macro"], rel=1e-13)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from comparing import close
 from forms import BATCH, as_csv, asked, posted, read
 from mumacro.validity import digits, k_effect, model_rows
 
@@ -42,14 +43,10 @@ def test_every_form_gives_the_librarys_answer(client, surrogate, name):
     answer = client.post(BATCH, json=rows, params=options).json()
     assert answer["results"] == expected
     for form in ("csv", "ndjson", "arrow"):
-        rest = {"error": None} if form == "arrow" else {"error": ""} if form == "csv" else ()
-        label = {"table": answer["table"], "api_version": "1"} if form == "ndjson" else rest
-        told = [{**one, **label} for one in expected]
-        if form == "csv":
-            told = [{name: x if isinstance(x, str) else repr(float(x)) for name, x in one.items()} for one in told]
+        more = {"table": answer["table"], "api_version": "1"} if form == "ndjson" else {"error": None}
         answers = asked(client, form, rows, **options)
-        assert answers == told
-        assert list(answers[0])[:5] + [name for name in answers[0] if name in ends] == [*names[:5], *ends]
+        assert answers == [{**one, **more} for one in expected]
+        assert list(answers[0]) == [*names, *more]
 
     one, of_query = {**rows[2], **options}, {**rows[2], **options}
     if ends:
@@ -81,7 +78,7 @@ def test_bad_rows_spoil_only_themselves(client):
     assert "lifts off" in fault["reason"]
 
 
-@pytest.mark.parametrize("name", ["ball", "along", "ball along", "normal"])
+@pytest.mark.parametrize("name", ["spring", "ball", "along", "ball along", "normal"])
 def test_included_quantities_are_the_librarys(client, surrogate, name):
     options, inputs = ASKED[name]
     case = {**RIG, **inputs, "v0": 0.02}
@@ -94,7 +91,8 @@ def test_included_quantities_are_the_librarys(client, surrogate, name):
     assert answer["stick_fraction"] == surrogate.stick_fraction_with_bound(found.v_tilde, found.y_tilde, **options)[0]
     limits = answer["limits"]
     for mark, v0 in (("mu_static", 0.0), ("mu_crit", limits["v0_crit"])):
-        assert limits[mark] == surrogate.evaluate(**{**case, "v0": v0}, **options).mu_macro
+        there = surrogate.evaluate(**{**case, "v0": v0}, **options).mu_macro
+        assert limits[mark] == (there if options else close(there, rel=1e-14))
     if options.get("direction") == "along":  # there the contact begins to slide backwards
         assert limits["v0_crit"] == case["y0"] * case["omega"]
     batch = client.post(BATCH, json={**case, "v0": [0.02], **more}).json()
