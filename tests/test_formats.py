@@ -186,9 +186,8 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     listed = {name: values for name, values in flat(columns).items() if name in names}
     assert [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)] == single
     query = {"include": ",".join(INCLUDED), **{f"std_{name}": value for name, value in std.items()}}
-    assert flat(client.get("/v1/mu-macro", params={**CASE, **query}).json()) == flat(
-        client.post("/v1/mu-macro", json={**CASE, **asked_for}).json()
-    )
+    of_query = flat(client.get("/v1/mu-macro", params={**CASE, **query}).json())
+    assert {name: of_query[name] for name in names} == single[0]
     reply = client.post(BATCH, params=query, json=good).json()
     assert [{name: flat(row)[name] for name in names} for row in reply["results"]] == single
     for form in ("arrow", "csv", "ndjson"):

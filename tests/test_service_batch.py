@@ -1,12 +1,11 @@
 """Batches and streams over HTTP: bad cases among good ones, order, options, and what only one form has."""
 
 import json
-import math
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
-from comparing import close
 from forms import BATCH, as_csv, as_ndjson, asked, posted, read, stream_of
 from mumacro.inputs import FIELDS
 
@@ -111,13 +110,6 @@ def test_plain_columns_get_the_same_bytes_on_the_fast_path(client, case, n):
     assert answer["mu_macro"][:-1] == short.json()["mu_macro"][:-1]
 
 
-def test_answers_are_the_same_bytes_whatever_coding_is_accepted(client, case):
-    body = json.dumps({**case, "v0": [0.001 * i for i in range(20_000)]})
-    answers = [client.post(BATCH, content=body, headers={"Accept-Encoding": offer}) for offer in ("gzip", "identity")]
-    assert "content-encoding" not in answers[0].headers
-    assert answers[0].content == answers[1].content
-
-
 def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client, case):
     rows = client.post(BATCH, json=[]).json()
     assert (rows["results"], rows["errors"], rows["n_errors"]) == ([], [], 0)
@@ -184,23 +176,17 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(client, case, odd, sta
         assert answers[1]["type"].endswith("malformed-body") == (status == 400)
 
 
-def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(client, case):
-    n, bad = 3000, range(3, 3000, 7)
-    lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(n)]
+def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(client, case, surrogate):
+    lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(3000)]
+    expected = surrogate.evaluate({**case, "v0": [line["v0"] for line in lines]}).mu_macro.tolist()
+    bad = range(3, 3000, 7)
     for index in bad:
         lines[index] = {**case, "v0": -1.0} if index % 2 else {**case, "speed": 1.0}
-    lines[1000] = {**case, "v0": [0.1, 0.2]}  # columns in a line that looks like the others
-    expected = client.post(BATCH, json={**case, "v0": [1e-4 * (i + 1) for i in range(n)]}).json()["mu_macro"]
     answers = asked(client, "ndjson", lines)
-    assert len(answers) == n
-    for index, answer in enumerate(answers):
-        if index == 1000:
-            assert len(answer["mu_macro"]) == 2
-        elif index in bad:
-            assert (answer["status"], answer["instance"]) == (422, f"{BATCH}#line={index + 1}")
-            assert answer["errors"][0]["field"] == ("v0" if index % 2 else "speed")
-        else:
-            assert answer["mu_macro"] == expected[index]
+    assert [answer.get("mu_macro") for answer in answers] == [None if i in bad else x for i, x in enumerate(expected)]
+    for index in bad:
+        assert answers[index]["instance"] == f"{BATCH}#line={index + 1}"
+        assert answers[index]["errors"][0]["field"] == ("v0" if index % 2 else "speed")
 
 
 def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started, case):
@@ -225,7 +211,6 @@ def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client, case):
 
 
 def test_arrow_keeps_order_over_record_batches_and_names_its_table(started, case, surrogate):
-    pa = pytest.importorskip("pyarrow")
     v0 = np.geomspace(1e-6, 1e3, 150_000)
     columns = {**{name: np.full(v0.size, value) for name, value in case.items()}, "v0": v0}
     whole = pa.record_batch(columns)
@@ -239,7 +224,6 @@ def test_arrow_keeps_order_over_record_batches_and_names_its_table(started, case
 
 
 def test_a_bad_arrow_case_affects_only_itself(client, case):
-    pa = pytest.importorskip("pyarrow")
     columns = {name: pa.array([value] * 6) for name, value in case.items()}
     columns["v0"] = pa.array([0.1, -1.0, None, float("nan"), 0.1, 0.1])
     columns["k"] = pa.array([1e6, 1e6, 1e6, 1e6, float("inf"), None])
@@ -251,7 +235,6 @@ def test_a_bad_arrow_case_affects_only_itself(client, case):
 
 
 def test_arrow_numbers_of_other_types_are_numbers_and_no_rows_are_a_batch(client, case):
-    pa = pytest.importorskip("pyarrow")
     columns = {name: pa.array([value], type=pa.float32()) for name, value in case.items()}
     columns["Fz"] = pa.array([10], type=pa.int16())
     (row,) = read("arrow", posted(client, "arrow", stream_of(pa.record_batch(columns))))
@@ -263,7 +246,6 @@ def test_arrow_numbers_of_other_types_are_numbers_and_no_rows_are_a_batch(client
 
 @pytest.mark.slow
 def test_a_damaged_arrow_stream_is_answered_or_refused(client, case):
-    pa = pytest.importorskip("pyarrow")
     columns = {**{name: [value] * 3 for name, value in case.items()}, "k": [1e6, None, 1e5]}
     whole = stream_of(pa.record_batch(columns))
     lies = (b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\0\0\0\0", b"\0\0\0\1")
@@ -272,9 +254,3 @@ def test_a_damaged_arrow_stream_is_answered_or_refused(client, case):
     bodies += [whole[:i] for i in range(0, len(whole), 40)]
     statuses = {posted(client, "arrow", body).status_code for body in bodies}
     assert {200, 400} <= statuses <= {200, 400, 413, 422}
-
-
-def test_a_head_of_csv_may_have_any_unit_of_its_column(client, case):
-    head, f = "mu0 [%],Fz (kN),k [N/um],y0 [um],f [kHz],v0 [mm/s]", case["omega"] / (2e3 * math.pi)
-    (row,) = read("csv", posted(client, "csv", f"{head}\r\n30,0.01,1,2,{f!r},10\r\n"))
-    assert row["mu_macro"] == close(one(client, case)["mu_macro"], rel=1e-13)

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
+import orjson
 import pytest
 
 from tests.serving import CASE, chunk, connect, head, to_end
@@ -90,36 +91,27 @@ def test_a_half_closed_client_gets_the_whole_answer(raw):
     assert received.endswith(END)
 
 
-@pytest.mark.parametrize(
-    ("text", "status"),
-    [
-        (b"GET /livez HTTP/1.1\r\n\r\n", 400),
-        (b"GET /livez HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n", 400),
-        (b"nonsense\r\n\r\n", 400),
-        (b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 400),
-        (b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a: b\r\n" * 99 + b"\r\n", 200),
-        (b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a: b\r\n" * 100 + b"\r\n", 431),
-        (b"GET /livez HTTP/1.1\r\nHost: x\r\nA: " + b"b" * 65_000 + b"\r\n\r\n", 200),
-        (b"GET /livez HTTP/1.1\r\nHost: x\r\nA: " + b"b" * 66_000 + b"\r\n\r\n", 431),
-        (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431),
-        (head(SINGLE, 300_000_000), 413),
-        (head(BATCH, 300_000_000), 413),
-    ],
-    ids=range(11),
-)
+TWO_LENGTHS = b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n" + END
+HEADS = [
+    (b"GET /livez HTTP/1.1\r\n\r\n", 400), (GET[:-2] + b"Host: y\r\n\r\n", 400), (b"nonsense\r\n\r\n", 400),
+    (TWO_LENGTHS, 400), (GET[:-2] + b"a: b\r\n" * 99 + b"\r\n", 200), (GET[:-2] + b"a: b\r\n" * 100 + b"\r\n", 431),
+    (GET[:-2] + b"A: " + b"b" * 65_000 + b"\r\n\r\n", 200), (GET[:-2] + b"A: " + b"b" * 66_000 + b"\r\n\r\n", 431),
+    (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431), (head(SINGLE, 300_000_000), 413),
+    (head(BATCH, 300_000_000), 413),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
 def test_a_head_is_refused_with_its_status(raw, text, status):
     raw.sendall(text)
     found, content = answer(raw)
     assert found == status
-    if status != 200:
-        assert json.loads(content)["status"] == status
+    assert status == 200 or json.loads(content)["status"] == status
 
 
 def test_a_head_without_an_end_is_cut_at_its_limit(raw):
     with suppress(OSError):
-        raw.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\nA: ")
-        for _ in range(100):
-            raw.sendall(b"b" * 100_000)
+        raw.sendall(GET[:-2] + b"A: " + b"b" * 10_000_000)
     assert not to_end(raw).startswith(b"HTTP/1.1 200")
 
 
@@ -131,15 +123,12 @@ SLOW = {
     "empty lines": (b"\r\n", b"\r\n", b""),
     "a head without an end": (GET[:-4] + b"\r\nA: ", b"", b" 408 "),
     "a head, byte by byte": (GET[:-4] + b"\r\nA: ", b"x", b""),
-    "fields without an end": (GET[:-2], b"A: b\r\n", b""),
     "a head after an answer": (GET + GET[:9], b"x", b" 200 "),
     "a body that stops": (head(SINGLE, 90) + b"x", b"", b" 408 "),
     "a batch that stops": (head(BATCH, 90) + b"x", b"", b" 408 "),
     "a body, byte by byte": (head(SINGLE, 5000), b" ", b""),
-    "a large body, byte by byte": (head(SINGLE, 60_000), b" ", b""),
     "a batch, byte by byte": (head(BATCH, 60_000), b" ", b""),
     "chunks": (head(SINGLE, None), chunk(b" "), b""),
-    "chunks of a batch": (head(BATCH, None), chunk(b" "), b""),
     "a line, byte by byte": (head(BATCH, None, NDJSON) + chunk(LINE), chunk(b" "), b'"mu_macro"'),
     "lines until the deadline": (head(BATCH, None, NDJSON), chunk(LINE), b'"mu_macro"'),
 }
@@ -181,9 +170,8 @@ def test_a_client_that_does_not_read_is_disconnected_and_takes_little_memory(str
     assert len(received) < 8_000_000
 
 
-@pytest.mark.parametrize("sent", [300_000, 3_000_000])
-def test_a_client_that_leaves_within_a_body_frees_its_place(strict, sent):
-    for _ in range(3):  # one more than the batches allowed
+def test_a_client_that_leaves_within_a_body_frees_its_place(strict):
+    for sent in (300_000, 3_000_000, 3_000_000):  # one more than the batches allowed
         with connect(strict) as raw:
             raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)
     deadline = time.monotonic() + PATIENCE_S
@@ -201,42 +189,29 @@ def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(s
 
 
 def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(strict):
-    large, few_bytes = columns(20_000), {**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]}
-    compact = json.dumps(few_bytes, separators=(",", ":"))
+    large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
+    compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
     assert len(compact) < 64 * 1024
-    law = json.dumps({**{name: CASE[name] for name in CASE if name != "v0"}, "start": 1e-3, "stop": 1.0})
     with ExitStack() as held:
         idle = [held.enter_context(connect(strict)) for _ in range(3)]
         for raw in idle:
             raw.sendall(head(BATCH, None, NDJSON))
+            assert raw.recv(65536).startswith(b"HTTP/1.1 200 ")  # before its first line
         assert strict.ask("POST", BATCH, large)[0] == 200
-        for raw in idle[:2]:  # now they have a slot each
+        for raw in 2 * idle[:2]:  # now they have a slot each
             raw.sendall(chunk(LINE))
-            while b"mu_macro" not in raw.recv(65536):
+            while b"mu_macro" not in raw.recv(65536):  # while the request is being sent
                 pass
         status, headers, _ = strict.ask("POST", BATCH, large)
         assert (status, headers["retry-after"], headers["connection"]) == (503, "1", "close")
+        unread = held.enter_context(connect(strict))
+        unread.sendall(head(BATCH, 10_000_000))
+        assert answer(unread)[0] == 503
         assert strict.ask("POST", BATCH, iter([large]), encode_chunked=True)[0] == 503
         assert strict.ask("POST", BATCH, compact)[0] == 503  # it asks for much
         assert strict.ask("POST", BATCH, large, {"Content-Type": NDJSON})[0] == 503
-        assert strict.ask("POST", "/v1/law", law)[0] == 200  # questions have their own
+        assert strict.ask("POST", "/v1/law", orjson.dumps(law))[0] == 200  # questions have their own
         assert strict.ask("POST", BATCH, json.dumps([CASE]))[0] == 200
-
-
-def test_a_third_batch_is_refused_unread(strict):
-    deadline = time.monotonic() + PATIENCE_S
-    received = b""
-    while not received.startswith(b"HTTP/1.1 503"):  # once the service has read the heads of the first two
-        assert time.monotonic() < deadline
-        with connect(strict) as first, connect(strict) as second, connect(strict) as third:
-            for raw in (first, second):
-                raw.sendall(head(BATCH, 100_000) + b"[")
-            time.sleep(0.25 * WAIT_S)
-            third.settimeout(0.25 * WAIT_S)
-            third.sendall(head(BATCH, 10_000_000))
-            with suppress(TimeoutError):
-                received = third.recv(65536)
-    assert b"application/problem+json" in received
 
 
 def test_health_is_answered_when_all_connections_are_open(strict):
@@ -257,9 +232,7 @@ def test_health_is_answered_when_all_connections_are_open(strict):
 # --- bodies and streams ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("kind", "step"), [("application/json", 1000), ("application/json", 300_000), (NDJSON, 65_536)]
-)
+@pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])
 def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(live_server, raw, kind, step):
     body = columns(20_000)
     raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
@@ -273,17 +246,6 @@ def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(live_server, ra
     status, received = answer(raw)
     assert status == 200
     assert received.strip() == live_server.ask("POST", BATCH, body)[2]
-
-
-def test_a_stream_is_answered_while_it_is_being_sent(raw):
-    raw.sendall(head(BATCH, None, NDJSON))
-    assert raw.recv(65536).startswith(b"HTTP/1.1 200 ")  # before its first line
-    for _ in range(3):
-        raw.sendall(chunk(LINE))
-        received = b""
-        while b'"mu_macro"' not in received:
-            received += raw.recv(65536)
-    raw.sendall(END)
 
 
 def test_no_piece_of_a_stream_is_lost(raw):
@@ -302,38 +264,26 @@ def test_no_piece_of_a_stream_is_lost(raw):
     assert found == sorted(found)
 
 
-def stream(server, line, count):
-    """Send the line this number of times while another thread reads; return the lines and the largest memory."""
-    lines, sizes = [0], []
-    with connect(server) as raw:
+@pytest.mark.slow
+def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server):
+    line, sizes, received = columns(1000) + b"\n", [], [0, b""]
+    with connect(live_server) as raw:
 
         def read():
-            last = b""
-            while last[-5:] != END and (piece := raw.recv(1 << 20)):
-                lines[0] += piece.count(b"mu_macro")
-                last = piece
+            while received[1] != END and (piece := raw.recv(1 << 20)):
+                received[:] = received[0] + len(piece), (received[1] + piece)[-5:]
 
         reader = threading.Thread(target=read)
         reader.start()
         raw.sendall(head(BATCH, None, NDJSON))
-        for index in range(count):
-            raw.sendall(chunk(line))
-            if index % 50 == 0:
-                sizes.append(server.memory())
+        for _ in range(80):
+            raw.sendall(50 * chunk(line))
+            sizes.append(live_server.memory())
         raw.sendall(END)
         reader.join(PATIENCE_S)
-    return lines[0], max(sizes)
-
-
-@pytest.mark.slow
-def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server):
-    line = columns(1000) + b"\n"
-    stream(live_server, line, 50)
-    lines, short = stream(live_server, line, 1000)  # long enough to fill all buffers
-    assert lines == 1000
-    lines, long = stream(live_server, line, 4000)
-    assert lines == 4000
-    assert long < short + 8  # MB; the answers alone are 300 MB
+    assert received[0] > 250e6  # bytes of answers
+    assert received[1] == END
+    assert max(sizes[30:]) < max(sizes[:30]) + 8  # MB, after all buffers are full
 
 
 @pytest.mark.slow
@@ -368,7 +318,8 @@ def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(se
     assert len(rows) > 8_000_000
     with serving(surrogate.path, MUMACRO_MAX_BATCHES=str(places)) as server, ThreadPoolExecutor(places) as pool:
         base = server.memory("VmHWM")
-        answers = list(pool.map(lambda _: server.ask("POST", BATCH, rows)[0], range(places)))
-        assert answers == [200] * places
+        answers = list(pool.map(lambda _: server.ask("POST", BATCH, rows), range(places)))
+        assert [status for status, _, _ in answers] == [200] * places
+        assert len({body for _, _, body in answers}) == 1
         # A case takes 90 bytes of text, 56 while it is evaluated, 33 until its answer is sent.
         assert 1e6 * (server.memory("VmHWM") - base) < places * (len(rows) + 90 * n) + 20_000_000

@@ -78,24 +78,35 @@ def test_bad_rows_spoil_only_themselves(client):
     assert "lifts off" in fault["reason"]
 
 
+@pytest.mark.parametrize("v0", [1e-4, 0.02, 5.0])
 @pytest.mark.parametrize("name", ["spring", "ball", "along", "ball along", "normal"])
-def test_included_quantities_are_the_librarys(client, surrogate, name):
+def test_included_quantities_are_the_librarys(client, surrogate, name, v0):
     options, inputs = ASKED[name]
-    case = {**RIG, **inputs, "v0": 0.02}
+    case = {**RIG, **inputs, "v0": v0}
     include = ["groups", "limits", "gradient", "stick_fraction", "std", "regime_certain"]
+    include += [] if name == "normal" else ["power"]
     more = {**options, "include": include, "std": {"k": 1e4}}
     answer = client.post(PATH, json={**case, **more}).json()
     found = surrogate.evaluate(**case, **options, gradient=True)
-    assert answer["gradient"] == found.gradient
-    assert answer["groups"] == {"v_tilde": found.v_tilde, "y_tilde": found.y_tilde, "l0": found.length_scale}
-    assert answer["stick_fraction"] == surrogate.stick_fraction_with_bound(found.v_tilde, found.y_tilde, **options)[0]
+    v, y, l0 = found.v_tilde, found.y_tilde, found.length_scale
+    assert answer["groups"] == {"v_tilde": v, "y_tilde": y, "l0": l0}
+    assert (answer["gradient"], answer["gradient_bound"]) == (found.gradient, found.gradient_bound)
+    fraction = surrogate.stick_fraction_with_bound(v, y, **options)
+    assert (answer["stick_fraction"], answer["stick_fraction_bound"]) == fraction
     limits = answer["limits"]
-    for mark, v0 in (("mu_static", 0.0), ("mu_crit", limits["v0_crit"])):
-        there = surrogate.evaluate(**{**case, "v0": v0}, **options).mu_macro
+    for mark, speed in (("mu_static", 0.0), ("mu_crit", limits["v0_crit"])):
+        there = surrogate.evaluate(**{**case, "v0": speed}, **options).mu_macro
         assert limits[mark] == (there if options else close(there, rel=1e-14))
     if options.get("direction") == "along":  # there the contact begins to slide backwards
         assert limits["v0_crit"] == case["y0"] * case["omega"]
-    batch = client.post(BATCH, json={**case, "v0": [0.02], **more}).json()
+    if "power" in include:
+        unit = case["mu0"] * case["Fz"] * l0 * case["omega"]
+        power, bound = surrogate.power_with_bound(v, y, **options)
+        saved = (case["mu0"] - found.mu_macro) * case["Fz"] * v0
+        assert answer["power"] == close({"oscillation": power * unit, "saved": saved}, rel=1e-13)
+        assert answer["power_bound"]["oscillation"] == close(bound * unit, rel=1e-13)
+        assert answer["power_bound"]["saved"] == close(found.error_bound * case["Fz"] * v0, rel=1e-2, abs=1e-14)
+    batch = client.post(BATCH, json={**case, "v0": [v0], **more}).json()
     for quantity in ("limits", "gradient"):
         assert batch[quantity] == {name: [value] for name, value in answer[quantity].items()}
     assert batch["std"] == [answer["std"]]

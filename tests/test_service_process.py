@@ -88,17 +88,6 @@ def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure
     assert "Traceback" not in failed.stdout + failed.stderr
 
 
-@pytest.mark.slow
-def test_batches_at_once_are_all_answered(serving, surrogate, case):
-    body = json.dumps([{**case, "v0": 1e-4 * index} for index in range(2000)])
-    with serving(surrogate.path, MUMACRO_MAX_BATCHES="8") as server:
-        with ThreadPoolExecutor(8) as pool:
-            answers = list(pool.map(lambda _: server.ask("POST", BATCH, body), range(60)))
-        assert {status for status, _, _ in answers} == {200}
-        assert len({body for _, _, body in answers}) == 1
-        assert server.stop() == 0
-
-
 # --- the log --------------------------------------------------------------------------------------------
 
 
@@ -171,16 +160,21 @@ def statuses(port, path, many):
 
 
 @pytest.mark.slow
-def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case):
+@pytest.mark.parametrize("then", ["reads", "stays", "leaves"])
+def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case, then):
     query = f"{SINGLE}?" + "&".join(f"{name}={value}" for name, value in case.items())
+    many = 3000 if then == "reads" else 500
     with unread(repository, surrogate) as (process, port, lines):
+        if then == "leaves":
+            process.stdout.close()
         # Some 250 bytes a line: a pipe holds 64 kB, and the service a megabyte.
         with ThreadPoolExecutor(4) as pool:
-            answered = [pool.submit(statuses, port, *asked) for asked in 4 * [(query, 3000)] + 4 * [("/x", 500)]]
-        assert [one.result() for one in answered] == 4 * [3000 * [200]] + 4 * [500 * [404]]
+            answered = [pool.submit(statuses, port, *asked) for asked in 4 * [(query, many), ("/x", 500)]]
+        assert [one.result() for one in answered] == 4 * [many * [200], 500 * [404]]
+        if then != "reads":
+            return
         reader = threading.Thread(target=lambda: lines.extend(process.stdout))
         reader.start()
-        assert statuses(port, "/y", 1) == [404]
         process.terminate()
         assert process.wait(60) == 0
         reader.join(60)
@@ -189,12 +183,3 @@ def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case)
     lost = sum(int(line["message"].split()[0]) for line in told)
     assert lost > 0
     assert lost + len(accesses(lines)) >= 14_000
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("leaves", [False, True])
-def test_a_log_reader_that_stays_stalled_or_leaves_ends_nothing(repository, surrogate, leaves):
-    with unread(repository, surrogate) as (process, port, _):
-        if leaves:
-            process.stdout.close()
-        assert statuses(port, "/nowhere", 2000) == 2000 * [404]

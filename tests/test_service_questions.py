@@ -84,7 +84,7 @@ def test_folded_roots_are_all_returned_within_the_range(client):
 
 
 def test_a_law_is_single_answers_in_a_row(client):
-    law = answered(client, "law", LAW)
+    law = answered(client, "law", LAW, points=33.0)  # an integer may be written so
     assert (law["along"], law["unit"]) == ("v0", "m/s")
     assert (law["values"][0], law["values"][-1], len(law["values"])) == (1e-4, 10.0, 33)
     for i in (0, 16, 32):
@@ -102,9 +102,8 @@ def test_a_law_is_single_answers_in_a_row(client):
 
 def test_a_family_has_a_law_for_each_of_its_values(client, problem):
     laws = answered(client, "law", LAW, k=..., family={"k": [1e5, 1e6]})
-    assert (laws["family"], laws["family_unit"], [curve["value"] for curve in laws["curves"]]) == (
-        "k", "N/m", [1e5, 1e6],
-    )  # fmt: skip
+    assert (laws["family"], laws["family_unit"]) == ("k", "N/m")
+    assert [curve["value"] for curve in laws["curves"]] == [1e5, 1e6]
     assert laws["curves"][1]["mu_macro"] == answered(client, "law", LAW)["mu_macro"]
     for changed, words in (({"family": {"v0": [1.0]}}, "is the swept input"), ({"family": {"k": [0.0]}}, "k must be"),
                            ({"family": {"k": [1e6] * 3}, "points": 10_001}, "up to 20002 points")):  # fmt: skip
@@ -149,11 +148,6 @@ def test_the_table_for_spreadsheets_is_the_law(client):
     assert response.text.count("\r\n") == 34
     head = client.head("/v1/law.csv", params=LAW)
     assert (head.status_code, head.content) == (200, b"")
-
-
-def test_an_integer_may_be_written_with_a_decimal_point(client):
-    body = json.dumps({**LAW, "points": 5}).replace('"points": 5', '"points": 5.0')
-    assert len(client.post("/v1/law", content=body).json()["values"]) == 5
 
 
 @pytest.mark.parametrize(("path", "given"), [("solve-for", SOLVE), ("law", LAW)])
