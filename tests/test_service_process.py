@@ -16,7 +16,7 @@ import pytest
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 #: texts that a client behind a proxy can send in place of its address
-NO_ADDRESS = ['a"b', "a\\", '1.2.3.4" "level": "error', "\t1.2.3.4", "{}", "\u00e9\u00ff", "a" * 5000]
+NO_ADDRESS = ['a"b', "a\\", '1.2.3.4" "level": "error', "\t1.2.3.4", "{}", "\u00e9\u00ff", "a" * 64 + "b" * 5000]
 NO_PATH = ("/%0a%7B%22level%22%3A%22error%22%7D", "/%22", "/%00", "/%ff", "/%E2%80%A8", "/a%0d%0ab")
 
 
