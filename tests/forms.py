@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import pyarrow as pa
+
 Row = dict[str, Any]
 BATCH = "/v1/mu-macro/batch"
 TYPES = {
@@ -34,15 +36,11 @@ def as_ndjson(rows: Sequence[Row]) -> str:
 
 def as_table(rows: Sequence[Row]) -> Any:
     """Columns of pyarrow."""
-    import pyarrow as pa
-
     return pa.table({name: pa.array([number(row[name]) for row in rows], pa.float64()) for name in rows[0]})
 
 
 def stream_of(table: Any, **options: Any) -> bytes:
     """A table or a record batch of pyarrow as a stream."""
-    import pyarrow as pa
-
     sink = pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, table.schema, options=pa.ipc.IpcWriteOptions(**options)) as writer:
         writer.write(table)
@@ -72,8 +70,6 @@ def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Ro
 def read(form: str, response: Any) -> list[Row]:
     """The cases of an answer."""
     if form == "arrow":
-        import pyarrow as pa
-
         return list(pa.ipc.open_stream(response.content).read_all().to_pylist())
     return rows_of(form, response.text)
 

@@ -7,7 +7,6 @@ import pyarrow as pa
 import pytest
 
 from forms import BATCH, as_csv, as_ndjson, asked, posted, read, stream_of
-from mumacro.inputs import FIELDS
 
 VALUES = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 GAP = "is missing; write rigid or a number"
@@ -227,13 +226,12 @@ def test_a_bad_arrow_case_affects_only_itself(client, case):
     assert rows[4]["mu_macro"] == one(client, {**case, "k": None, "v0": 0.1})["mu_macro"]
 
 
-def test_arrow_numbers_of_other_types_are_numbers_and_no_rows_are_a_batch(client, case):
-    columns = {name: pa.array([value], type=pa.float32()) for name, value in case.items()}
-    columns["Fz"] = pa.array([10], type=pa.int16())
-    (row,) = read("arrow", posted(client, "arrow", stream_of(pa.record_batch(columns))))
+def test_arrow_numbers_of_other_types_are_numbers(client, case):
+    given = pa.record_batch({name: pa.array([value], type=pa.float32()) for name, value in case.items()})
+    given = given.set_column(1, "Fz", pa.array([10], type=pa.int16()))
+    (row,) = read("arrow", posted(client, "arrow", stream_of(given)))
     assert row["mu_macro"] == one(client, {name: float(np.float32(x)) for name, x in case.items()})["mu_macro"]
-    empty = pa.schema([(name, pa.float64()) for name in FIELDS]).empty_table()
-    answer = pa.ipc.open_stream(posted(client, "arrow", stream_of(empty)).content).read_all()
+    answer = pa.ipc.open_stream(posted(client, "arrow", stream_of(given.slice(1))).content).read_all()
     assert (answer.num_rows, answer.schema.names[:5]) == (0, list(VALUES))
 
 

@@ -13,17 +13,14 @@ RIG = {"mu0": 0.3, "Fz": 10.0, "omega": 1.3e5}
 NORMAL = {"k": 1e6, "Fz_amplitude": 4.0}
 ACROSS = {"k": 1e6, "y0": 2e-6}
 ENDS = {"k_low": 0.8e6, "k_high": 1.3e6}
+BALL = {"contact": "ball"}
 ASKED = {
-    "spring": ({}, ACROSS),
-    "ball": ({"contact": "ball"}, ACROSS),
-    "rigid ball": ({"contact": "ball"}, {"k": "rigid", "y0": 2e-6}),
-    "along": ({"direction": "along"}, ACROSS),
-    "ball along": ({"contact": "ball", "direction": "along"}, ACROSS),
-    "normal": ({"direction": "normal"}, NORMAL),
-    "interval": ({}, {**ENDS, "y0": 2e-6}),
-    "interval of a ball": ({"contact": "ball"}, {**ENDS, "y0": 2e-6}),
+    "spring": ({}, ACROSS), "ball": (BALL, ACROSS), "rigid ball": (BALL, {"k": "rigid", "y0": 2e-6}),
+    "along": ({"direction": "along"}, ACROSS), "ball along": ({**BALL, "direction": "along"}, ACROSS),
+    "normal": ({"direction": "normal"}, NORMAL), "interval": ({}, {**ENDS, "y0": 2e-6}),
+    "interval of a ball": (BALL, {**ENDS, "y0": 2e-6}),
     "interval, normal": ({"direction": "normal"}, {**ENDS, "Fz_amplitude": 4.0}),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ASKED)

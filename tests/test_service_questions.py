@@ -40,19 +40,15 @@ def test_a_root_gives_its_target_back(client):
     assert root["low"] < root["value"] < root["high"] < (1.0 + 1e-9) * root["low"]
 
 
-def test_a_frequency_ratio_and_included_quantities_are_those_of_the_root(client):
-    by_omega, by_f = (
-        answered(client, "solve-for", SOLVE, unknown=name, y0=2e-6, omega=..., target=0.8, quantity="mu_ratio",
-                 include=["power"])
-        for name in ("omega", "f")
-    )  # fmt: skip
-    assert (by_f["unit"], by_f["quantity"]) == ("Hz", "mu_ratio")
-    (in_radians,), (in_hertz,) = by_omega["results"][0]["roots"], by_f["results"][0]["roots"]
-    for end in ("value", "low", "high"):
-        assert 2 * math.pi * in_hertz[end] == close(in_radians[end], rel=1e-14)
-    there = answered(client, "mu-macro", CASE, omega=in_radians["value"], include=["power"])
+def test_a_frequency_is_solved_for_by_a_ratio_with_what_is_included(client):
+    ratio = {**SOLVE, "unknown": "f", "y0": 2e-6, "omega": ..., "target": 0.8, "quantity": "mu_ratio"}
+    answer = answered(client, "solve-for", ratio, include=["power"])
+    assert (answer["unit"], answer["quantity"]) == ("Hz", "mu_ratio")
+    (root,) = answer["results"][0]["roots"]
+    there = answered(client, "mu-macro", CASE, omega=..., f=root["value"], include=["power"])
     assert there["mu_ratio"] == close(0.8, rel=1e-14)
-    assert in_radians["power"]["saved"] == close(there["power"]["saved"], rel=1e-13)
+    assert root["power"] == close(there["power"], rel=1e-13)
+    assert root["low"] < root["value"] < root["high"]
 
 
 def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client):
@@ -100,15 +96,11 @@ def test_a_law_is_single_answers_in_a_row(client):
     assert "approximations" not in law
 
 
-def test_a_family_has_a_law_for_each_of_its_values(client, problem):
+def test_a_family_has_a_law_for_each_of_its_values(client):
     laws = answered(client, "law", LAW, k=..., family={"k": [1e5, 1e6]})
     assert (laws["family"], laws["family_unit"]) == ("k", "N/m")
     assert [curve["value"] for curve in laws["curves"]] == [1e5, 1e6]
     assert laws["curves"][1]["mu_macro"] == answered(client, "law", LAW)["mu_macro"]
-    for changed, words in (({"family": {"v0": [1.0]}}, "is the swept input"), ({"family": {"k": [0.0]}}, "k must be"),
-                           ({"family": {"k": [1e6] * 3}, "points": 10_001}, "up to 20002 points")):  # fmt: skip
-        given = {name: value for name, value in {**LAW, **changed}.items() if name != "k"}
-        assert words in problem(client.post("/v1/law", json=given), 422)["detail"]
 
 
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega", "f"])
@@ -148,12 +140,6 @@ def test_the_table_for_spreadsheets_is_the_law(client):
     assert response.text.count("\r\n") == 34
     head = client.head("/v1/law.csv", params=LAW)
     assert (head.status_code, head.content) == (200, b"")
-
-
-@pytest.mark.parametrize(("path", "given"), [("solve-for", SOLVE), ("law", LAW)])
-def test_a_tolerance_picks_the_table(client, path, given):
-    for table in client.get("/v1/table").json()["loaded"]:
-        assert answered(client, path, given, tolerance=table["tolerance"])["table"] == table
 
 
 # --- stiffness and fit ----------------------------------------------------------------------------------

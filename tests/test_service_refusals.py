@@ -118,6 +118,9 @@ REFUSED = [
     ("GET law.csv?mu0=0.4", {}, "?mu0", "is given more than once"),
     ("GET law.csv", {"omega": ...}, "?omega", "is required"),
     *(("GET law.csv", {"Fz": text}, "?Fz", "") for text in ("", "ten", "nan", "inf", "1e999", "0x10", "1_000")),
+    *(("POST law", {"k": ..., **changed}, place, words) for changed, place, words in (
+        ({"family": {"v0": [1]}}, "#/family", "is the swept input"), ({"family": {"k": [0]}}, "#/family", "k must be"),
+        ({"family": {"k": [1e6] * 3}, "points": 10_001}, "#/points", "up to 20002 points"))),
     ("POST law?mu0=1", {}, "?mu0", "belongs in the body"),
     # solve-for
     *(("POST solve-for", {name: value}, f"#/{name}", words) for name, value, words in (

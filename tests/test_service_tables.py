@@ -35,9 +35,13 @@ def test_the_table_describes_itself(client, surrogate):
     [(None, "1e-12"), (1e-12, "1e-12"), (9e-11, "1e-12"), (1e-10, "1e-10"), (2e-8, "1e-10"), (1e-7, "1e-7"),
      (1, "1e-4")],
 )  # fmt: skip
-def test_the_smallest_table_that_is_tight_enough_is_picked(client, tolerance, name):
+def test_the_smallest_table_that_is_tight_enough_is_picked(client, case, tolerance, name):
     picked = client.get("/v1/table", params={} if tolerance is None else {"tolerance": tolerance}).json()
     assert picked["id"] == f"mumacro-{name}"
+    for path, more in (("mu-macro", {}), ("law", {"v0": None, "start": 0.1, "stop": 1.0}),
+                       ("solve-for", {"v0": None, "unknown": "v0", "target": 0.1})):  # fmt: skip
+        answer = client.post(f"/v1/{path}", json={**case, **more, "tolerance": tolerance}).json()
+        assert answer["table"] == picked["table"]
     assert [label["tolerance"] for label in picked["loaded"]] == [1e-12, 1e-10, 1e-7, 1e-4]
 
 
