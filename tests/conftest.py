@@ -3,6 +3,7 @@
 import importlib
 import os
 import re
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -23,11 +24,13 @@ from tests.serving import Server
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from starlette.testclient import TestClient
 
+REPOSITORY = Path(__file__).resolve().parent.parent
+
 
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The root of the source tree."""
-    return Path(__file__).resolve().parent.parent
+    return REPOSITORY
 
 
 @pytest.fixture(scope="session")
@@ -95,6 +98,18 @@ def live_server(surrogate: Surrogate) -> Iterator[Server]:
 def serving() -> Callable[..., AbstractContextManager[Server]]:
     """A separate service process, until the context ends."""
     return servers.serving
+
+
+@pytest.fixture(scope="session")
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of the example server for UM-Bridge."""
+    pytest.importorskip("umbridge", reason="the PyPI package umbridge is not installed")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "examples/umbridge_server.py", str(port)]
+    with servers.running(command, tmp_path_factory.mktemp("bridge") / "log") as server:
+        yield server.url
 
 
 @pytest.fixture(scope="session")

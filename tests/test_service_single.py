@@ -94,14 +94,18 @@ def test_one_value_is_returned_as_text_and_answers_may_be_cached(client, case):
 
 
 @pytest.mark.parametrize(
-    ("change", "limits"),
-    [({"y0": 0}, (0.3, 0.0, 0.3)), ({"omega": 0}, (0.3, 0.0, 0.3)), ({"y0": 0, "k": None}, (0.3, 0.0, 0.3)),
-     ({"omega": 0, "k": None}, (0.3, 0.0, 0.3)), ({"k": None}, (0.0, 0.0, 0.0))],
+    ("change", "limits", "power"),
+    [*(({name: 0, **rest}, (0.3, 0.0, 0.3), 0.0) for name in ("y0", "omega") for rest in ({}, {"k": None})),
+     ({"k": None}, (0.0, 0.0, 0.0), None)],
 )  # fmt: skip
-def test_the_limits_without_oscillation_are_coulombs_and_those_of_rigid_contact_zero(client, case, change, limits):
-    answer = ask(client, {**case, **change}, include=["limits"])
+def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, limits, power):
+    answer = ask(client, {**case, **change}, include=["limits", "power", "stick_fraction"])
     assert tuple(answer["limits"].values()) == limits
     assert (answer["mu_macro"] == 0.3) == (limits[0] == 0.3)
+    assert answer["power"]["oscillation"] == answer["power_bound"]["oscillation"] == power
+    assert answer["power"]["saved"] == close((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
+    assert answer["stick_fraction"] == answer["stick_fraction_bound"] == 0.0
+    assert 0.0 <= answer["power_bound"]["saved"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
 
 
 @pytest.mark.parametrize("y0", [3e-8, 2e-6, 3e-6, 3e-5, 3e-3])
@@ -132,15 +136,6 @@ def test_the_standard_deviation_is_the_root_of_squares(client, case, k):
     assert "gradient" not in only
     assert only["std"] == close(0.01 * abs(slopes["mu0"]), rel=1e-12)
     assert ask(client, case, include=["std"], std={})["std"] == 0.0
-
-
-@pytest.mark.parametrize(("change", "power"), [({"y0": 0}, 0.0), ({"omega": 0}, 0.0), ({"k": None}, None)])
-def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, power):
-    answer = ask(client, {**case, **change}, include=["power", "stick_fraction"])
-    assert (answer["power"]["oscillation"], answer["stick_fraction"]) == (power, 0.0)
-    assert answer["power"]["saved"] == close((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
-    assert (answer["power_bound"]["oscillation"], answer["stick_fraction_bound"]) == (power, 0.0)
-    assert 0.0 <= answer["power_bound"]["saved"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
 
 
 @pytest.mark.parametrize(

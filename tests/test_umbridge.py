@@ -1,14 +1,10 @@
 """The example server for UM-Bridge, asked by the client of the package."""
 
-import socket
-import sys
-
 import pytest
 
 from comparing import close
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
-from tests.serving import running
 
 umbridge = pytest.importorskip("umbridge", reason="the PyPI package umbridge is not installed")
 
@@ -16,14 +12,8 @@ POINT = [0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]
 
 
 @pytest.fixture(scope="module")
-def model(tmp_path_factory):
-    """The model of the example server, in a process of its own."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "examples/umbridge_server.py", str(port)]
-    with running(command, tmp_path_factory.mktemp("bridge") / "log") as server:
-        yield umbridge.HTTPModel(server.url, "mu_macro")
+def model(bridge):
+    return umbridge.HTTPModel(bridge, "mu_macro")
 
 
 def test_values_and_slopes_are_those_of_the_library(model):
