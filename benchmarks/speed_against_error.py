@@ -241,17 +241,19 @@ def plot(rows: list[Row], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.5, 6.0), layout="constrained")
+    figure = Figure(figsize=(9.5, 5.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(xscale="log", yscale="log", ylabel="ns per point, one thread")
     axes.set_xlabel(r"largest error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000")
+    colors = iter(("#c1272d", "#1f5fa8", "#2a8c8c", "#8a8a8a", "#b07aa1", "#e08214", "#222222"))
     shown = [row for row in rows if row.max_abs == row.max_abs and "threads" not in row.size]
     for name in dict.fromkeys("our tables" if row.kind == OURS else row.name for row in shown):
         line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.name)]
-        own = {"color": "#c1272d", "lw": 2.2} if line[0].kind == OURS else {"lw": 1.0}
+        color = next(colors)
+        own = {"color": color, "lw": 2.2 if line[0].kind == OURS else 1.0}
         axes.plot([row.max_abs for row in line], [row.ns for row in line], "o-", label=name, **own)
     axes.grid(color="#e4e4e4")
-    axes.legend(fontsize=8, ncols=2)
+    axes.legend(fontsize=9, loc="upper left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=100, metadata={"Software": None})
 
