@@ -43,7 +43,7 @@ export class Field {
 }
 
 export class Form {
-  /** `set({ name: quantity })`, `change(part of the state)` when something is committed; `blame(name, fault, empty)`. */
+  /** `set({ name: quantity })`, `change(part of the state)` when something is chosen; `blame(name, fault, empty)`. */
   constructor(set, change, blame) {
     Object.assign(this, { blame, rows: {} });
     this.rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
@@ -73,9 +73,8 @@ export class Form {
       fault.classList.toggle("bad", why !== null && !empty);
       this.blame(name, why && fault.textContent, empty);
     });
-    const rigid = make("label", { class: "switch" }, this.rigid, "rigid (no spring)");
-    const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider,
-      name === "k" ? rigid : null, fault);
+    const rigid = name === "k" && make("label", { class: "switch" }, this.rigid, "rigid (no spring)");
+    const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider, rigid, fault);
     this.rows[name] = { row, slider, field };
     return row;
   }

@@ -117,17 +117,17 @@ export class Frame {
 }
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const LOOKS = ["text-anchor", "fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "font",
-  "paint-order"];
+const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "font",
+  "text-anchor", "paint-order"];
 
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
 export class Plot {
   constructor(svg, paint) {
     Object.assign(this, { svg, paint, waiting: false });
-    new ResizeObserver(() => this.remake()).observe(svg);
+    new ResizeObserver(() => this.redraw()).observe(svg);
   }
 
-  remake() {
+  redraw() {
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {
