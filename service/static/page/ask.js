@@ -85,11 +85,11 @@ export class Status {
   /** Says what is wrong with a topic, or (null) that nothing is; `calm`: it mends itself, or is not typed yet. */
   set(topic, text, calm = false) {
     const old = this.answered ? " Grey results belong to earlier values." : "";
+    this.reasons.delete(topic);
     if (text) this.reasons.set(topic, { text: text + old, calm });
-    else this.reasons.delete(topic);
-    // one reason is enough; what the user can mend comes first
+    // one reason is enough: what was typed, else the newest
     const all = [...this.reasons];
-    const [, first = { text: "" }] = all.find(([name]) => name.startsWith("typed")) ?? all[0] ?? [];
+    const [, first = { text: "" }] = all.find(([name]) => name.startsWith("typed")) ?? all.at(-1) ?? [];
     if (this.place.textContent !== first.text) this.place.textContent = first.text;
     this.place.classList.toggle("bad", first.calm === false);
     this.shown.classList.toggle("old", this.reasons.size > 0);

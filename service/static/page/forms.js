@@ -121,6 +121,7 @@ function panel(name, path, read, show) {
     const { found: now } = attempt(() => read(state));
     if (now) status.set("typed", null);
     const same = !answered || JSON.stringify(now) === answered;
+    if (same) status.set(name, null);
     status.set("changed", same ? null : "This was asked with other values.", true);
   };
   const channel = status.channel(name, (asked) => post(path, asked), (found, asked) => {
@@ -253,6 +254,6 @@ function picture(width, height, { v0, mu_macro: mu, std = [] }, curve, unit) {
   const frame = new Frame(width, height, x, { low: 0, high: top, title: "µ macro" });
   return [frame.axes(), frame.inside(
     curve && [frame.band(at, curve.low, curve.high), frame.curve(at, curve.mu_macro, "curve")],
-    speeds.map((one, i) => [frame.curve([one, one], ends[i], "error"), frame.dot(one, mu[i], 3.5, "measured")]),
+    speeds.map((one, i) => [frame.curve([one, one], ends[i], "measured"), frame.dot(one, mu[i], 3.5, "measured")]),
   )];
 }
