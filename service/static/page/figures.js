@@ -2,7 +2,7 @@
 import { Status } from "./ask.js";
 import { Field } from "./forms.js";
 import {
-  INPUTS, REGIMES, caseOf, fromSI, inUnit, namesOf, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  INPUTS, caseOf, fromSI, inUnit, inWords, namesOf, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { post } from "./service.js";
@@ -53,13 +53,11 @@ export function mapPanel(set, nudge) {
     return `ṽ = ${show(v, 3)}, ỹ = ${show(a, 3)}: µ/µ₀ ≈ ${here}`;
   }
 
-  /** Moves the point: v~ by the speed, y~ by the amplitude. */
+  /** Moves the point, where there is one: v~ by the speed, y~ by the amplitude. */
   function pick(v, y) {
     const [mu0, Fz, k, omega] = ["mu0", "Fz", "k", "omega"].map((name) => valueOf(state, name));
-    const why = "Without a frequency, or for another contact, there is no point inside the map.";
-    const rigid = "A rigid contact has no point inside the map: switch it off to move the point.";
-    if (k !== Infinity && omega && isMapped(state)) set({ v0: ((v * mu0 * Fz) / k) * omega, y0: (y * mu0 * Fz) / k });
-    else $("map-read").textContent = k === Infinity ? rigid : why;
+    const length = (mu0 * Fz) / k; // 0 for a rigid contact
+    if (length && omega && isMapped(state)) set({ v0: v * length * omega, y0: y * length });
   }
 
   /** Marks the point of an answer: { asked, groups, mu_ratio, regime }; says where there is none. */
@@ -80,7 +78,7 @@ export function mapPanel(set, nudge) {
         .filter(([, value, axis]) => value < axis?.start || value > axis?.stop)
         .map(([name, value]) => `${name} = ${show(value, 3)}`).join(", ");
       if (away) out = `The point is outside of this map (${away}): the arrow on the frame points to it.`;
-      const here = `speed ${show(v, 3)}, amplitude ${show(y, 3)}, ratio ${show(mu_ratio, 3)}, ${REGIMES[regime]}`;
+      const here = `speed ${show(v, 3)}, amplitude ${show(y, 3)}, ratio ${show(mu_ratio, 3)}, ${inWords(regime)}`;
       $("map").setAttribute("aria-label", `Map of the friction ratio. The point: ${here}.`);
     }
     $("map-section").classList.toggle("other", !isMapped(asked));
@@ -172,7 +170,7 @@ export function lawPanel(change, set, nudge) {
   function read(i) {
     cursor = i;
     plot.redraw();
-    const told = () => `${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${REGIMES[law.regime[i]]}`;
+    const told = () => `${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${inWords(law.regime[i])}`;
     $("law-read").textContent = i === null ? EMPTY : told();
   }
 

@@ -1,7 +1,7 @@
 // Typed fields, the form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  CHOICES, INPUTS, REGIMES, RIGID, about, attempt, caseOf, fromSI, inUnit, namesOf, powerOf, readPoints, readQuantity,
+  CHOICES, INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
   readValue, rounded, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
@@ -153,19 +153,15 @@ export function solver(use) {
     const [unknown, quantity] = [$("unknown").value, $("quantity").value];
     const { low: target } = within("target", () => readQuantity("mu0", $("target").value, "-"));
     return { ...caseOf(state, [unknown]), unknown, quantity, target, include: powerOf(state) };
-  }, ({ unknown, quantity, reachable, results: [{ roots, reason }] }, asked, state) => {
+  }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
     const { unit } = state.given[unknown];
-    const symbol = symbolOf(unknown, unit);
-    const { min, max, min_included, max_included } = reachable;
-    const [from, to] = [min_included ? "from" : "from above", max_included ? "to" : "to below"];
-    const can = `${quantity === "mu_ratio" ? "µ/µ₀" : "µ"} can be ${from} ${show(min, 4)} ${to} ${show(max, 4)} here`;
-    const none = items([min === max ? reason : `No value of ${symbol} gives that: ${can}.`]);
-    $("solve-result").replaceChildren(...(roots.length ? [] : none), ...roots.map((root) => {
-      const told = `${symbol} = ${inUnit(unknown, root.value, unit, 6)}`;
+    const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
+    $("solve-result").replaceChildren(...items(roots.length ? [] : [none]), ...roots.map((root) => {
+      const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, root.value, unit, 6)}`;
       const button = make("button", { "aria-label": `use ${told}` }, "Use");
       button.addEventListener("click", () => use({ [unknown]: rounded(unknown, root.value, unit, 15) }));
       const shaker = root.power ? `, shaker ${inUnit("power", root.power.oscillation)}` : "";
-      return make("li", {}, `${told}: µ = ${show(root.mu_macro, 5)}, ${REGIMES[root.regime]}${shaker}`, button);
+      return make("li", {}, `${told}: µ = ${show(root.mu_macro, 5)}, ${inWords(root.regime)}${shaker}`, button);
     }));
   });
   return (state) => {

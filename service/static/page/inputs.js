@@ -19,10 +19,8 @@ export const CHOICES = {
     normal: "an oscillating normal force",
   },
 };
-export const REGIMES = {
-  continuous: "continuous sliding", stick_slip: "stick–slip", static: "at rest", partial_slip: "partial slip",
-  reverse_slip: "slip back and forth",
-};
+/** The name of a regime in words. */
+export const inWords = (name) => name.replaceAll("_", " ");
 const POWER = {
   offered: ["kW", "mW", "µW", "nW", "W"],
   units: { kW: [1e3, 1], W: [1, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9] },

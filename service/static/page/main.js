@@ -3,8 +3,8 @@ import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
 import { Form, fit, solver, stiffness } from "./forms.js";
 import {
-  CHOICES, INPUTS, REGIMES, about, attempt, friction, fromAddress, inUnit, isWide, namesOf, question, rounded,
-   setNames, show, startState, symbolOf, toAddress, valueOf,
+  CHOICES, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, isWide, namesOf, question, rounded,
+  setNames, show, startState, symbolOf, toAddress, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
 import { get, post } from "./service.js";
@@ -101,7 +101,7 @@ function showAnswer({ asked, ...found }) {
   const kind = k.low === Infinity ? "rigid contact" : CHOICES.contact[asked.contact];
   const motion = CHOICES.direction[asked.direction];
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
-  $("regime").textContent = REGIMES[found.regime];
+  $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
   $("model").textContent = `Model: ${kind}, ${motion}; not compared with measured points.`;
   $("rows").replaceChildren(...(found.model ?? []).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
