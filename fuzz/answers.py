@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.measuring import main, markdown, quantity
 from builder.limits import V_RANGE, Y_RANGE
-from builder.measure import SEAMS
 from builder.sweep import Sweep
-from builder.verify import _both_sides
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from mumacro.library import kernels
@@ -164,17 +162,6 @@ def neighbours(table: Surrogate, share: float) -> Count:
     return count
 
 
-def seams(table: Surrogate, share: float) -> Count:
-    """Points 2e-13 apart on both sides of every seam and of the border."""
-    count = Count()
-    for v1, v2, y1, y2 in _both_sides(table, max(200, int(N // (len(SEAMS) + 3) * share)), 7):
-        one, two = table.ratio_with_bound(v1, y1), table.ratio_with_bound(v2, y2)
-        change = np.maximum(np.abs(one[0] - two[0]) - 4e-13 * one[0], 0.0)  # mu~ may change by the relative distance
-        allowed = one[1] + two[1]
-        count.add(change > allowed, change / allowed)
-    return count
-
-
 def fresh_solves(table: Surrogate, share: float) -> Count:
     """|table - full model| against bound + error estimate of the solver, in the solver's range."""
     count = Count()
@@ -238,7 +225,6 @@ PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
     "(Fz, k) or (v0, omega) by a power of two: the same bits": partial(scaled, by_twos=True),
     "(Fz, k) or (v0, omega) by any factor": partial(scaled, by_twos=False),
     "one input to the next double": neighbours,
-    "on both sides of every seam": seams,
     "the bound covers a fresh solve, in the solver's range": fresh_solves,
     "the same source, and a value within both bounds, on any processor": on_any_processor,
     "the same bits alone, in any order, as columns, with 1 and 2 threads": same_bits,

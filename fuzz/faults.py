@@ -1,6 +1,6 @@
 """Faults of disks, permissions, processes and clocks: no data are lost, and the same command resumes.
 
-    python fuzz/faults.py [--only killed_builds] [--share 0.1] [--write]
+    python fuzz/faults.py [--write]
 
 Small disks are mounted as tmpfs and permissions are removed for another user; both need root.  A trial
 that cannot be made on this machine is reported as "not tried".
@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,6 @@ from mumacro.writing import alone_in
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
 TOLERANCE = "1e-2"
-NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a user that owns nothing
 
 
@@ -64,9 +63,8 @@ def checksum(path: Path) -> str:
 
 def cases(path: Path, n: int) -> Path:
     """A CSV file of random cases."""
-    rng = np.random.default_rng(1)
-    rows = 10.0 ** rng.uniform([-2, -1, 4, -8, 2, -5], [0, 3, 8, -4, 6, 1], (n, 6))
-    path.write_text("\n".join([",".join(NAMES), *(",".join(map(repr, row)) for row in rows.tolist()), ""]))
+    rows = 10.0 ** np.random.default_rng(1).uniform([-2, -1, 4, -8, 2, -5], [0, 3, 8, -4, 6, 1], (n, 6))
+    np.savetxt(path, rows, "%.17g", ",", header="mu0,Fz,k,y0,omega,v0", comments="")
     return path
 
 
@@ -192,6 +190,26 @@ def two_builds_to_one_output(folder: Path) -> str:
 ASK = ("-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01", "--json", "--table", "1e-4")
 
 
+def killed_builds(folder: Path, kills: int = 20) -> str:
+    """At random moments, each followed by the same command."""
+    out, chance, resumed, done = folder / "rough.nc", random.Random(7), 0, 0  # noqa: S311
+    begun = time.perf_counter()
+    run(*build(folder / "whole.nc"))
+    most = (time.perf_counter() - begun) / 2.0
+    for _ in range(kills):
+        resumed += bool(list(folder.glob(f"{out.name}.checkpoint/*.npy")))
+        done += out.exists()
+        process = subprocess.Popen([sys.executable, *build(out)], cwd=ROOT, env=ENVIRONMENT, stdout=-3, stderr=-3)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=chance.uniform(0.0, most))
+        process.kill()
+        process.wait()
+    run(*build(out))
+    assert checksum(out) == checksum(folder / "whole.nc")
+    assert left(folder) == ["rough.nc", "whole.nc"], left(folder)
+    return f"{kills} kills, {resumed} starts from finished parts, {done} after an end: the same data, no file left"
+
+
 def no_home(folder: Path) -> str:
     if os.getuid() != 0:
         raise NotTriedError("only root may run a trial as a user without a home")
@@ -228,13 +246,14 @@ FAULTS: dict[str, Callable[[Path], str]] = {
     "disk full while eval runs": full_disk_in_eval,
     "no permission to write a build": lost_permission_in_a_build,
     "no home, and an unwritable one": no_home,
+    "SIGKILL of builds": killed_builds,
     "disk full while a table is written": full_disk_in_writing_a_table,
     "no permission to write a table": lost_permission_in_writing_a_table,
     "no permission to write eval's output": lost_permission_in_eval,
     "two builds to one output": two_builds_to_one_output,
     "a clock that steps": clock_steps,
 }
-QUICK = [*FAULTS][4:]
+QUICK = [*FAULTS][5:]
 
 
 def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
@@ -248,49 +267,13 @@ def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
             return "FAILED", " ".join(str(error).split())[:300]
 
 
-def faults(share: float) -> str:  # noqa: ARG001 (every fault is tried once)
+def faults() -> str:
     """Every fault once."""
     rows = [[name, *tried(fault)] for name, fault in FAULTS.items()]
     return markdown(("fault", "result", "what was seen"), rows, 3)
 
 
-def killed_builds(share: float, total: int = 20) -> str:
-    """Builds that are killed at random moments and restarted until they are complete."""
-    total = max(1, round(total * share))
-    chance = random.Random(7)  # noqa: S311
-    killed = resumed = 0
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        begun = time.perf_counter()
-        run(*build(folder / "whole.nc"))
-        whole = time.perf_counter() - begun
-        outs = [folder / "0.nc"]
-        while killed < total:
-            if outs[-1].exists():
-                outs.append(folder / f"{len(outs)}.nc")
-            resumed += bool(list(folder.glob(f"{outs[-1].name}.checkpoint/*.npy")))
-            command = [sys.executable, *build(outs[-1])]
-            process = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stdout=-3, stderr=-3)
-            try:
-                process.wait(timeout=chance.uniform(0.0, whole / 2.0))
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-                killed += 1
-        run(*build(outs[-1]))
-        same = sum(checksum(out) == checksum(folder / "whole.nc") for out in outs)
-        rest = {*left(folder)} - {out.name for out in (*outs, folder / "whole.nc")}
-    counts = {
-        "builds killed, at random moments": killed,
-        "starts that resumed from finished parts": resumed,
-        "tables completed": len(outs),
-        "of them with the data of an undisturbed build": same,
-        "other files left": len(rest),
-    }
-    return markdown(("", "count"), [[what, str(count)] for what, count in counts.items()])
-
-
-SECTIONS = {"faults": faults, "killed_builds": killed_builds}
+SECTIONS = {"faults": faults}
 
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0)
+    main(__doc__, SECTIONS)
