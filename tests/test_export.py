@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -14,6 +13,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 from scipy.io import loadmat
 
+from builder.__main__ import main
 from builder.c import wasm
 from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table
 from comparing import close
@@ -158,12 +158,10 @@ def test_the_logarithmic_matrix_is_the_one_to_interpolate(written, surrogate):
 # --- the command, what is refused -----------------------------------------------------------------------
 
 
-def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(table, tmp_path, repository):
-    command = [sys.executable, "-m", "builder", "export", str(PATH), "--format", "mat"]
-    environment = {**os.environ, "PYTHONPATH": str(repository)}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {
+def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(table, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", str(PATH), "--format", "mat"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
         "table": str(PATH), "format": "mat", "out": "mumacro-1e-10.mat", "shape": list(table.mu_ratio.shape)
     }  # fmt: skip
     assert np.array_equal(loadmat(tmp_path / "mumacro-1e-10.mat")["mu_ratio"], table.mu_ratio)
@@ -171,14 +169,19 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
 
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
-    [(("README.md", "--format", "csv"), 1, "README.md"), (("x.nc", "--format", "xls"), 2, "--format"),
-     (("x.nc",), 2, "--format"), (("tables/mumacro-1e-4.nc", "--format", "csv", "--out", "docs"), 2, "--out")],
+    [(["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"), (["x.nc", "--format", "xls"], 2, "--format"),
+     (["x.nc"], 2, "--format"), ([str(PATH), "--format", "csv", "--out", "."], 2, "--out")],
 )  # fmt: skip
-def test_what_the_command_cannot_export_is_reported_in_one_line(run_builder, arguments, code, said):
-    done = run_builder("export", *arguments)
-    assert done.returncode == code
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
+def test_what_the_command_cannot_export_is_reported_in_one_line(monkeypatch, tmp_path, capsys, arguments, code, said):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)
+    with pytest.raises(SystemExit) as end:
+        sys.exit(main(["export", *arguments]))
+    assert end.value.code == code
+    told = capsys.readouterr().err
+    assert said in told
+    assert len(told.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
 
 def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path, monkeypatch):

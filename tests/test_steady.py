@@ -1,4 +1,7 @@
-"""The exact solver: compared with an independent quadruple-precision solver, a naive one, invariants and limits."""
+"""The exact solver: an independent quadruple-precision solver, a naive one, the orbit, limits and events.
+
+Energy balance, monotony and error estimate over the whole range are in test_extremes.py.
+"""
 
 import math
 from collections.abc import Callable
@@ -109,70 +112,6 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     assert out[SIGMA] == close(start, abs=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("v_range", "y_range"),
-    [((1e-3, 1e3), (1e-3, 1e3)), ((1e-12, 1e8), (1e-8, 1e8)), (V_RANGE, Y_RANGE), ((1e-60, 1e-3), (1e-9, 10.0))],
-)
-def test_energy_balance_and_bounds_over_all_decades(v_range: tuple[float, float], y_range: tuple[float, float]) -> None:
-    rng = np.random.default_rng(7)
-    v, y = log_uniform(rng, *v_range, 1500), log_uniform(rng, *y_range, 1500)
-    w, out, orbit, res = workspace()
-    for vi, yi in zip(v, y, strict=True):
-        assert solve_raw(vi, yi, yi - 1.0, w, out, orbit, res) == OK
-        mu, deficit, stick, power, regime, path, _ = res
-        assert 0.0 <= mu <= 1.0
-        assert 0.0 <= deficit <= 1.0
-        assert mu + deficit == close(1.0, abs=1e-15)
-        assert 0.0 <= stick <= 1.0
-        assert (stick > 0.0) == (regime == steady.STICK_SLIP)
-        assert power >= 0.0
-        if vi * mu > 1e-280:
-            assert path > 0.0
-            assert abs(vi * mu + power - path) <= 4e-15 * path
-
-
-@pytest.mark.parametrize(
-    ("v", "y"), [(1.0, 1e-10), (1e3, 1e-15), (1e-21, 1e-10), (2e-21, 1e-10), (1e-15, 1e-14), (3e-20, 1e-12)]
-)
-def test_tiny_amplitudes_slip_as_fast_as_the_drive(v: float, y: float) -> None:
-    found = solve(v, y)
-    assert found.slip_speed == close(v, rel=1e-9)
-    if found.regime == "continuous":
-        assert 0.0 < found.min_slip_speed <= v
-        assert found.deficit == close(0.25 * y * y / (1.0 + v * v), rel=1e-9)
-
-
-def test_creep_at_any_speed_keeps_its_energy_balance() -> None:
-    # slip lasts sqrt(v~)
-    for exponent in range(-60, -4, 4):
-        v = 2.77 * 10.0**exponent
-        found = solve(v, 0.8917)
-        assert found.mu_ratio == close(math.sqrt((1.0 - 0.8917) * (1.0 + 0.8917)), abs=8.0 * v**1.0 + 1e-15)
-        assert found.slip_speed / v == close(2.20933, rel=1e-3 if exponent > -12 else 1e-5)
-        assert v * found.mu_ratio + found.power == close(found.slip_speed, rel=1e-14)
-
-
-# --- monotony -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("v", "y"),
-    [*((np.geomspace(1e-9, 1e5, 3000), y) for y in (1e-3, 0.1, 0.74, 1.0, 1.3, 3.0, 100.0, 1e5)),
-     *((v, np.geomspace(1e-6, 1e6, 3000)) for v in (1e-9, 1e-4, 0.01, 0.3, 1.0, 30.0, 1e4))],
-)  # fmt: skip
-def test_mu_rises_strictly_with_speed_and_falls_strictly_with_amplitude(v: Any, y: Any, sweep: Sweep) -> None:
-    solved = sweep.solve("full", v, y)
-    # neighbours differ by 1 %, which near mu~ = 1 is visible only in 1 - mu~
-    shown = np.where(solved["mu_ratio"] < 0.5, solved["mu_ratio"], -solved["deficit"])
-    steps, both = np.diff(shown), (shown[1:] > 0.0) == (shown[:-1] > 0.0)
-    if np.ndim(y):
-        assert np.all(steps[both] < 0.0)
-    else:
-        flat = (v[1:] < 1e-7) & (y < 1.0)  # static limit: mu~ moves by less than its last digit
-        assert np.all(steps[both & ~flat] > 0.0)
-        assert np.all(steps[both & flat] >= -3e-16)
-
-
 # --- limits -------------------------------------------------------------------------------------------
 
 
@@ -211,13 +150,6 @@ def test_a_limit_is_approached_with_the_order_of_its_error(
     first, one, two = (error(place) for place in places)
     assert abs(first) > abs(one)
     assert math.log(abs(one / two)) / math.log(places[1] / places[2]) == close(order, abs=within)
-
-
-@pytest.mark.parametrize(("y", "constant"), [(1.1, 15.74522672), (2.0, 1.74344269), (10.0, 0.30660836)])
-def test_slope_at_zero_speed_above_one(y: float, constant: float) -> None:
-    assert solve(1e-12, y).mu_ratio / 1e-12 == close(constant, abs=6e-9)
-    errors = [solve(v, y).mu_ratio / v - solve(1e-14, y).mu_ratio / 1e-14 for v in (1e-3, 1e-4, 1e-5)]
-    assert abs(errors[0]) > abs(errors[1]) > abs(errors[2])
 
 
 def test_amplitude_excess_is_used_beyond_the_digits_of_the_amplitude() -> None:
