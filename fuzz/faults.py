@@ -41,9 +41,9 @@ class NotTriedError(Exception):
 
 def run(*words: object, nobody: bool = False, code: int | None = 0, **environment: str) -> str:
     """Run a command of the project and return its last output: one line if it fails."""
-    words = (*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words))
+    command = (*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words))
     done = subprocess.run(
-        words, cwd=ROOT, env={**ENVIRONMENT, **environment}, capture_output=True, text=True, timeout=1800, check=False
+        command, cwd=ROOT, env={**ENVIRONMENT, **environment}, capture_output=True, text=True, timeout=1800, check=False
     )
     assert "Traceback" not in done.stderr, done.stderr
     assert code is None or done.returncode == code, f"exit code {done.returncode}: {done.stderr or done.stdout}"
