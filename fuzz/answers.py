@@ -64,11 +64,6 @@ def pieces(total: int, share: float, size: int = 100_000) -> Iterator[tuple[int,
         yield count, seed, draw(count, seed)
 
 
-def rows_of(answer: Any) -> Array:
-    """mu_macro, mu~, bound and source, (4, n)."""
-    return np.stack([answer.mu_macro, answer.mu_ratio, answer.error_bound, answer.source_code]).astype(np.float64)
-
-
 class Count:
     """Cases tried, cases without the property, and the largest of some measure."""
 
@@ -180,29 +175,6 @@ def fresh_solves(table: Surrogate, share: float) -> Count:
     return count
 
 
-def same_bits(table: Surrogate, share: float) -> Count:
-    """Alone, in a batch, in another order, as columns, with gradients, with one and two threads."""
-    count = Count()
-    one_thread, two_threads = Surrogate.open(table.path, threads=1), Surrogate.open(table.path, threads=2)
-    for n, seed, cases in pieces(N, share):
-        rng = np.random.default_rng(seed)
-        order = rng.permutation(n)
-        given: Any = list(cases.values())
-        expected = rows_of(table.evaluate(cases)).view(np.uint64)
-        for found, at in (
-            (rows_of(one_thread.evaluate(cases)), slice(None)),
-            (rows_of(two_threads.evaluate(cases)), slice(None)),
-            (rows_of(table.evaluate({name: values[order] for name, values in cases.items()})), order),
-            (rows_of(table.evaluate(cases, gradient=True)), slice(None)),
-            (np.stack(table.evaluate_columns(*given)).astype(np.float64), slice(None)),
-        ):
-            count.add(np.any(expected[:, at] != found.view(np.uint64), axis=0))
-        for i in rng.integers(0, n, max(1, n // 50)).tolist():
-            alone = rows_of(table.evaluate({name: float(values[i]) for name, values in cases.items()}))
-            count.add(np.array([np.any(alone.view(np.uint64) != expected[:, i])]))
-    return count
-
-
 def on_any_processor(table: Surrogate, share: float) -> Count:
     """The best kernel of this processor and the basic one, without AVX and fused multiply-add."""
     count = Count()
@@ -227,7 +199,6 @@ PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
     "one input to the next double": neighbours,
     "the bound covers a fresh solve, in the solver's range": fresh_solves,
     "the same source, and a value within both bounds, on any processor": on_any_processor,
-    "the same bits alone, in any order, as columns, with 1 and 2 threads": same_bits,
 }
 
 
