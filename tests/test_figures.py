@@ -125,13 +125,6 @@ def test_marks_are_at_the_border_and_at_rest(shown: dict[str, list[Panel]]) -> N
     assert not static.x.any()
 
 
-def test_the_error_of_the_border_formulas_is_that_of_the_two_curves(shown: dict[str, list[Panel]]) -> None:
-    _, off = shown["fig06_border"]
-    for curve in off.curves:
-        assert curve.y[-1] == close(-1.2, abs=0.4)  # [%] at y~ = 1e4
-    assert np.abs(labelled(off, "(27)").y).max() == close(5.2, abs=0.1)
-
-
 @pytest.mark.parametrize(("v", "y"), CASES)
 def test_the_cycle_that_is_drawn_is_the_steady_one(
     surrogate: Surrogate, shown: dict[str, list[Panel]], v: float, y: float
