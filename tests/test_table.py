@@ -67,7 +67,9 @@ EDITS: dict[str, tuple[Edit, str]] = {
     **{f"infinite {name}": (infinite(name), "holds non-finite values")
        for name in ("mu_ratio", "border/mid/value", f"{BLOCK}/stick", "border/blocks/cell_errors")},
     **{f"twice {name}": (lambda root, name=name: put(name, 2 * np.asarray(root[BLOCK].getncattr(name)))(root),
-                         r"checksum does not match|the shape of 'cell_errors' is \(3, 40, 3\)") for name in OF_BLOCK},
+                         r"the shape of 'cell_errors' is \(3, 40, 3\)" if name == "cells" else "checksum")
+       for name in OF_BLOCK},
+    "an error that is not finite": (put(OF_BLOCK[2], np.nan), f"'{OF_BLOCK[2]}' of /{BLOCK} is not 1 finite"),
     **{f"no attribute {name}": (lambda root, name=name: root[BLOCK].delncattr(name),
                                 f"attribute '{name}' of /{BLOCK} is missing") for name in OF_BLOCK},
     **{f"{name} = {value}": (put(name, value), f"'{name}' of /{BLOCK} is not|cells must be|'errors' is negative")
