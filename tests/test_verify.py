@@ -172,3 +172,10 @@ def test_wrinkles_too_small_for_the_value_are_found_in_the_slope(sweep: Sweep, b
     for name in part.nodes.keys() - {"mu_ratio"}:
         assert found.values[name] <= part.errors[name][0]
         assert np.all(found.cells[name] <= part.cell_errors[name])
+
+
+@pytest.mark.parametrize("block", ["corner", "continuous_mid_1"])
+def test_an_error_along_one_edge_of_a_block_counts_whole(sweep: Sweep, block: str) -> None:
+    table, index = read_table(TABLE), NAMES.index(block)
+    table.blocks[index].nodes["mu_ratio"][:, -1] *= 1.0 + 1e-5
+    assert block_errors(Surrogate(table, TABLE), sweep, 200, seed=1)[index].values["mu_ratio"] > 5e-6
