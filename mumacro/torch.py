@@ -16,6 +16,8 @@ from mumacro.surrogate import Surrogate
 try:
     import torch
     from torch.autograd.forward_ad import unpack_dual
+    from torch.compiler import is_compiling
+    from torch.func import debug_unwrap
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(missing("torch", error), name=error.name) from None
 
@@ -55,12 +57,13 @@ class Friction(DifferentiableFriction):
 
 def _derivatives(x: Any, table: int, code: int, order: int) -> Any:
     """Of a quantity at x (2, ...), v~ and y~, or of mu_macro at x (6, ...): value, slopes, second derivatives."""
-    followed = x.requires_grad or unpack_dual(x).tangent is not None
-    return (_Followed.apply if followed else _OPERATOR)(x, table, code, order)
+    if is_compiling() or x.requires_grad or debug_unwrap(x) is not x or unpack_dual(x).tangent is not None:
+        return _Followed.apply(x, table, code, order)
+    return _OPERATOR(x, table, code, order)
 
 
 class _Followed(torch.autograd.Function):  # type: ignore[misc]
-    """The operator where derivatives are wanted; those of ``register_autograd`` know no ``torch.func.grad``."""
+    """The operator where derivatives may be wanted; ``register_autograd`` knows no ``torch.func.grad``."""
 
     generate_vmap_rule = True
 
@@ -111,7 +114,7 @@ def _in_graph(x: Any, table: int, code: int, order: int) -> Any:  # noqa: ARG001
 
 
 def _in_batch(info: Any, dims: Any, x: Any, table: int, code: int, order: int) -> tuple[Any, int]:  # noqa: ARG001
-    return _derivatives(x.movedim(dims[0], 1), table, code, order), min(order, 1)
+    return _OPERATOR(x.movedim(dims[0], 1), table, code, order), min(order, 1)
 
 
 torch.library.define("mumacro::derivatives", "(Tensor x, int table, int code, int order) -> Tensor")

@@ -290,19 +290,35 @@ def test_torch_checks_the_gradient_by_the_six_inputs(torch: ModuleType, in_torch
 
 @pytest.mark.filterwarnings("ignore")
 def test_torch_transformations_compose(torch: ModuleType, in_torch: Any, table: Surrogate) -> None:
-    from torch.func import vmap
+    from torch.func import grad, hessian, jacrev, jvp, vmap
 
     v, y = torch.tensor([0.1, 0.2, 3.0], dtype=torch.float64), torch.tensor([0.5, 2.0], dtype=torch.float64)
     plane = vmap(vmap(in_torch.mu_ratio, in_dims=(None, 0)), in_dims=(0, None))(v, y)
     np.testing.assert_array_equal(plane.numpy(), table.mu_ratio(v.numpy()[:, None], y.numpy()))
     np.testing.assert_array_equal(in_torch.mu_ratio(v[:, None], y).numpy(), plane.numpy())
     speeds = v[:2].clone().requires_grad_()
-    (slopes,) = torch.autograd.grad(in_torch.power(speeds, y).sum(), speeds)
-    np.testing.assert_array_equal(slopes.numpy(), partials(table, "power", v[:2], y)[0])
+    expected = partials(table, "power", v[:2], y)[0]
+    ways = {
+        "autograd": torch.autograd.grad(in_torch.power(speeds, y).sum(), speeds)[0],
+        "grad": grad(lambda a: in_torch.power(a, y).sum())(v[:2]),
+        "vmap of grad": vmap(grad(in_torch.power))(v[:2], y),
+        "grad of vmap": grad(lambda a: vmap(in_torch.power)(a, y).sum())(v[:2]),
+        "jacrev": jacrev(in_torch.power)(v[:2], y).diagonal(),
+        "compiled": torch.compile(grad(lambda a: in_torch.power(a, y).sum()), backend="aot_eager")(v[:2]),
+    }
+    for way, slopes in ways.items():
+        np.testing.assert_array_equal(slopes.numpy(), expected, err_msg=way)
     batch = torch.autograd.grad(
         in_torch.power(speeds, y), speeds, torch.eye(2, dtype=torch.float64), is_grads_batched=True
     )
-    np.testing.assert_array_equal(batch[0].numpy(), np.diag(slopes.numpy()))
+    np.testing.assert_array_equal(batch[0].numpy(), np.diag(expected))
+    bend = grad(grad(in_torch.power))(v[0], y[0])
+    assert bend.item() == bends(table, "power", v[:1], y[:1])[0, 0]
+    given = (v[0], torch.ones_like(v[0]))
+    for forwards in (lambda: jvp(lambda a: in_torch.power(a, y[0]), *((x,) for x in given)),
+                     lambda: hessian(lambda a: in_torch.power(a, y[0]))(v[0])):  # fmt: skip
+        with pytest.raises(NotImplementedError, match="jvp"):  # no zero slope
+            forwards()
     single = torch.tensor([0.1, 0.5], requires_grad=True)  # single precision
     ratio = in_torch.mu_ratio(single, 2.0)
     assert ratio.dtype == torch.float64
@@ -332,6 +348,7 @@ def test_torch_compiles_the_whole_program_with_its_derivatives(torch: ModuleType
     expected = Surrogate.open(1e-10).evaluate(CASE, gradient=True)
     assert expected.gradient is not None
     compiled = torch.compile(lambda *x: in_torch.mu_macro(*x).square(), fullgraph=True, backend="aot_eager")
+    assert compiled(*six).item() == expected.mu_macro**2
     given = [x.clone().requires_grad_() for x in six]
     found = compiled(*given)
     found.backward()
