@@ -1,6 +1,6 @@
 """Time of mu~ inside other programs: one point, arrays, a loop of 1,000 steps; scipy's ellipk beside it.
 
-PyTorch is measured where it is installed.  The rows "before" are of the release that called Python back.
+PyTorch is measured where it is installed.  Times in brackets are of the release that called Python back.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import mumacro
 from mumacro.jax import Friction as InJax
 
 STEPS = 1000
-BEFORE = {"JAX": ["278", "-", "-", "254"], "PyTorch": ["157", "-", "-", "-"]}
+BEFORE = {("JAX", 0): "278", ("JAX", 3): "254", ("PyTorch", 0): "157"}
 GLUE = """#include "mumacro.h"
 int ratio(const double **in, double **out, long long *iw, double *w, int mem) {
     return out[0][0] = mumacro_mu_ratio(in[0][0], in[1][0]), 0;
@@ -100,8 +100,9 @@ def interop(quick: bool) -> str:
         one, many, all_points = ([made(x[:size] if size else float(x[0])) for x in (v, y)] for size in (0, 1000, n))
         figures = [best(lambda: call(*one), 200) * 1e6, best(lambda: call(*many), 20) * 1e6]  # noqa: B023
         figures += [best(lambda: call(*all_points), 1) / n * 1e9, best(lambda: steps(0.1), 1) * 1e3]  # noqa: B023
-        rows.append([name, *map(quantity, figures)])
-        rows += [[f"{name}, before", *BEFORE[name]]] if name in BEFORE else []
+        before = (BEFORE.get((name, i)) for i in range(4))
+        told = (quantity(x) + (f" ({old})" if old else "") for x, old in zip(figures, before, strict=True))
+        rows.append([name, *told])
     return markdown(["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"], rows)
 
 
