@@ -209,12 +209,12 @@ def killed_eval(folder: Path, n: int = 400_000, kills: int = 10) -> str:
     for kind in ("csv", "parquet"):
         words = ["-m", "mumacro", "eval", str(source), "-o"]
         run(*words, folder / f"whole.{kind}")
-        out, notes = folder / f"out.{kind}", folder / f"out.{kind}.parts" / "notes"
+        out, log = folder / f"out.{kind}", folder / f"out.{kind}.parts" / "log"
         for _ in range(kills):
             command = [sys.executable, *words, str(out)]
             process = subprocess.Popen(command, cwd=ROOT, env=variables, stdout=-3, stderr=-3)
-            before = notes.stat().st_size if notes.exists() else 0
-            while process.poll() is None and (not notes.exists() or notes.stat().st_size <= before):
+            before = log.stat().st_size if log.exists() else 0
+            while process.poll() is None and (not log.exists() or log.stat().st_size <= before):
                 time.sleep(0.002)
             time.sleep(chance.uniform(0.0, 0.03))
             process.kill()

@@ -21,9 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measuring import main, markdown
-from mumacro.files.answering import numbers
-from mumacro.files.columns import find_columns
-from mumacro.files.reading import CsvSource, NdjsonSource, Place
+from mumacro.files.answering import find_columns, numbers
+from mumacro.files.reading import TextSource
 
 NAMES = ("mu0", "Fz", "y0", "omega", "v0")  # k may be rigid: text that is no number is valid there
 TOTAL = 10_000_000
@@ -87,12 +86,12 @@ def drawn(n: int, seed: int, kind: str) -> list[str]:
     return [KINDS[kind](chance) for _ in range(n)]
 
 
-def read(path: Path, kind: str) -> Iterator[tuple[list[NDArray[np.float64]], NDArray[np.int64]]]:
-    """Columns of doubles as eval reads them, NaN for refused values; and their row numbers, from 1."""
-    source = CsvSource([path], ",", ".") if kind == "csv" else NdjsonSource([path])
-    columns = find_columns(source.schema.names, rigid=True)
-    for block in source.blocks(Place(), columns, verbatim=True):
-        yield [numbers(block.batch.column(columns.places[name][0]))[0] for name in NAMES], block.rows
+def read(path: Path, kind: str) -> Iterator[list[NDArray[np.float64]]]:
+    """Columns of doubles as eval reads them, NaN for refused values and rows."""
+    source = TextSource([path], "," if kind == "csv" else "", ".", verbatim=True)
+    places, _ = find_columns(source.schema.names, rigid=True)
+    for block in source.blocks(0, 0, [places[name][0] for name in NAMES]):
+        yield [numbers(block.batch.column(places[name][0]), name)[0] for name in NAMES]
 
 
 def compare(texts: list[str], kind: str, folder: Path) -> tuple[int, int, int]:
@@ -110,11 +109,7 @@ def compare(texts: list[str], kind: str, folder: Path) -> tuple[int, int, int]:
             for row in rows:
                 stream.write("{" + ", ".join(f'"{n}": {cell}' for n, cell in zip(NAMES, row, strict=True)) + "}\n")
     wanted = np.array([[expected(cell.replace('"', "") if kind == "csv" else cell) for cell in row] for row in rows])
-    found = np.full(wanted.shape, np.nan)
-    for columns, numbered in read(path, kind):
-        kept = numbered - 1 - PLAIN
-        block = np.stack(columns, axis=1)
-        found[kept[kept >= 0]] = block[kept >= 0]
+    found = np.concatenate([np.stack(columns, axis=1) for columns in read(path, kind)])[PLAIN:]
     refused = np.isnan(found)
     with np.errstate(invalid="ignore"):
         # JSON's "-0" is an integer, and an integer zero has no sign

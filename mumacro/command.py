@@ -31,11 +31,12 @@ from mumacro.inputs import (
     unit_of,
 )
 from mumacro.surrogate import Surrogate
+from mumacro.tabular import SEPARATORS
 from mumacro.validity import digits, k_effect
 
 __all__ = [
-    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_kind",
-    "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "read_case",
+    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_format",
+    "add_kind", "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "read_case",
     "read_values", "run", "write_result",
 ]  # fmt: skip
 
@@ -94,6 +95,12 @@ def add_table(parser: OneLineParser) -> None:
     add_form(parser)
 
 
+def add_format(parser: OneLineParser) -> None:
+    """The options for the form of CSV."""
+    parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,")
+    parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: .")
+
+
 def add_form(parser: argparse.ArgumentParser) -> None:
     """The options for the form of a result."""
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
@@ -121,8 +128,8 @@ def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
         code, text = 1, str(error)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        code, text = 1, where + " ".join((error.strerror or str(error)).split())
-    print(f"{title}: {text}", file=sys.stderr)
+        code, text = 1, where + (error.strerror or str(error))
+    print(f"{title}: {' '.join(text.split())}", file=sys.stderr)
     return code
 
 
