@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 
 from mumacro import command
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, kind_in, open_table
+from mumacro.command import ImpossibleError, UsageError, as_json, in_columns, kind_in, open_table
 from mumacro.contact import AMPLITUDE
 from mumacro.errors import InputError
 from mumacro.fitted import Fit
 from mumacro.fitting import fit
 from mumacro.inputs import LIKE, SI, unit_of
 from mumacro.measured import STD, UNKNOWNS
-from mumacro.questions import OUT
 from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head
 from mumacro.validity import digits
 
@@ -43,14 +42,11 @@ _SHOWN = 5  # faults of a file
 
 def fit_points(words: Sequence[str]) -> str:
     """``mumacro fit``."""
-    parser = OneLineParser(
-        prog="mumacro fit", description="k and mu0 of a contact from measured friction.", epilog=_COLUMNS
-    )
-    parser.add_argument("points", help="a file of CSV; - is standard input")
+    first = "points", {"help": "a file of CSV; - is standard input"}
+    told = "k and mu0 of a contact from measured friction."
+    parser = command.question("fit", told, _COLUMNS, "the other inputs", "*", first)
     parser.add_argument("--unknown", nargs="+", default=[*UNKNOWNS], metavar="NAME", help="k, mu0; default: both")
     command.add_format(parser)
-    parser.add_argument("-o", "--out", type=Path, help=OUT)
-    command.add_case(parser, "the other inputs", "*")
     chosen = parser.parse_intermixed_args(words)
     unknown, more = ([x for x in chosen.unknown if ("=" in x) == given] for given in (False, True))
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
@@ -104,14 +100,8 @@ def _told(found: Fit, shown: int | None) -> str:
 def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> dict[str, Any]:
     """The columns of measured points, by name in SI, (n,); those of other names are left out.
 
-    Raises
-    ------
-    ImpossibleError
-        No header, no v0 or mu_macro, another separator, a column twice or in an unknown unit, a cell that is no
-        number; names ``where`` and the row.
+    ImpossibleError tells what is wrong with the header or with cells, after ``where``.
 
-    Examples
-    --------
     >>> read_points("v0 [mm/s],mu_macro\\n10,0.2\\n", "points.csv")
     {'v0': array([0.01]), 'mu_macro': array([0.2])}
     """
