@@ -297,7 +297,8 @@ def about(surrogate: Surrogate) -> dict[str, Any]:
 def in_columns(rows: Iterable[Sequence[str]]) -> str:
     """Rows of cells as text in columns."""
     columns = list(zip_longest(*rows, fillvalue=""))
-    padded = ([cell.ljust(max(map(len, column))) for cell in column] for column in columns)
+    widths = [max(map(len, column)) for column in columns]
+    padded = ([cell.ljust(width) for cell in column] for column, width in zip(columns, widths, strict=True))
     return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
 
 
