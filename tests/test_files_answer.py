@@ -156,11 +156,6 @@ def test_a_misnamed_column_is_never_ignored(names, options, parts):
     assert all(part in str(caught.value) for part in parts), caught.value
 
 
-def test_k_beside_its_ends_is_refused_by_the_library_as_in_files(surrogate):
-    with pytest.raises(InputError, match="k must be left out beside an interval of it"):
-        surrogate.evaluate({name: [value] for name, value in {**CASE, "k_low": 1e5, "k_high": 1e7}.items()})
-
-
 def test_rigid_can_be_given_for_a_batch_without_k(surrogate):
     found, _ = answer(batch_of(speed=["slow"]).drop_columns("k"), surrogate, rigid=True)
     assert found.column("speed").to_pylist() == ["slow"]
