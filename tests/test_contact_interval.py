@@ -98,7 +98,8 @@ def test_columns(table):
     pairs = table.evaluate(k_range=(frame.k_low.to_numpy(), frame.k_high.to_numpy()), **CASE)
     assert answers.mu_macro_low.tolist() == pairs.mu_macro_low.tolist()
     assert answers.mu_macro_high.tolist() == pairs.mu_macro_high.tolist()
-    assert "mu_macro_low" not in table.evaluate(frame.assign(k=1e6))  # k says all: other columns are ignored
+    with pytest.raises(InputError, match="k must be left out beside an interval of it"):
+        table.evaluate(frame.assign(k=1e6))
 
 
 @pytest.mark.parametrize(
