@@ -1,6 +1,5 @@
 """mumacro.fit: inputs recovered within their covariance, what points do not tell, bad input."""
 
-import doctest
 import math
 import warnings
 
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import InputError, fit, fitting
+from mumacro import InputError, fit
 from mumacro.contact import CONTACTS
 
 RIG = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
@@ -32,10 +31,6 @@ def noisy(surrogate, spread, seed=0, **inputs):
     """Points with noise, and their standard deviations."""
     mu = friction(surrogate, **inputs)
     return mu + np.random.default_rng(seed).normal(scale=spread, size=mu.shape)
-
-
-def test_the_example_runs() -> None:
-    assert doctest.testmod(fitting).failed == 0
 
 
 @pytest.mark.slow
