@@ -85,20 +85,15 @@ def test_groups_at_the_ends_of_double_precision(table: Surrogate, inputs: tuple[
 @pytest.mark.parametrize("k", [1e6, None, 5e-324, 1e308])
 def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: dict[str, float], k: float | None) -> None:
     found = table.evaluate(**{**CASE, **stillness, "k": k})
-    assert found.mu_macro == CASE["mu0"]
-    assert found.mu_ratio == 1.0
-    assert found.error_bound == 0.0
-    assert found.source == "no_oscillation"
+    answer = found.mu_macro, found.mu_ratio, found.error_bound, found.source
+    assert answer == (CASE["mu0"], 1.0, 0.0, "no_oscillation")
 
 
 @pytest.mark.parametrize("y", [1e-300, 0.3, 0.6, 0.999, 1.0, 1.2, 1e5, 1e300])
 def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
     found = table.evaluate(mu0=0.5, Fz=2.0, k=1.0, y0=y, omega=7.0, v0=0.0)
-    assert found.y_tilde == y
-    assert found.v_tilde == 0.0
+    assert (found.v_tilde, found.y_tilde, found.regime, found.source) == (0.0, y, "static", "static_limit")
     assert found.mu_ratio == close(math.sqrt((1.0 - y) * (1.0 + y)) if y < 1.0 else 0.0, rel=5e-16)
-    assert found.regime == "static"
-    assert found.source == "static_limit"
     # the last digit of y~ = y0 k/(mu0 Fz) enters by its root only at the edge of the static limit
     assert 0.0 <= found.error_bound < (1e-7 if y == 1.0 else 1e-12)
 
@@ -111,9 +106,7 @@ def test_rigid_contact_is_the_elliptic_integral(table: Surrogate, y0: float, ome
     with workdps(700):
         expected = float(2 / pi * ellipk(-((mpf(y0) * mpf(omega) / mpf(v0)) ** 2)))
     assert found.mu_ratio == close(expected, rel=1e-15)
-    assert found.source == "rigid"
-    assert found.length_scale == 0.0
-    assert found.v_tilde == found.y_tilde == math.inf
+    assert (found.source, found.length_scale, found.v_tilde, found.y_tilde) == ("rigid", 0.0, math.inf, math.inf)
 
 
 def test_rigid_contact_is_what_ever_stiffer_springs_tend_to(table: Surrogate) -> None:
@@ -172,8 +165,7 @@ def test_only_the_two_groups_matter(table: Surrogate, a: int, b: int, c: int, v:
         mu0=0.5, Fz=2.0 * force, k=force / length, y0=y * length, omega=1.0 / time, v0=v * length / time
     )
     assert (scaled.v_tilde, scaled.y_tilde) == (plain.v_tilde, plain.y_tilde) == (v, y)
-    assert scaled.mu_macro == plain.mu_macro
-    assert scaled.source == plain.source
+    assert (scaled.mu_macro, scaled.source) == (plain.mu_macro, plain.source)
     assert scaled.length_scale == length * plain.length_scale
     swapped = table.evaluate(mu0=0.5 * force, Fz=2.0 / force, k=1.0, y0=y, omega=1.0, v0=v)
     assert swapped.mu_ratio == plain.mu_ratio
@@ -212,19 +204,16 @@ def test_an_illegal_value_of_an_array_affects_only_its_case(
     column = [CASE[field], bad, CASE[field]]
     found = table.evaluate(**{**CASE, field: column}, **asked)
     sound = table.evaluate(**CASE, gradient=True)
-    assert found.source_code.tolist() == [sound.source_code, -1, sound.source_code]
-    assert found.regime_code.tolist() == [sound.regime_code, -1, sound.regime_code]
-    assert found.source.tolist() == [sound.source, "", sound.source]
-    assert found.regime.tolist() == [sound.regime, "", sound.regime]
-    numbers = {name: getattr(found, name) for name in ("mu_macro", "mu_ratio", "error_bound")}
+    for name, none in (("source_code", -1), ("regime_code", -1), ("source", ""), ("regime", "")):
+        assert getattr(found, name).tolist() == [getattr(sound, name), none, getattr(sound, name)]
+    numbers = [found.mu_macro, found.mu_ratio, found.error_bound]
     if asked:
-        numbers |= {name: getattr(found, name) for name in ("v_tilde", "y_tilde", "length_scale")}
+        numbers += [found.v_tilde, found.y_tilde, found.length_scale]
         assert found.regime_certain.tolist() == [True, False, True]
     if "gradient" in asked:
-        numbers |= {f"d {name}": found.gradient[name] for name in FIELDS}
-        numbers |= {f"bound {name}": found.gradient_bound[name] for name in FIELDS}
-    for name, values in numbers.items():
-        assert np.isnan(values).tolist() == [False, True, False], name
+        numbers += [*found.gradient.values(), *found.gradient_bound.values()]
+    for values in numbers:
+        assert np.isnan(values).tolist() == [False, True, False]
         assert values[0] == values[2]
     # an illegal scalar together with an array makes every case illegal
     for other in FIELDS:
@@ -361,8 +350,7 @@ def test_columns_mark_illegal_cases_and_take_infinite_stiffness_for_rigid(table:
 
 def test_columns_of_different_lengths_are_refused(table: Surrogate) -> None:
     one, two, three = np.full(1, 1.0), np.full(2, 1.0), np.full(3, 1.0)
-    with pytest.raises(InputError, match="columns of one length"):
-        table.evaluate_columns(one, two, three, one, one, one)
-    with pytest.raises(InputError, match="columns of one length"):
-        table.evaluate_columns(one, one, one, one, one, np.ones((2, 1)))
+    for columns in ((one, two, three, one, one, one), (one, one, one, one, one, np.ones((2, 1)))):
+        with pytest.raises(InputError, match="columns of one length"):
+            table.evaluate_columns(*columns)
     assert table.evaluate_columns(one, one, one, one, one, np.empty(0))[0].shape == (0,)
