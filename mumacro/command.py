@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from mumacro import plotting
 from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs import (
@@ -31,12 +32,13 @@ from mumacro.inputs import (
     unit_of,
 )
 from mumacro.surrogate import Surrogate
+from mumacro.tabular import SEPARATORS
 from mumacro.validity import digits, k_effect
 
 __all__ = [
-    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_kind",
-    "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "read_case",
-    "read_values", "run", "write_result",
+    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_format",
+    "add_kind", "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "question",
+    "read_case", "read_values", "run", "write_result",
 ]  # fmt: skip
 
 INPUTS = """\
@@ -68,6 +70,18 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
+def question(
+    name: str, told: str, epilog: str, words: str, least: str = "+", first: tuple[str, dict[str, Any]] | None = None
+) -> OneLineParser:
+    """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that stands before it."""
+    parser = OneLineParser(prog=f"mumacro {name}", description=told, epilog=epilog)
+    if first:
+        parser.add_argument(first[0], **first[1])
+    add_case(parser, words, least)
+    parser.add_argument("-o", "--out", type=Path, help="write the result there: a picture, .png, .svg or .pdf, or .csv")
+    return parser
+
+
 def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
     """The inputs, explained by ``words``, the kind of contact, and the options of all commands that answer."""
     parser.add_argument("words", nargs=least, metavar="name=value", help=words)
@@ -92,6 +106,12 @@ def add_table(parser: OneLineParser) -> None:
     text = "a table file, or the error of mu_macro/mu0 that a bundled table must keep; default: the tightest one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
+
+
+def add_format(parser: OneLineParser) -> None:
+    """The options for the form of CSV."""
+    parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,")
+    parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: .")
 
 
 def add_form(parser: argparse.ArgumentParser) -> None:
@@ -121,8 +141,8 @@ def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
         code, text = 1, str(error)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        code, text = 1, where + " ".join((error.strerror or str(error)).split())
-    print(f"{title}: {text}", file=sys.stderr)
+        code, text = 1, where + (error.strerror or str(error))
+    print(f"{title}: {' '.join(text.split())}", file=sys.stderr)
     return code
 
 
@@ -132,35 +152,12 @@ def run(title: str, command: Callable[[Any], int | str], given: Any) -> int:
 def read_case(
     words: Sequence[str], kind: Kind = SPRING, without: Sequence[str] = (), *, one_k: str = "", whole: bool = True
 ) -> dict[str, Any]:
-    """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; an infinite ``k`` is rigid.
+    """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of ``Surrogate.evaluate``.
 
-    Parameters
-    ----------
-    words : sequence of str
-        Each holds any number of ``name=value``, with or without a unit.
-    kind : Kind
-        The contact and direction, which say what the amplitude is.
-    without : sequence of str
-        Unknown or swept inputs, which must not be among them.
-    one_k : str
-        Why ``k`` must not be an interval ``low..high`` here; empty where it may be.
-    whole : bool
-        The other inputs must all be there.
+    ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must not be an interval
+    ``low..high`` here, which otherwise is ``k_range``; where ``whole``, all other inputs must be there.  UsageError
+    tells everything that is wrong, in one line.
 
-    Returns
-    -------
-    dict of str to float
-        By name: the six inputs (``f`` [Hz] in place of ``omega``, the pair ``k_range`` in place of ``k`` where that was
-        given) less ``without``; keywords of :meth:`mumacro.Surrogate.evaluate`.
-
-    Raises
-    ------
-    UsageError
-        Everything that is wrong, in one line: text that is no ``name=value``, an unknown, repeated, missing or
-        superfluous name, a value that is no number, in no known unit, or out of bounds.
-
-    Examples
-    --------
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20.69kHz v0=0.01"])["k"]
     1000000.0
     """
@@ -296,7 +293,8 @@ def about(surrogate: Surrogate) -> dict[str, Any]:
 def in_columns(rows: Iterable[Sequence[str]]) -> str:
     """Rows of cells as text in columns."""
     columns = list(zip_longest(*rows, fillvalue=""))
-    padded = ([cell.ljust(max(map(len, column))) for cell in column] for column in columns)
+    widths = [max(map(len, column)) for column in columns]
+    padded = ([cell.ljust(width) for cell in column] for column, width in zip(columns, widths, strict=True))
     return "\n".join("  ".join(row).rstrip() for row in zip(*padded, strict=True))
 
 
@@ -308,10 +306,6 @@ def write_result(path: Path, columns: Mapping[str, Any], draw: Callable[[Any], A
             rows.writerow(columns)
             rows.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
     else:
-        from mumacro import plotting
-
-        if path.suffix not in plotting.ENDINGS:
-            raise UsageError(f"-o {path}: the name must end in .csv, {', '.join(plotting.ENDINGS)}")
         plotting.save(path, draw)
     return f"written: {path}"
 

@@ -30,6 +30,7 @@ DirectionName = Literal["across", "along", "normal"]
 CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
 DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
+LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of that amplitude
 
 
 class Kind(NamedTuple):
@@ -72,7 +73,7 @@ class Kind(NamedTuple):
             return error
         bound = "given [N] for direction normal"
         if error.value is not None:
-            bound = ">= 0 and below Fz: at Fz the contact lifts off"
+            bound = LIFTS_OFF
         return InputError(AMPLITUDE, error.value, bound, error.index)
 
     def as_six(self, inputs: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from mumacro.errors import InputError
 
 __all__ = [
-    "BOUNDS", "FIELDS", "GAP", "LIKE", "MOST_HZ", "NAMES", "PER_UNIT", "POSITIVE", "RAD_PER_CYCLE", "RIGID", "SI",
-    "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "field_of", "is_rigid", "length_scale", "number_hint",
+    "BOUNDS", "FIELDS", "GAP", "LIKE", "MOST_HZ", "NAMES", "PER_UNIT", "PLAIN", "POSITIVE", "RAD_PER_CYCLE", "RIGID",
+    "SI", "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "field_of", "is_rigid", "length_scale",
+    "number_hint",
     "read_number", "read_quantity", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion",
     "unit_of", "unknown_name",
 ]  # fmt: skip
@@ -115,7 +116,7 @@ _OTHER_NAMES |= {name.lower(): name for name in NAMES}
 _IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
-_PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
+PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 
 
 def is_rigid(text: str) -> bool:
@@ -135,7 +136,9 @@ def refusal(name: str, value: float) -> str:
     """
     if name == "k":
         return GAP if math.isnan(value) else "must be finite and > 0, or rigid"
-    return f"must be {BOUNDS['omega']}, and so must be omega = 2 pi f" if name == "f" else f"must be {BOUNDS[name]}"
+    if name == "f":
+        return f"must be {BOUNDS['omega']}, and so must be omega = 2 pi f"
+    return f"must be {BOUNDS[LIKE.get(name, name)]}"
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
@@ -222,7 +225,7 @@ def number_hint(name: str, value: object) -> str:
     if not isinstance(value, str):
         return "must be a number"
     text = value.strip()[:80]
-    if _PLAIN.fullmatch(text):
+    if PLAIN.fullmatch(text):
         number = float(text)
         if math.isfinite(number):
             return "must be a number, not a text: leave out the quotes"
@@ -267,13 +270,13 @@ def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], 
     text = text.strip()
     if rigid and is_rigid(text):
         return math.inf
-    if _PLAIN.fullmatch(text):
+    if PLAIN.fullmatch(text):
         return float(text)
     with_unit = _WITH_UNIT.fullmatch(text)
     scale = _scale(units, with_unit[2].strip(" []()")) if with_unit else None
     if with_unit and scale:
         return scale.si(float(with_unit[1]))
-    if _PLAIN.fullmatch(text.replace(",", ".")):
+    if PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
     known = ", ".join([unit for unit in units if unit][:4])
     hint = ", or rigid" if rigid else ""
@@ -287,7 +290,7 @@ def read_range(name: str, text: str) -> tuple[float, float]:
     (800000.0, 1200000.0)
     """
     low, _, high = text.partition("..")
-    if _PLAIN.fullmatch(low.strip()) and (found := _WITH_UNIT.fullmatch(high.strip())):
+    if PLAIN.fullmatch(low.strip()) and (found := _WITH_UNIT.fullmatch(high.strip())):
         low = f"{low} {found[2]}"
     ends = read_number(name, low), read_number(name, high)
     if not 0.0 < ends[0] < ends[1] < math.inf:

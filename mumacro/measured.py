@@ -24,28 +24,11 @@ _SCATTER, _SHARE = 5.0, 0.05
 
 
 class Measured:
-    """Points (n,) with their friction, and the model at them.
+    """Points (n,) with their friction, and the model at them; parameters and errors are those of :func:`mumacro.fit`.
 
-    Parameters
-    ----------
-    data, unknowns, contact, direction, surrogate, fixed
-        As in :func:`mumacro.fit`.
-
-    Attributes
-    ----------
-    columns : dict of ndarray
-        The known inputs [SI], (n,), those of the names that ``evaluate`` takes.
-    mu, weight : ndarray
-        Measured mu_macro [-]; one over its standard deviation, 1 where that is not known.
-    std : ndarray or None
-        The standard deviations.
-    amplitude : str
-        The input that says how far the contact is moved or unloaded: y0, or Fz_amplitude.
-
-    Raises
-    ------
-    InputError
-        See :func:`mumacro.fit`.
+    ``columns`` has the known inputs [SI], (n,), by the names that ``evaluate`` takes; ``mu`` is mu_macro [-], ``std``
+    its standard deviations, None where not known, ``weight`` one over them, or 1; ``amplitude`` is the input that
+    says how far the contact is moved or unloaded: y0, or Fz_amplitude.
     """
 
     def __init__(

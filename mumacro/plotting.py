@@ -57,7 +57,9 @@ def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
     """
     path = Path(path)
     if path.suffix not in ENDINGS:
-        raise InputError("file name", str(path), f"a name that ends in {', '.join(ENDINGS)}")
+        raise InputError(
+            "file name", str(path), f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"
+        )
     figure = _loaded("figure").Figure(figsize=(7.0, 4.5), layout="constrained")
     draw(figure.subplots())
     figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
@@ -66,23 +68,8 @@ def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
 def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None) -> Any:
     """mu_macro along one input, with the static limit, the borders, the band of k_range, and roots of a target.
 
-    Parameters
-    ----------
-    law : Law
-        What :func:`mumacro.law.friction_law` returns.
-    axes : matplotlib Axes, optional
-        Where to draw; new ones if left out.
-    roots, target : optional
-        Values of the input [SI] to mark, and the mu_macro [-] that they give.
-
-    Returns
-    -------
-    matplotlib Axes
-
-    Raises
-    ------
-    MumacroError
-        matplotlib is not installed; names the extra.
+    ``roots`` are values of the input [SI] to mark, and ``target`` the mu_macro [-] that they give.  Draws on ``axes``
+    of matplotlib, or new ones, and returns them; raises MumacroError where matplotlib is not installed.
     """
     axes, x = _own(axes), law.values
     axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")

@@ -6,7 +6,7 @@ import csv
 import math
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 
 from mumacro import command
-from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, kind_in, open_table
+from mumacro.command import ImpossibleError, UsageError, as_json, in_columns, kind_in, open_table
 from mumacro.contact import AMPLITUDE
 from mumacro.errors import InputError
 from mumacro.fitted import Fit
 from mumacro.fitting import fit
-from mumacro.inputs import NAMES, Scale, is_rigid, number_hint, scale_of, split_unit, suggestion, unit_of
+from mumacro.inputs import LIKE, SI, unit_of
 from mumacro.measured import STD, UNKNOWNS
-from mumacro.questions import OUT
-from mumacro.separators import SEPARATORS, advice
+from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head
 from mumacro.validity import digits
 
 __all__ = ["FIT", "fit_points", "read_points"]
@@ -37,20 +36,17 @@ examples:
   {FIT}
   mumacro fit measured.csv Fz=10N y0=2um f=20kHz mu0=0.3 --unknown k --contact ball
 """
+_READ = (*SI, AMPLITUDE, "mu_macro", STD)  # columns
 _SHOWN = 5  # faults of a file
 
 
 def fit_points(words: Sequence[str]) -> str:
     """``mumacro fit``."""
-    parser = OneLineParser(
-        prog="mumacro fit", description="k and mu0 of a contact from measured friction.", epilog=_COLUMNS
-    )
-    parser.add_argument("points", help="a file of CSV; - is standard input")
+    first = "points", {"help": "a file of CSV; - is standard input"}
+    told = "k and mu0 of a contact from measured friction."
+    parser = command.question("fit", told, _COLUMNS, "the other inputs", "*", first)
     parser.add_argument("--unknown", nargs="+", default=[*UNKNOWNS], metavar="NAME", help="k, mu0; default: both")
-    parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells; default: ,")
-    parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers; default: .")
-    parser.add_argument("-o", "--out", type=Path, help=OUT)
-    command.add_case(parser, "the other inputs", "*")
+    command.add_format(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, more = ([x for x in chosen.unknown if ("=" in x) == given] for given in (False, True))
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
@@ -104,22 +100,19 @@ def _told(found: Fit, shown: int | None) -> str:
 def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> dict[str, Any]:
     """The columns of measured points, by name in SI, (n,); those of other names are left out.
 
-    Raises
-    ------
-    ImpossibleError
-        No header, no v0 or mu_macro, another separator, a column twice or in an unknown unit, a cell that is no
-        number; names ``where`` and the row.
+    ImpossibleError tells what is wrong with the header or with cells, after ``where``.
 
-    Examples
-    --------
     >>> read_points("v0 [mm/s],mu_macro\\n10,0.2\\n", "points.csv")
     {'v0': array([0.01]), 'mu_macro': array([0.2])}
     """
     lines = text.removeprefix("\ufeff").splitlines()
-    header, *rows = [row for row in csv.reader(lines, delimiter=sep) if any(map(str.strip, row))] or [[]]
-    if remedy := advice(sep.join(header), lines[1:50], sep, decimal):
-        raise ImpossibleError(f"{where}: {remedy}")
-    places, faults = _places(header)
+    try:
+        header = read_head("".join(lines[:1]), lines[1:50], sep, decimal)
+    except ValueError as error:
+        raise ImpossibleError(f"{where}: line 1: {error}") from None
+    rows = [row for row in csv.reader(lines[1:], delimiter=sep) if any(map(str.strip, row))]
+    places, faults = find_heads(header, {name: name if name in SI else LIKE.get(name, "mu0") for name in _READ})
+    faults += [absent(name, header) for name in ("v0", "mu_macro") if name not in places]
     columns = {name: np.empty(len(rows)) for name in places}
     for number, row in enumerate(rows, 1):
         if len(row) != len(header):
@@ -127,43 +120,13 @@ def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> di
             continue
         for name, (i, scale) in places.items():
             try:
-                columns[name][number - 1] = scale.si(_number(name, row[i].strip(), decimal))
+                value = read_cell(name, row[i], decimal)
+                columns[name][number - 1] = scale.si(value)
+                if math.isnan(value):
+                    faults.append(f"row {number}: {name} is missing")
             except ValueError as error:
                 faults.append(f"row {number}: {name} {error}, got {row[i][:80]!r}")
     if faults:
         more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
         raise ImpossibleError(f"{where}: {'; '.join(faults[:_SHOWN])}{more}")
     return columns
-
-
-def _places(header: Sequence[str]) -> tuple[Mapping[str, tuple[int, Scale]], list[str]]:
-    """Where the columns are, what one unit of each is, and what is wrong with the header."""
-    places: dict[str, tuple[int, Scale]] = {}
-    faults = []
-    for i, head in enumerate(header):
-        name, unit = split_unit(head)
-        if name not in (*NAMES, AMPLITUDE, "mu_macro", STD):
-            continue
-        scale = Scale() if unit is None else scale_of("mu0" if name in ("mu_macro", STD) else name, unit)
-        if scale is None:
-            faults.append(f"the column {head!r} has a unit that {name} cannot have")
-        if name in places:
-            faults.append(f"{name} is there twice")
-        places[name] = i, scale or Scale()
-    for name, unit in (("v0", "m/s"), ("mu_macro", "-")):
-        if name not in places:
-            near = [head for head in header if suggestion(split_unit(head)[0]) == name]
-            remedy = f"rename {near[0]!r}" if near else f"there are {', '.join(map(repr, header))}"
-            faults.append(f"there is no column {name} [{unit}]; {remedy}")
-    return places, faults
-
-
-def _number(name: str, cell: str, decimal: str) -> float:
-    """A cell as a number; ValueError says what it is instead."""
-    if name == "k" and is_rigid(cell):
-        return math.inf
-    plain = cell if decimal == "." else cell.replace(".", "?").replace(decimal, ".")
-    try:
-        return float(plain.replace("_", "?"))
-    except ValueError:
-        raise ValueError(number_hint(name, cell) if cell else "is missing") from None

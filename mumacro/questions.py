@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,6 @@ __all__ = ["LAW", "ONE_K", "SOLVE_FOR", "STIFFNESS", "law", "map_", "solve", "st
 LAW = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s 1m/s"
 SOLVE_FOR = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
 STIFFNESS = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"
-OUT = "write the result there: a picture, .png, .svg or .pdf, or .csv"
 CURVE = 400  # points of a curve in a picture
 ONE_K = "one k is needed: over an interval of it a wanted mu_macro has no single answer; solve for both ends"
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
@@ -41,30 +39,20 @@ _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 
 def law(words: Sequence[str]) -> str:
     """``mumacro law``."""
-    parser = OneLineParser(
-        prog="mumacro law",
-        description="mu_macro over a range of one input, with the static value and the border of continuous sliding.",
-        epilog=f"{command.INPUTS}\nexamples:\n  {LAW}\n  {LAW} -o law.png",
-    )
-    command.add_case(parser, "a case without the swept input", "*")
-    text = "the swept input, its first and its last value"
-    parser.add_argument("--along", nargs="+", metavar=("NAME", "LOW HIGH"), default=["v0"], help=text)
-    parser.add_argument("--from", dest="start", help="first value, in its SI unit or with a unit, as in --along")
-    parser.add_argument("--to", dest="stop", help="last value, the same")
+    told = "mu_macro over a range of one input, with the static value and the border of continuous sliding."
+    epilog = f"{command.INPUTS}\nexamples:\n  {LAW}\n  {LAW} -o law.png"
+    parser = command.question("law", told, epilog, "a case without the swept input", "*")
+    text = "the swept input, its first and its last value, in its SI unit or with a unit"
+    parser.add_argument("--along", nargs=3, metavar=("NAME", "LOW", "HIGH"), required=True, help=text)
     parser.add_argument("--points", type=int, help="number of values; default: 25, in pictures 400")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
     parser.add_argument("--approximations", action="store_true", help="also the approximations of the article")
-    parser.add_argument("-o", "--out", type=Path, help=OUT)
     chosen = parser.parse_intermixed_args(words)
-    (along, *ends), known = [x for x in chosen.along if "=" not in x] or [""], [x for x in chosen.along if "=" in x]
-    kind = kind_in(chosen)
+    (along, *ends), kind = chosen.along, kind_in(chosen)
     if along not in kind.columns:
-        raise UsageError(f"--along {along or known[0]}: the swept input is one of {', '.join(kind.columns)}")
-    ends = ends or [end for end in (chosen.start, chosen.stop) if end is not None]
-    if len(ends) != 2:
-        raise UsageError(f"give the first and the last value: --along {along} LOW HIGH")
+        raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
     (inner, scale), unit = field_of(along), unit_of(along)
-    case = read_case([*chosen.words, *known], kind, [along])
+    case = read_case(chosen.words, kind, [along])
     start, stop = (scale * end for end in command.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
     values = sweep_values(inner, start, stop, chosen.points or (CURVE if drawn else 25), chosen.scale)
@@ -95,18 +83,14 @@ def _shown(value: float, form: str) -> str:
 
 def solve(words: Sequence[str]) -> str:
     """``mumacro solve-for``."""
-    parser = OneLineParser(
-        prog="mumacro solve-for",
-        description="Every value of one input at which mu_macro has a wanted value.",
-        epilog=f"{command.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {SOLVE_FOR}",
-    )
-    parser.add_argument("unknown", choices=(*NAMES, AMPLITUDE), help="the unknown input")
-    command.add_case(parser, "the other five inputs")
+    told = "Every value of one input at which mu_macro has a wanted value."
+    epilog = f"{command.INPUTS}\nexample, the amplitude [m] that halves the friction:\n  {SOLVE_FOR}"
+    first = "unknown", {"choices": (*NAMES, AMPLITUDE), "help": "the unknown input"}
+    parser = command.question("solve-for", told, epilog, "the other five inputs", first=first)
     parser.add_argument("--target", type=float, required=True, help="wanted mu_macro [-]")
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
-    parser.add_argument("-o", "--out", type=Path, help=OUT)
     chosen = parser.parse_intermixed_args(words)
     unknown, (inner, scale), unit = chosen.unknown, field_of(chosen.unknown), unit_of(chosen.unknown)
     kind = kind_in(chosen)
@@ -152,14 +136,12 @@ def solve(words: Sequence[str]) -> str:
 
 def map_(words: Sequence[str]) -> str:
     """``mumacro map``."""
-    parser = OneLineParser(
-        prog="mumacro map",
-        description="The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case on it.",
-        epilog=f"{command.INPUTS}\nexample:\n  mumacro map -o map.png",
-    )
-    command.add_case(parser, "a case to mark, if any", "*")
-    parser.add_argument("-o", "--out", type=Path, required=True, help=OUT)
+    told = "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case on it."
+    epilog = f"{command.INPUTS}\nexample:\n  mumacro map -o map.png"
+    parser = command.question("map", told, epilog, "a case to mark, if any", "*")
     chosen = parser.parse_intermixed_args(words)
+    if chosen.out is None:
+        raise UsageError("a map is written to a file: give -o map.png")
     kind, surrogate = kind_in(chosen), open_table(chosen.table)
     one_k = "one k is needed: the map marks one point"
     point = None

@@ -754,9 +754,7 @@ def _picked(cases: Any, columns: Sequence[str]) -> dict[str, Any]:
     try:
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
         there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
-        picked = {name: cases[name] for name in columns if name in there}
-        if "k" not in there:
-            picked |= {name: cases[name] for name in ENDS if name in there}
+        picked = {name: cases[name] for name in (*columns, *ENDS) if name in there}
     except (AttributeError, TypeError, KeyError) as error:
         kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
         raise InputError(

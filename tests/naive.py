@@ -47,20 +47,8 @@ def march_ball(v: float, y: float, springs: int, steps: int) -> float:
     """mu~ of a ball as ``springs`` independent springs, each marched by itself over one steady period."""
     total = 0.0
     for j in range(springs):
-        xi = (j + 0.5) / springs
-        s = 1.0 - xi * xi
-        a, b = v / (1.5 * s), y / (1.5 * s)
-        ux, uy, mean, d_tau = 0.0, 0.0, 0.0, 2.0 * math.pi / steps
+        s = 1.5 * (1.0 - ((j + 0.5) / springs) ** 2)  # load of the spring over the mean one's
+        a, b = v / s, y / s
         periods = math.ceil(1.0 / a + 40.0 / max(2.0 * math.pi * a, 4.0 * (b - 1.0)))
-        for period in range(periods):
-            for i in range(steps):
-                ux += a * d_tau
-                uy += b * (math.sin((i + 1) * d_tau) - math.sin(i * d_tau))
-                stretch = math.hypot(ux, uy)
-                if stretch > 1.0:
-                    ux /= stretch
-                    uy /= stretch
-                if period == periods - 1:
-                    mean += ux
-        total += 1.5 * s * mean / steps / springs
-    return total
+        total += s * march(a, b, steps, periods)[:, 0].mean()
+    return total / springs

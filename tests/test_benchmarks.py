@@ -97,6 +97,8 @@ def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
     check([comparison, quantities])
     seen = []
     for row in comparison:
+        if row["max abs error"] == "-":
+            continue
         name, error = row["method"].strip("*"), float(row["max abs error"])
         if name.startswith("mumacro-"):
             assert 0.0 < error <= float(name.removeprefix("mumacro-"))

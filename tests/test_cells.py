@@ -10,15 +10,7 @@ from numpy.typing import NDArray
 from comparing import close
 from made_cells import Cells
 from mumacro import charts
-from mumacro.cells import (
-    WIDTH,
-    cell_positions,
-    cells_1d,
-    cells_2d,
-    chebyshev_coefficients,
-    interpolation_matrix,
-    nodes,
-)
+from mumacro.cells import WIDTH, cell_positions, cells_1d, cells_2d, chebyshev_coefficients, interpolation_matrix, nodes
 from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
 from mumacro.library import Kernel, kernels
 
@@ -51,20 +43,13 @@ def test_nodes_are_the_zeros_of_the_chebyshev_polynomial(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 3, 8, 21])
-def test_coefficients_interpolate(n: int) -> None:
+def test_coefficients_interpolate_along_every_axis(n: int) -> None:
     rng = np.random.default_rng(n)
     values = rng.normal(size=n)
-    c = chebyshev_coefficients(values)
-    assert chebyshev.chebval(nodes(n, -1.0, 1.0), c) == close(values, abs=1e-13)
-    assert interpolation_matrix(n, nodes(n, -1.0, 1.0)) @ c == close(values, abs=1e-13)
-
-
-def test_coefficients_of_a_plane_work_along_both_axes() -> None:
-    rng = np.random.default_rng(4)
-    expected = rng.normal(size=(5, 9))
-    x, z = nodes(5, -1.0, 1.0), nodes(9, -1.0, 1.0)
-    values = chebyshev.chebgrid2d(x, z, expected)
-    assert chebyshev_coefficients(values) == close(expected, abs=1e-13)
+    assert interpolation_matrix(n, nodes(n, -1.0, 1.0)) @ chebyshev_coefficients(values) == close(values, abs=1e-13)
+    expected = rng.normal(size=(n, 9))
+    plane = chebyshev.chebgrid2d(nodes(n, -1.0, 1.0), nodes(9, -1.0, 1.0), expected)
+    assert chebyshev_coefficients(plane) == close(expected, abs=1e-13)
 
 
 @pytest.mark.parametrize("cells", [1, 3, 8])
@@ -211,14 +196,10 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
 
 
 def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
-    assert S.to_evaluation(np.array([0.0, 1.0])) == close([0.0, SQRT2], abs=1e-16)
-    assert S.to_file(np.array([0.0, SQRT2])) == close([0.0, 1.0], abs=1e-15)
     rho = np.concatenate([np.geomspace(1e-30, 0.5, 50), 1.0 - np.geomspace(1e-12, 0.5, 50)])
-    sigma = np.where(rho < 0.5, np.sqrt(rho), SQRT2 - np.sqrt(1.0 - rho))
-    s = S.to_file(sigma)
+    s = S.to_file(np.where(rho < 0.5, np.sqrt(rho), SQRT2 - np.sqrt(1.0 - rho)))
     assert np.sin(0.5 * math.pi * s) ** 2 == close(rho, rel=1e-15)
-    assert np.all((s >= 0.0) & (s <= 1.0))
-    assert np.all(np.diff(S.to_file(np.linspace(0.0, SQRT2, 1001))) > 0.0)
+    assert S.to_file(np.array([0.0, SQRT2])) == close([0.0, 1.0], abs=1e-15)
     # continuous at its knot
     beside = S.to_evaluation(np.array([0.5 - 1e-15, 0.5, 0.5 + 1e-15]))
     assert beside == close(0.5 * SQRT2, abs=4e-15)

@@ -1,25 +1,18 @@
 """The atlas: point to place and place to point are inverse, in every block, on nodes, edges and seams."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from comparing import close
 from mumacro import Surrogate, charts
 from mumacro.cells import nodes
 from mumacro.charts import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES, Axis
 from mumacro.library import Kernel, kernels
+from tests.cases import Array, tables
 
-Array = NDArray[np.float64]
 C_LOW, S_MID, CORNER = (NAMES.index(name) for name in ("continuous_low", "stick_slip_mid", "corner"))
 PARTS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.37, 0.5, 0.5 + 1e-9, 0.71, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9)
-
-
-@pytest.fixture(scope="module", params=["mumacro-1e-4", "mumacro-1e-12"])
-def table(request: pytest.FixtureRequest, tables_dir: Path) -> Surrogate:
-    return Surrogate.open(tables_dir / f"{request.param}.nc")
+table = tables(1e-4, 1e-12)
 
 
 def along(axis: Axis) -> Array:

@@ -1,11 +1,9 @@
 """The solver over its whole range: limits, scaling laws at both ends, and a second method for the same cycle."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from builder import sections, steady
@@ -15,27 +13,15 @@ from builder.sections import ANGLE_SECTION, COS_0, SIGMA_1, SIN_0, TIME_SECTION,
 from builder.steady import RELATIVE_ERROR, solve, workspace
 from builder.sweep import Sweep
 from comparing import close
-from mumacro import Surrogate
 from mumacro.closed_forms import outer, second_order
-
-Array = NDArray[np.float64]
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
-    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
+from tests.cases import log_uniform, opened
 
 
 @pytest.mark.parametrize(
     ("v_range", "y_range"),
-    [
-        (V_RANGE, Y_RANGE),
-        ((1e-60, 1e-40), (1e-3, 1e6)),
-        ((1e-60, 1e-12), (1e-15, 1e8)),
-        ((1e-8, 1e10), (1e8, 1e14)),
-        ((1e-30, 1e-10), (1e-15, 1e-4)),
-        ((1e6, 1e10), (1e-10, 1e14)),
-    ],
-)
+    [(V_RANGE, Y_RANGE), ((1e-60, 1e-40), (1e-3, 1e6)), ((1e-60, 1e-12), (1e-15, 1e8)), ((1e-8, 1e10), (1e8, 1e14)),
+     ((1e-30, 1e-10), (1e-15, 1e-4)), ((1e6, 1e10), (1e-10, 1e14))],
+)  # fmt: skip
 def test_the_whole_range_is_solved(v_range: tuple[float, float], y_range: tuple[float, float]) -> None:
     rng = np.random.default_rng(3)
     for v, y in zip(log_uniform(rng, *v_range, 1000), log_uniform(rng, *y_range, 1000), strict=True):
@@ -64,8 +50,8 @@ def test_mu_is_linear_in_creeping_speeds_above_one(y: float) -> None:
 
 
 @pytest.mark.parametrize("y", [1.05, 1.3, 2.0, 5.0, 30.0, 1e3, 1.4e5])
-def test_the_table_continues_the_solver_down_to_denormal_speeds(y: float, tables_dir: Any) -> None:
-    s = Surrogate.open(tables_dir / "mumacro-1e-12.nc")
+def test_the_table_continues_the_solver_down_to_denormal_speeds(y: float) -> None:
+    s = opened(1e-12)
     slope = solve(1e-60, y).mu_ratio / 1e-60
     for v in (1e-60, 1e-147, 1e-220, 1e-304):
         found = float(s.mu_ratio(v, y))
@@ -123,9 +109,9 @@ def test_the_power_has_no_step_where_its_formula_changes() -> None:
 
 @pytest.mark.parametrize("share", [1e-6, 0.1, 0.9, 1.1, 10.0])
 @pytest.mark.parametrize("y", [1e-15, 1e-30, 1e-70])
-def test_the_table_continues_the_solver_down_to_any_amplitude(share: float, y: float, tables_dir: Any) -> None:
+def test_the_table_continues_the_solver_down_to_any_amplitude(share: float, y: float) -> None:
     # everything depends on v~/y~^2 alone; the power is y~^4 times a function of it
-    s = Surrogate.open(tables_dir / "mumacro-1e-12.nc")
+    s = opened(1e-12)
     at = Y_RANGE[0]
     solved = solve(share * 0.5 * at * at, at)
     stick, stick_bound = s.stick_fraction_with_bound(share * 0.5 * y * y, y)
@@ -169,21 +155,19 @@ def test_the_smallest_slip_speed_is_seen_in_stiff_steps() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("y", [1e-15, 1e-12, 0.5, 1.0, 1.3, 1e5, 1e14])
-def test_mu_rises_with_speed_over_the_whole_range(y: float, sweep: Sweep) -> None:
-    v = np.geomspace(*V_RANGE, 3000)
-    solved = sweep.solve("full", v, np.full_like(v, y))
-    assert np.all(np.diff(solved["mu_ratio"]) >= -RELATIVE_ERROR * solved["mu_ratio"][1:])
-    assert np.all(np.diff(solved["deficit"]) <= RELATIVE_ERROR * solved["deficit"][1:])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("v", [1e-60, 1e-40, 1e-18, 1e-3, 1.0, 1e5, 1e10])
-def test_mu_falls_with_amplitude_over_the_whole_range(v: float, sweep: Sweep) -> None:
-    y = np.geomspace(*Y_RANGE, 3000)
-    solved = sweep.solve("full", np.full_like(y, v), y)
-    assert np.all(np.diff(solved["mu_ratio"]) <= RELATIVE_ERROR * solved["mu_ratio"][1:])
-    assert np.all(np.diff(solved["deficit"]) >= -RELATIVE_ERROR * solved["deficit"][1:])
+@pytest.mark.parametrize(
+    ("along", "fixed"),
+    [*(("v", y) for y in (1e-15, 1e-12, 0.5, 1.0, 1.3, 1e5, 1e14)),
+     *(("y", v) for v in (1e-60, 1e-40, 1e-18, 1e-3, 1.0, 1e5, 1e10))],
+)  # fmt: skip
+def test_mu_rises_with_speed_and_falls_with_amplitude_over_the_whole_range(
+    along: str, fixed: float, sweep: Sweep
+) -> None:
+    moving, still = np.geomspace(*(V_RANGE if along == "v" else Y_RANGE), 3000), np.full(3000, fixed)
+    solved = sweep.solve("full", *((moving, still) if along == "v" else (still, moving)))
+    for name, sign in (("mu_ratio", 1.0), ("deficit", -1.0)):
+        rise = (sign if along == "v" else -sign) * np.diff(solved[name])
+        assert np.all(rise >= -RELATIVE_ERROR * solved[name][1:]), name
 
 
 # --- the error estimate -------------------------------------------------------------------------------

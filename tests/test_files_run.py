@@ -82,7 +82,7 @@ def assert_whole(out, cases):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("share", [-1.0, 0.0, 0.4, 0.8])
+@pytest.mark.parametrize("share", [-1.0, 0.4, 0.8])
 def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(tmp_path, surrogate, cases, kind, share):
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
     stopped(source, out, surrogate, share)
@@ -95,12 +95,11 @@ def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(tmp_pa
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("file", ["answers", "notes"])
 @pytest.mark.parametrize("harm", ["cut", "changed", "gone", "longer"])
-def test_finished_pieces_that_are_cut_or_changed_are_done_again(tmp_path, surrogate, cases, kind, file, harm):
+def test_finished_pieces_that_are_cut_or_changed_are_done_again(tmp_path, surrogate, cases, kind, harm):
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
     stopped(source, out, surrogate)
-    part = tmp_path / f"out.{kind}.parts" / file
+    part = tmp_path / f"out.{kind}.parts" / "log"
     data = part.read_bytes()
     if harm == "gone":
         part.unlink()
@@ -110,7 +109,7 @@ def test_finished_pieces_that_are_cut_or_changed_are_done_again(tmp_path, surrog
         part.write_bytes({"cut": data[:at], "changed": swapped, "longer": data + data[at:]}[harm])
     summary = evaluate_files([source], out, surrogate, say=said.append)
     assert summary.rows == 3000
-    assert ("is done again" in "".join(said)) == ((file, harm) not in (("answers", "longer"), ("notes", "gone")))
+    assert ("is done again" in "".join(said)) == (harm != "gone")
     assert_whole(out, cases)
 
 
@@ -144,7 +143,7 @@ def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(tmp_path, surrog
         assert evaluate_files([source], out, surrogate).rows == 3000
         assert_whole(out, cases)
         steps += 1
-    assert steps > 8
+    assert steps > 6
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -167,14 +166,14 @@ def test_the_command_given_again_after_its_end_finds_all_done(tmp_path, cases, c
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parquet", "csv"])
 def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path, repository, cases, kind):
-    source, out, notes = tmp_path / "cases.csv", tmp_path / f"out.{kind}", tmp_path / f"out.{kind}.parts" / "notes"
+    source, out, log = tmp_path / "cases.csv", tmp_path / f"out.{kind}", tmp_path / f"out.{kind}.parts" / "log"
     header, *rows = (cases / "cases.csv").read_text().splitlines(keepends=True)
     source.write_text("".join([header, *(200 * rows)]))
     command, kills = [sys.executable, "-m", "mumacro", "eval", str(source), "-o"], 0
     for pause in (0.0, 0.01, 0.05, 0.2):
         process = subprocess.Popen([*command, str(out)], cwd=repository, stdout=-3, stderr=-3)
-        had = notes.stat().st_size if notes.exists() else 0
-        while process.poll() is None and (not notes.exists() or notes.stat().st_size <= had):
+        had = log.stat().st_size if log.exists() else 0
+        while process.poll() is None and (not log.exists() or log.stat().st_size <= had):
             time.sleep(0.002)
         time.sleep(pause)
         if process.poll() is None:
@@ -210,18 +209,25 @@ def test_an_input_that_changes_during_the_run_is_not_reported_complete(tmp_path,
     assert left(tmp_path) == [source.name]
 
 
-def test_changed_content_of_the_same_size_and_time_is_another_input(tmp_path, surrogate, cases):
+@pytest.mark.parametrize("kind", [{}, {"contact": "ball"}, {"direction": "along"}])
+def test_another_content_contact_or_direction_is_another_run(tmp_path, surrogate, cases, kind):
     source, out = tmp_path / "cases.csv", tmp_path / "out.csv"
     copied(cases, "csv", tmp_path)
-    stopped(source, out, surrogate)
+    stopped(source, out, surrogate, **kind)
     data, times = source.read_bytes(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
-    source.write_bytes(data.replace(b"e-05", b"e-06"))
-    os.utime(source, ns=times)
-    with pytest.raises(FilesError, match=r"parts of another run \(inputs differ\); --force deletes them"):
+    if not kind:  # of the same size and time
+        source.write_bytes(data.replace(b"e-05", b"e-06"))
+        os.utime(source, ns=times)
+    what = "options" if kind else "inputs"
+    with pytest.raises(FilesError, match=rf"parts of another run \({what} differ\); --force deletes them"):
         evaluate_files([source], out, surrogate)
     source.write_bytes(data)  # and the same content of another time is the same input
-    assert evaluate_files([source], out, surrogate).resumed
-    assert_whole(out, cases)
+    assert evaluate_files([source], out, surrogate, **kind).resumed
+    if kind:
+        evaluate_files([source], tmp_path / "whole.csv", surrogate, **kind)
+        assert out.read_bytes() == (tmp_path / "whole.csv").read_bytes() != (cases / "whole.csv").read_bytes()
+    else:
+        assert_whole(out, cases)
 
 
 @pytest.mark.parametrize("name", ["out.csv", "out.csv.rejects.csv"])
@@ -235,24 +241,21 @@ def test_an_output_never_overwrites_an_input(tmp_path, capsys, cases, name, give
     assert (tmp_path / name).read_bytes() == (cases / "cases.csv").read_bytes()
 
 
-def test_files_that_are_not_of_a_run_are_kept(tmp_path, surrogate, cases):
-    source = copied(cases, "csv", tmp_path)
+def test_files_that_are_not_of_a_run_are_kept_and_a_second_run_to_one_output_is_refused(
+    tmp_path, surrogate, cases, capsys
+):
+    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", []
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
-    evaluate_files([source], tmp_path / "out.csv", surrogate, force=True)
-    assert (tmp_path / "out.csv.parts" / "precious.txt").read_text() == "mine"
-
-
-def test_a_second_run_to_one_output_is_refused(tmp_path, surrogate, cases, capsys):
-    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", []
 
     def other(*_):
         if not said:
             assert main(["eval", str(source), "-o", str(out), "--force"]) == 1
             said.append(capsys.readouterr().err)
 
-    assert evaluate_files([source], out, surrogate, progress=other).rows == 3000
+    assert evaluate_files([source], out, surrogate, force=True, progress=other).rows == 3000
     assert "out.csv.parts: another process is at work here; wait for it, or stop it" in said[0]
+    assert (tmp_path / "out.csv.parts" / "precious.txt").read_text() == "mine"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no limit of file sizes")
@@ -289,15 +292,3 @@ def test_memory_does_not_grow_with_the_file(tmp_path, repository):
 
     # 1.2 million more rows are 130 MB of numbers
     assert peak(1_500_000) - peak(300_000) < 100
-
-
-@pytest.mark.parametrize("kind", [{"contact": "ball"}, {"direction": "along"}])
-def test_a_run_of_another_contact_or_direction_is_another_run(tmp_path, surrogate, cases, kind):
-    source, out = copied(cases, "csv", tmp_path), tmp_path / "out.csv"
-    stopped(source, out, surrogate, **kind)
-    with pytest.raises(FilesError, match=r"parts of another run \(options differ\); --force deletes them"):
-        evaluate_files([source], out, surrogate)
-    assert evaluate_files([source], out, surrogate, **kind).resumed
-    whole = tmp_path / "whole.csv"
-    evaluate_files([source], whole, surrogate, **kind)
-    assert out.read_bytes() == whole.read_bytes() != (cases / "whole.csv").read_bytes()

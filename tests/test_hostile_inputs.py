@@ -1,6 +1,5 @@
 """One policy for bad input: a bad scalar is refused by name, a bad array value gives NaN, and nothing crashes."""
 
-import json
 import math
 import os
 import subprocess
@@ -13,6 +12,7 @@ import pytest
 
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES
+from tests.cases import CASE, opened
 
 #: methods of (v~, y~)
 PLANE = {
@@ -32,17 +32,19 @@ NO_NUMBERS = {
     "times": np.array(["2020-01-01"], dtype="datetime64[s]"), "durations": np.array([1], dtype="timedelta64[s]"),
     "a time": np.datetime64("2020-01-01"), "text array": np.array(["0.1"]), "None in an array": [0.1, None],
     "records": np.zeros(3, dtype=[("a", "f8")]), "objects": np.array([object()]), "void": np.void(b"12345678"),
+    "long": ["x" * 100_000] * 100,
 }  # fmt: skip
 OUT_OF_BOUNDS = [-1.0, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
 
 
 @pytest.fixture(scope="module")
 def table() -> Surrogate:
-    return Surrogate.open(1e-4)
+    return opened(1e-4)
 
 
-def first(found: Any) -> Any:
-    return found[0] if isinstance(found, tuple) else found
+def parts(found: Any) -> tuple[Any, ...]:
+    """A value alone, or with bound or slopes."""
+    return found if isinstance(found, tuple) else (found,)
 
 
 @pytest.mark.parametrize("method", PLANE)
@@ -57,6 +59,12 @@ def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, metho
         table.v_tilde_crit(NO_NUMBERS[bad])
 
 
+def test_an_infinite_amplitude_is_refused_by_name(table: Surrogate) -> None:
+    with pytest.raises(InputError) as caught:
+        table.mu_ratio(1.0, math.inf)
+    assert caught.value.field == "y_tilde"
+
+
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", OUT_OF_BOUNDS, ids=repr)
 def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate, method: str, bad: Any) -> None:
@@ -66,10 +74,7 @@ def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate,
             ask(table, v, y)
         assert caught.value.field == field
         many = ask(table, np.array([0.1, float(v), 0.1]), np.array([0.5, float(y), 0.5]))
-        sound = ask(table, 0.1, 0.5)
-        for one, column in zip(
-            sound if isinstance(sound, tuple) else (sound,), many if isinstance(many, tuple) else (many,), strict=True
-        ):
+        for one, column in zip(parts(ask(table, 0.1, 0.5)), parts(many), strict=True):
             assert column[0] == column[2] == one
             assert column[1] == -1 if column.dtype == np.int8 else math.isnan(column[1])
 
@@ -79,8 +84,8 @@ def test_quantities_beyond_the_quadrant_are_refused_not_read(table: Surrogate, v
     for method, ask in PLANE.items():
         with pytest.raises(InputError):
             ask(table, v, y)
-        assert np.isnan(first(ask(table, [v], y))).all(), method
-        assert np.isnan(first(ask(table, np.full(5000, v), np.full(5000, y)))).all(), method
+        assert np.isnan(parts(ask(table, [v], y))[0]).all(), method
+        assert np.isnan(parts(ask(table, np.full(5000, v), np.full(5000, y)))[0]).all(), method
 
 
 @pytest.mark.parametrize("method", PLANE)
@@ -104,20 +109,15 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
         "memory": memoryview(np.ascontiguousarray(v)),
     }  # fmt: skip
     for name, layout in layouts.items():
-        found = ask(table, layout, y)
-        for one, two in zip(
-            found if isinstance(found, tuple) else (found,),
-            expected if isinstance(expected, tuple) else (expected,),
-            strict=True,
-        ):
+        for one, two in zip(parts(ask(table, layout, y)), parts(expected), strict=True):
             np.testing.assert_array_equal(one, two, err_msg=name)
     assert np.array_equal(spread[::2, ::3], v)
     for one in (True, np.True_, np.float16(1), np.longdouble(1), np.uint64(1), np.array(1), 1):
-        assert first(ask(table, one, 0.5)) == first(ask(table, 1.0, 0.5))
+        assert parts(ask(table, one, 0.5))[0] == parts(ask(table, 1.0, 0.5))[0]
     for empty in (np.empty(0), [], np.empty((0, 3))):
-        assert np.shape(first(ask(table, empty, 0.5))) == np.shape(empty)
-    assert isinstance(first(ask(table, np.array(0.1), np.array(0.5))), float)
-    assert first(ask(table, np.broadcast_to(0.1, (3, 4)), 0.5)).shape == (3, 4)
+        assert np.shape(parts(ask(table, empty, 0.5))[0]) == np.shape(empty)
+    assert isinstance(parts(ask(table, np.array(0.1), np.array(0.5))[0]), float)
+    assert parts(ask(table, np.broadcast_to(0.1, (3, 4))[0], 0.5)).shape == (3, 4)
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
@@ -126,8 +126,7 @@ def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
     masked = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
     found = table.mu_ratio(masked, 0.5)
     assert np.isnan(found).tolist() == [False, True, False]
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
-    assert table.evaluate({**case, "v0": masked}).source_code.tolist()[1] == -1
+    assert table.evaluate({**CASE, "v0": masked}).source_code.tolist()[1] == -1
     assert masked.data.tolist() == [1, 2, 3]
     with pytest.raises(InputError, match="v_tilde"):
         table.mu_ratio(np.ma.masked, 0.5)
@@ -156,7 +155,7 @@ def test_of_must_be_a_quantity(table: Surrogate) -> None:
 @pytest.mark.parametrize("bad", NO_NUMBERS)
 @pytest.mark.parametrize("field", ["mu0", "k", "omega", "f", "v0"])
 def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(table: Surrogate, field: str, bad: str) -> None:
-    case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+    case: dict[str, Any] = dict(CASE)
     if field == "f":
         del case["omega"]
     case[field] = NO_NUMBERS[bad]
@@ -242,10 +241,3 @@ def test_random_bits_do_no_harm(repository: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "survived"
-
-
-def test_errors_of_bad_input_are_short_whatever_was_given(table: Surrogate) -> None:
-    with pytest.raises(InputError) as caught:
-        table.mu_ratio(["x" * 100_000] * 100, 0.5)
-    assert len(str(caught.value)) < 400
-    assert json.dumps(str(caught.value))

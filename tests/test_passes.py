@@ -1,11 +1,9 @@
 """Many points at once against one by one: the same bits, for all positions and numbers of points."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from comparing import close
 from mumacro import Surrogate, batch, charts
@@ -13,14 +11,10 @@ from mumacro.cells import outer_cells
 from mumacro.charts import CHARTS, RHO_MAX, SIGMA_CUT, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from mumacro.contact import put_rules
 from mumacro.library import Kernel, kernels
+from tests.cases import Array, log_uniform, tables
 
-Array = NDArray[np.float64]
 CHUNK = 256  # points that the kernel's passes take together
-
-
-@pytest.fixture(scope="module", params=["mumacro-1e-4", "mumacro-1e-12"])
-def table(request: pytest.FixtureRequest, tables_dir: Path) -> Surrogate:
-    return Surrogate.open(tables_dir / f"{request.param}.nc")
+table = tables(1e-4, 1e-12)
 
 
 def one_by_one(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> list[Array]:
@@ -51,23 +45,15 @@ def same(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> None:
         assert np.all(value <= 1.0)
 
 
-def test_over_the_whole_quadrant(table: Surrogate) -> None:
-    rng = np.random.default_rng(5)
-    v, y = 10.0 ** rng.uniform(-14.0, 10.0, 6000), 10.0 ** rng.uniform(-10.0, 14.0, 6000)
-    same(table, v, y)
-    v, y = 10.0 ** rng.uniform(-3.0, 3.0, 6000), 10.0 ** rng.uniform(-3.0, 3.0, 6000)
-    same(table, v, y)
-    assert np.unique(table.ratio_with_bound(v, y)[2]).size >= len(CHARTS) - 1
-
-
-@pytest.mark.parametrize("name", charts.QUANTITY_NAMES[1:])
-def test_other_quantities(table: Surrogate, name: str) -> None:
-    rng = np.random.default_rng(8)
-    v, y = 10.0 ** rng.uniform(-8.0, 4.0, 4000), 10.0 ** rng.uniform(-4.0, 8.0, 4000)
-    near = 10.0 ** rng.uniform(-8.0, -1.0, 1500), 1.0 + rng.uniform(-0.25, 0.5, 1500)
-    v, y = np.concatenate([v, near[0]]), np.concatenate([y, near[1]])
-    same(table, v, y, name)
-    assert np.count_nonzero(table.quantity(name, v, y)[2] == charts.NAMES.index("corner")) > 500
+@pytest.mark.parametrize("name", charts.QUANTITY_NAMES)
+def test_over_the_whole_quadrant_and_next_to_the_corner(table: Surrogate, name: str) -> None:
+    rng, n = np.random.default_rng(5), 3000
+    v = [log_uniform(rng, *ends, n) for ends in ((1e-14, 1e10), (1e-3, 1e3), (1e-8, 0.1))]
+    y = [log_uniform(rng, 1e-10, 1e14, n), log_uniform(rng, 1e-3, 1e3, n), 1.0 + rng.uniform(-0.25, 0.5, n)]
+    same(table, np.concatenate(v), np.concatenate(y), name)
+    source = table.quantity(name, np.concatenate(v), np.concatenate(y))[2]
+    assert np.unique(source).size >= len(CHARTS) - 1
+    assert np.count_nonzero(source == charts.NAMES.index("corner")) > 500
 
 
 def test_on_both_sides_of_every_seam(table: Surrogate) -> None:
@@ -104,40 +90,23 @@ def test_extremes_go_one_by_one(table: Surrogate) -> None:
 
 
 def test_what_is_outside_the_quadrant_is_nan_alone_in_its_chunk(table: Surrogate) -> None:
-    bad = [
-        (-1.0, 1.0),
-        (1.0, -1.0),
-        (math.nan, 1.0),
-        (1.0, math.nan),
-        (1.0, math.inf),
-        (-math.inf, 1.0),
-        (0.0, math.inf),
-    ]
-    v, y = np.full(600, 0.1), np.full(600, 0.5)
-    places = [0, 1, 255, 256, 257, 511, 599]
-    for place, (a, b) in zip(places, bad, strict=True):
-        v[place], y[place] = a, b
+    inf, nan = math.inf, math.nan
+    bad = [(-1.0, 1.0), (1.0, -1.0), (nan, 1.0), (1.0, nan), (1.0, inf), (-inf, 1.0), (0.0, inf)]
+    v, y, places = np.full(600, 0.1), np.full(600, 0.5), [0, 1, 255, 256, 257, 511, 599]
+    v[places], y[places] = np.transpose(bad)
     mu = table.mu_ratio(v, y)
-    assert sorted(np.flatnonzero(np.isnan(mu))) == places
-    keep = ~np.isnan(mu)
-    assert set(mu[keep]) == {table.mu_ratio(0.1, 0.5)}
+    assert np.flatnonzero(np.isnan(mu)).tolist() == places
+    assert set(mu[~np.isnan(mu)]) == {table.mu_ratio(0.1, 0.5)}
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 7, 8, 9, CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 5])
-def test_any_number_of_points(table: Surrogate, n: int) -> None:
+def test_any_number_of_points_at_any_position(table: Surrogate, n: int) -> None:
     rng = np.random.default_rng(n)
-    v, y = 10.0 ** rng.uniform(-3.0, 3.0, n), 10.0 ** rng.uniform(-3.0, 3.0, n)
+    v, y, order = log_uniform(rng, 1e-3, 1e3, n), log_uniform(rng, 1e-3, 1e3, n), rng.permutation(n)
     expected = np.array([table.mu_ratio(float(a), float(b)) for a, b in zip(v, y, strict=True)])
     np.testing.assert_array_equal(table.mu_ratio(v, y), expected)
-
-
-def test_a_point_has_the_same_answer_at_every_position(table: Surrogate) -> None:
-    rng = np.random.default_rng(8)
-    v, y = 10.0 ** rng.uniform(-3.0, 3.0, 2000), 10.0 ** rng.uniform(-3.0, 3.0, 2000)
-    mu = table.mu_ratio(v, y)
-    order = rng.permutation(v.size)
-    np.testing.assert_array_equal(table.mu_ratio(v[order], y[order]), mu[order])
-    np.testing.assert_array_equal(table.mu_ratio(v[3:], y[3:]), mu[3:])
+    np.testing.assert_array_equal(table.mu_ratio(v[order], y[order]), expected[order])
+    np.testing.assert_array_equal(table.mu_ratio(v[3:], y[3:]), expected[3:])
 
 
 # --- the arithmetic behind it -------------------------------------------------------------------------
@@ -173,32 +142,29 @@ def test_cells_of_the_limit_of_large_speed_are_the_closed_form() -> None:
 
 @pytest.mark.parametrize("name", charts.QUANTITY_NAMES)
 def test_every_level_with_fused_multiply_add_gives_the_same_bits(table: Surrogate, name: str) -> None:
-    rng = np.random.default_rng(12)
-    v, y = 10.0 ** rng.uniform(-9.0, 6.0, 20_000), 10.0 ** rng.uniform(-6.0, 8.0, 20_000)
+    rng, n = np.random.default_rng(12), 20_000
+    v, y = log_uniform(rng, 1e-9, 1e6, n), log_uniform(rng, 1e-6, 1e8, n)
     code, data = charts.QUANTITY_NAMES.index(name), table._with(name)
-    answers = []
-    for kernel in kernels:
-        value, bound, source, slopes = (
-            np.empty(v.size),
-            np.empty(v.size),
-            np.empty(v.size, np.int8),
-            np.empty((5, v.size)),
-        )
-        kernel.values(data, code, v, y, value, bound, source)
-        kernel.slopes(data, code, v, y, slopes)
-        answers.append((kernel.level, value, bound, source, slopes))
-    _, *best = answers[-1]
-    for level, value, bound, source, slopes in answers[:-1]:
-        if level == "base" and len(kernels) > 1:
-            # without fused multiply-add: within the allowance for rounding that both bounds contain
-            assert np.mean(source == best[2]) > 0.9999
-            same = (source == best[2]) & (np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-6)
-            assert np.all(np.abs(value - best[0])[same] <= 1e-13 * (1.0 + np.abs(best[0][same])))
-            assert np.all(np.abs(value - best[0])[same] <= 2.0 * bound[same])
-            assert np.all(np.abs(slopes[1:3] - best[3][1:3])[:, same] <= 2.0 * slopes[3:, same])
-        else:
-            for ours, theirs in zip((value, bound, source, slopes), best, strict=True):
+
+    def asked(kernel: Kernel) -> list[Array]:
+        found: list[Array] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]
+        kernel.values(data, code, v, y, *found[:3])
+        kernel.slopes(data, code, v, y, found[3])
+        return found
+
+    best = asked(kernels[-1])
+    for kernel in kernels[:-1]:
+        found = asked(kernel)
+        if kernel.level != "base":
+            for ours, theirs in zip(found, best, strict=True):
                 np.testing.assert_array_equal(ours, theirs)
+            continue
+        # without fused multiply-add: within the allowance for rounding that both bounds contain
+        same = (found[2] == best[2]) & (np.abs(v / table.v_tilde_crit(y) - 1.0) > 1e-6)
+        assert np.mean(found[2] == best[2]) > 0.9999
+        off = np.abs(found[0] - best[0])
+        assert np.all((off <= 1e-13 * (1.0 + np.abs(best[0])))[same] & (off <= 2.0 * found[1])[same])
+        assert np.all((np.abs(found[3][1:3] - best[3][1:3]) <= 2.0 * found[3][3:])[:, same])
 
 
 @pytest.mark.parametrize("kind", [(1, 0), (0, 1), (1, 1), (0, 2)], ids=["ball", "along", "ball-along", "normal"])

@@ -10,8 +10,7 @@ import pytest
 
 from comparing import close
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep, last_double
-
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+from tests.cases import CASE, without
 
 
 class Known:
@@ -31,8 +30,7 @@ def curve(sweep, *x):
 
 
 def sweep_over(surrogate, name, **changed):
-    case = {field: value for field, value in {**CASE, **changed}.items() if field != name}
-    return Sweep(surrogate, case, name)
+    return Sweep(surrogate, without({**CASE, **changed}, name), name)
 
 
 def test_neighbouring_doubles_are_found_at_any_scale():

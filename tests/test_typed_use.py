@@ -49,13 +49,10 @@ def report(path: str | None) -> str:
     rigid = surrogate.evaluate(mu0=0.3, Fz=10, k=None, y0=2e-6, f=2e4, v0=0.01)
     dimensionless: float = surrogate.mu_ratio(0.1, 0.5)
     power, bound = surrogate.power_with_bound(0.1, 0.5)
-    solution: Solution = solve_for(
-        surrogate, "v0", 0.25, {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
-    )
+    rest = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+    solution: Solution = solve_for(surrogate, "v0", 0.25, rest)
     roots: tuple[Root, ...] = solution.roots[0]
-    crossings = border_crossings(
-        surrogate, "v0", {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}, 0.0, 1.0
-    )
+    crossings = border_crossings(surrogate, "v0", rest, 0.0, 1.0)
     shown = [f"{one.mu_macro:.6f}", one.regime, mumacro.SOURCES[one.source_code], slope, rigid.mu_macro, dimensionless]
     return " ".join(map(str, [*shown, power, bound, roots[0].value, crossings[0].value, answer.mu_macro.shape]))
 
@@ -72,36 +69,33 @@ def test_examples_of_docstrings_run(name: str) -> None:
 
 
 def test_there_are_examples() -> None:
-    finder = doctest.DocTestFinder(exclude_empty=True)
-    shown = {
-        test.name for name in MODULES for test in finder.find(importlib.import_module(name)) if test.examples
-    }  # fmt: skip
-    assert {
-        "mumacro.answer.Answer", "mumacro.surrogate.Surrogate.evaluate", "mumacro.surrogate.Surrogate.mu_ratio",
-        "mumacro.surrogate.Surrogate.open", "mumacro.surrogate.Surrogate.slopes", "mumacro.bundled.bundled_tables",
-    } <= shown  # fmt: skip
+    shown = {test.name for name in MODULES for test in doctest.DocTestFinder().find(importlib.import_module(name))
+             if test.examples}  # fmt: skip
+    used = {"answer.Answer", "bundled.bundled_tables", "settling.settling", "fitting.fit", "element.Element"}
+    used |= {f"surrogate.Surrogate.{name}" for name in ("evaluate", "mu_ratio", "open", "slopes")}
+    assert {f"mumacro.{name}" for name in used} <= shown
+
+
+def checked(program: Path, repository: Path, cache: Path) -> "subprocess.CompletedProcess[str]":
+    """What the strict checker says."""
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(repository / "pyproject.toml"),
+               "--cache-dir", str(cache), str(program)]  # fmt: skip
+    return subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.mark.slow
-def test_a_typed_program_passes_the_strict_checker_and_runs(tmp_path: Path, repository: Path) -> None:
-    program = tmp_path / "shaken.py"
-    program.write_text(PROGRAM)
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(repository / "pyproject.toml"),
-               "--cache-dir", str(tmp_path / "cache"), str(program)]  # fmt: skip
-    done = subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
+def test_a_typed_program_passes_the_strict_checker_and_runs_and_a_wrong_one_does_not(
+    tmp_path: Path, repository: Path
+) -> None:
+    right, wrong = tmp_path / "shaken.py", tmp_path / "wrong.py"
+    right.write_text(PROGRAM)
+    wrong.write_text("from mumacro import Surrogate\n\nSurrogate.open().mu_rato(0.1, 0.5)\nSurrogate.open([1])\n")
+    done = checked(right, repository, tmp_path / "cache")
     assert done.returncode == 0, done.stdout + done.stderr
-    done = subprocess.run([sys.executable, str(program)], cwd=repository, capture_output=True, text=True,
+    found = checked(wrong, repository, tmp_path / "cache")
+    assert found.returncode == 1
+    assert all(told in found.stdout for told in ("mu_rato", "arg-type"))
+    done = subprocess.run([sys.executable, str(right)], cwd=repository, capture_output=True, text=True,
                           env={"PYTHONPATH": str(repository), "PATH": ""}, timeout=300, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("0.240012 stick_slip ")
-
-
-@pytest.mark.slow
-def test_a_program_with_a_wrong_name_does_not_pass(tmp_path: Path, repository: Path) -> None:
-    program = tmp_path / "wrong.py"
-    program.write_text("from mumacro import Surrogate\n\nSurrogate.open().mu_rato(0.1, 0.5)\nSurrogate.open([1])\n")
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(program)]
-    done = subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 1
-    assert "mu_rato" in done.stdout
-    assert "arg-type" in done.stdout

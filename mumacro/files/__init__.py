@@ -3,8 +3,7 @@
 ``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes files.
 """
 
-from mumacro.files.answering import ANSWERS, REJECTS, answer
-from mumacro.files.columns import FilesError
+from mumacro.files.answering import ANSWERS, REJECTS, FilesError, answer
 from mumacro.files.run import Summary, evaluate_files
 
 __all__ = ["ANSWERS", "REJECTS", "FilesError", "Summary", "answer", "evaluate_files"]

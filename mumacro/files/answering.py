@@ -1,9 +1,13 @@
-"""One Arrow record batch of cases in, the same batch with results out, and a list of rejected rows."""
+"""One Arrow record batch of cases in, the same batch with results out, and a list of rejected rows.
+
+Columns that are named like a missing input are refused.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,24 +15,28 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from mumacro.answer import IntervalAnswer
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
-from mumacro.contact import AMPLITUDE, kind_of
-from mumacro.files.columns import ANSWERS, BAND, Columns, FilesError, find_columns
-from mumacro.inputs import POSITIVE, RAD_PER_CYCLE, Scale, refusal
+from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
+from mumacro.errors import InputError, MumacroError
+from mumacro.inputs import GAP, LIKE, SI, Scale, refusal, split_unit
 from mumacro.interval import ENDS
 from mumacro.surrogate import Surrogate
+from mumacro.tabular import TOO_LARGE, absent, find_heads, meant_by, read_cell
 
-__all__ = ["ANSWERS", "REJECTS", "added_fields", "answer", "answer_columns", "numbers"]
+__all__ = ["ANSWERS", "REJECTS", "FilesError", "added_fields", "answer", "answer_columns", "find_columns", "numbers"]
 
 Array = NDArray[np.float64]
-Codes = NDArray[np.int8]
 
+#: columns that are added
+ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
+BAND = IntervalAnswer.__slots__  # beside mu_macro, of an interval of k
 #: of a row without a result: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema([("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())])
 
-_PLAIN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(?i:nan|inf|infinity)$"
-_NO_NUMBER, _TOO_LARGE = 1, 2
-_WHY = {_NO_NUMBER: "must be a number", _TOO_LARGE: "is beyond double range"}
+
+class FilesError(MumacroError):
+    """A file of cases cannot be read, understood or written; one line that names it, the reason and the remedy."""
 
 
 def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
@@ -86,146 +94,133 @@ def answer(
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
-    columns = find_columns(batch.schema.names, rigid, include, kind_of(contact, direction))
-    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), columns, include)
-    schema = pa.schema([*batch.schema, *added_fields(columns.added(include))], batch.schema.metadata)
-    return pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema), rejects
+    kind = kind_of(contact, direction)
+    places, names = find_columns(batch.schema.names, rigid, include, kind)
+    added, rejects, _ = answer_columns(batch, surrogate or Surrogate.open(), places, names, kind)
+    schema = pa.schema([*batch.schema, *added_fields(names)], batch.schema.metadata)
+    answered = pa.RecordBatch.from_arrays([*batch.columns, *added], schema=schema)
+    return answered, pa.RecordBatch.from_pylist(
+        [dict(zip(REJECTS.names, row, strict=True)) for row in rejects], REJECTS
+    )
+
+
+def find_columns(
+    names: Sequence[str], rigid: bool = False, include: Sequence[str] = (), kind: Kind = SPRING, where: str = ""
+) -> tuple[dict[str, tuple[str, Scale]], list[str]]:
+    """By input, in their order, the heading and what its unit is in SI; and the names of the columns that are added.
+
+    FilesError names, after ``where``, all columns that are there twice, would be written twice, have an unknown unit,
+    or are missing; for those it lists the columns that were seen, or names a similar one.
+
+    >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"])[0]["Fz"]
+    ('Fz [kN]', Scale(times=1000.0, over=1.0))
+    """
+    found, faults = find_heads(names, {name: LIKE.get(name, name) for name in (*kind.columns, *ENDS)})
+    others = dict.fromkeys(name for name in names if split_unit(name)[0] not in found)
+    faults += [f"the column {name!r} is there twice" for name in others if names.count(name) > 1]
+    stiff = [column for column in names if meant_by(column, loosely=False) == "k"]
+    if rigid and stiff:
+        faults.append(f"--rigid is given, but the column {stiff[0]!r} looks like a stiffness; leave one out")
+    if "k" in found and (end := [name for name in ENDS if name in found]):
+        faults.append(f"there are both k and {end[0]}; leave one out")
+    ends = ENDS if found.keys() & {*ENDS} else () if rigid else ("k",)
+    wanted = [name for field in kind.fields for name in (ends if field == "k" else (field,))]
+    for name in wanted:
+        if name not in found and (name != "omega" or "f" not in found):
+            told = absent(name, names)
+            if name == "y0" and AMPLITUDE in (split_unit(column)[0] for column in names):
+                told = f"there is no column y0, but {AMPLITUDE}: give --direction normal"
+            or_rigid = "; rename the one that holds it, or give --rigid if all contacts are rigid"
+            faults.append(told + or_rigid if name == "k" and "similar" not in told else told)
+    slopes = [f"d_mu_macro_d_{name}" for name in kind.fields] if "gradient" in include else []
+    added = [ANSWERS[0], *(BAND if ends == ENDS else ()), *ANSWERS[1:], *slopes]
+    faults += [f"the column {name!r} would be written twice; rename it" for name in added if name in names]
+    if faults:
+        raise FilesError(where + "; ".join(faults))
+    return {name: (names[found[name][0]], found[name][1]) for name in (*wanted, "f") if name in found}, added
 
 
 def answer_columns(
-    batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, include: Sequence[str] = (), decimal: str = "."
-) -> tuple[list[pa.Array], pa.RecordBatch, dict[str, Array]]:
-    """The columns that :func:`answer` adds, the rejects, and the inputs as doubles in their units by heading."""
-    n = batch.num_rows
+    batch: pa.RecordBatch, surrogate: Surrogate, places: Mapping[str, tuple[str, Scale]], names: Sequence[str],
+    kind: Kind, decimal: str = ".",
+) -> tuple[list[pa.Array], list[tuple[int, str, str | None, str]], dict[str, Array]]:  # fmt: skip
+    """The columns ``names`` that :func:`answer` adds, rows of the rejects, and the inputs in their units by heading."""
     given: dict[str, Array] = {}
-    values: dict[str, Any] = {} if ENDS[0] in columns.places else {"k": np.full(n, math.inf)}
-    faults: dict[str, Codes] = {}
-    for name, (heading, scale) in columns.places.items():
-        field = "omega" if name == "f" else name
-        try:
-            given[heading], fault = numbers(batch.column(heading), name == "k", decimal)
-        except FilesError as error:
-            raise FilesError(f"the column {heading!r} {error}") from None
-        values[field] = _in_si(given[heading], scale, RAD_PER_CYCLE if name == "f" else 1.0, fault)
-        faults[field] = fault
-    gradient = "gradient" in include
-    found = surrogate.evaluate(**{**values, **columns.kind.names, "gradient": gradient})
+    values: dict[str, Array] = {} if {"k", *ENDS} & places.keys() else {"k": np.full(len(batch), math.inf)}
+    faults: dict[str, dict[int, str]] = {}
+    for name, (heading, scale) in places.items():
+        given[heading], faults[name] = numbers(batch.column(heading), name, decimal)
+        values[name] = _in_si(given[heading], scale, faults[name])
+    inputs: dict[str, Any] = {**values, **kind.names, "gradient": "d_mu_macro_d_mu0" in names}
+    with np.errstate(over="ignore"):  # omega of a frequency beyond double range, which is refused
+        found = surrogate.evaluate(**inputs)
     bad = found.source_code < 0
     mask = bad if bad.any() else None
     code = np.where(bad, 0, found.source_code).astype(np.int8)
-    arrays: dict[str, Any] = {
-        "regime": _words(REGIME_OF_SOURCE[code], REGIMES, mask),
-        "source": _words(code, SOURCES, mask),
-    }
+    arrays = {"regime": _words(REGIME_OF_SOURCE[code], REGIMES, mask), "source": _words(code, SOURCES, mask)}
     for name, slope in (found.gradient or {}).items():
         # the slope along k is 0 for a rigid contact, which has no k
         told = slope if name != "k" or name not in values else np.where(np.isinf(values["k"]), math.nan, slope)
         arrays[f"d_mu_macro_d_{name}"] = pa.array(told, mask=np.isnan(told))
-    for name in ("mu_macro", *BAND, "mu_ratio", "error_bound"):
-        if hasattr(found, name):
-            arrays[name] = pa.array(getattr(found, name), mask=mask)
-    rejects = _rejects(batch, columns, np.flatnonzero(bad), values, faults)
-    return [arrays[name] for name in columns.added(include)], rejects, given
+    columns = [arrays[name] if name in arrays else pa.array(getattr(found, name), mask=mask) for name in names]
+    rejects = []
+    for i in np.flatnonzero(bad).tolist():
+        name, why = _refused(surrogate, {name: float(column[i]) for name, column in values.items()}, kind)
+        cell = batch.column(places[name][0])[i].as_py()
+        rejects.append((i, name, None if cell is None else str(cell), faults[name].get(i, why)))
+    return columns, rejects, given
 
 
-def _words(codes: Codes, words: Sequence[str], mask: NDArray[np.bool_] | None) -> pa.Array:
+def _words(codes: NDArray[np.int8], words: Sequence[str], mask: NDArray[np.bool_] | None) -> pa.Array:
     return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string()))
 
 
-def _in_si(found: Array, scale: Scale, factor: float, fault: Codes) -> Array:
+def _in_si(found: Array, scale: Scale, faults: dict[int, str]) -> Array:
     """Values in SI; a power of ten below one divides, so that 2 um is the double 2e-6."""
-    if scale == Scale() and factor == 1.0:
-        return np.require(found, requirements=("C", "W"))
+    if scale == Scale():
+        return found
     with np.errstate(over="ignore"):
-        values: Array = found * scale.times / scale.over * factor
+        values: Array = found * scale.times / scale.over
     beyond = np.isinf(values) & np.isfinite(found)  # a large stiffness is not a rigid contact
-    values[beyond], fault[beyond] = math.nan, _TOO_LARGE
+    values[beyond] = math.nan
+    faults |= dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
     return values
 
 
-def numbers(array: pa.Array, stiffness: bool = False, decimal: str = ".") -> tuple[Array, Codes]:
-    """A column as doubles (n,), NaN where it holds none, and a code (n,) for text that is no number.
+def numbers(array: pa.Array, name: str, decimal: str = ".") -> tuple[Array, dict[int, str]]:
+    """A column of the input ``name`` as doubles (n,), NaN where it holds none, and what is wrong with cells of text.
 
-    With ``stiffness`` the word ``rigid`` is infinite.
-
-    Raises
-    ------
-    FilesError
-        The column's type is none of numbers or text.
+    FilesError where its type is none of numbers or text.
     """
     if pa.types.is_dictionary(array.type):
         array = array.dictionary_decode()
-    kind = array.type
-    fault: Codes = np.zeros(len(array), np.int8)
-    if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind):
-        array = _parsed(array, stiffness, decimal, fault)
-    elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
-        array = pc.cast(array, pa.float64(), safe=False)
-    elif pa.types.is_null(kind):
-        array = pa.nulls(len(array), pa.float64())
-    else:
-        raise FilesError(f"holds {kind}, not numbers")
-    if array.null_count:
-        array = pc.fill_null(array, math.nan)
-    return array.to_numpy(zero_copy_only=False), fault
+    kind, text = array.type, array
+    is_text = pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
+    is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+    if not (is_text or is_number or pa.types.is_null(kind)):
+        raise FilesError(f"the column {name} holds {kind}, not numbers")
+    with suppress(pa.ArrowInvalid):
+        if is_text and decimal != ".":  # with a decimal comma 1.5 may mean 1500: it is no number
+            text = pc.replace_substring(pc.replace_substring(array, ".", "?"), decimal, ".")
+        found = pc.fill_null(pc.cast(text, pa.float64(), safe=False), math.nan).to_numpy(zero_copy_only=False)
+        if not is_text or np.isfinite(found).all():
+            return found, {}
+    found, faults = np.full(len(array), math.nan), {}  # cell by cell, as not all of them are numbers
+    for i, cell in enumerate(array.to_pylist()):
+        try:
+            found[i] = read_cell(name, cell or "", decimal)
+        except ValueError as error:
+            faults[i] = str(error)
+    return found, faults
 
 
-def _parsed(array: pa.Array, stiffness: bool, decimal: str, fault: Codes) -> pa.Array:
-    """Text as doubles, null where it is none; ``fault`` gets the reason, unless the cell is empty."""
-    text = pc.utf8_trim_whitespace(pc.cast(array, pa.large_string()))
-    if decimal != ".":  # with a decimal comma 1.5 may mean 1500: it is no number
-        text = pc.replace_substring(pc.replace_substring(text, ".", "?"), decimal, ".")
-    rigid = pc.equal(pc.ascii_lower(text), "rigid") if stiffness else pa.scalar(False)
-    text = pc.if_else(pc.or_(rigid, pc.equal(text, "")), None, text)
+def _refused(surrogate: Surrogate, row: Mapping[str, Any], kind: Kind) -> tuple[str, str]:
+    """The first input of a row that has no result, and why."""
     try:
-        out = pc.cast(text, pa.float64())
-    except pa.ArrowInvalid:
-        plain = pc.fill_null(pc.match_substring_regex(text, _PLAIN), True)
-        fault[pc.invert(plain).to_numpy(zero_copy_only=False)] = _NO_NUMBER
-        text = pc.if_else(plain, text, None)
-        out = pc.cast(text, pa.float64())
-    infinite = pc.fill_null(pc.is_inf(out), False)
-    if pc.any(infinite).as_py():  # a number of too many digits must not pass for an infinite stiffness
-        large = pc.and_(infinite, pc.match_substring_regex(text, r"\d"))
-        fault[pc.fill_null(large, False).to_numpy(zero_copy_only=False)] = _TOO_LARGE
-        out = pc.if_else(large, None, out)
-    return pc.if_else(rigid, math.inf, out) if stiffness else out
-
-
-def _rejects(
-    batch: pa.RecordBatch,
-    columns: Columns,
-    rows: NDArray[np.intp],
-    values: dict[str, Array],
-    faults: dict[str, Codes],
-) -> pa.RecordBatch:
-    """What is wrong with ``rows``: the first bad input of each, in the order of the inputs."""
-    listed: list[tuple[int, str, str | None, str]] = []
-    named = {"omega" if name == "f" else name: name for name in columns.places}
-    for i in rows.tolist():
-        row = {field: float(values[field][i]) for field in columns.fields if field in named}
-        reasons = ((field, _reason(field, row, int(faults[field][i]))) for field in row)
-        for field, reason in filter(lambda pair: pair[1], reasons):
-            cell = batch.column(columns.places[named[field]][0])[i].as_py()
-            listed.append((i, named[field], None if cell is None else str(cell), str(reason)))
-            break
-    by_field: list[Any] = [list(column) for column in zip(*listed, strict=True)] or [[] for _ in REJECTS]
-    arrays = [pa.array(column, field.type) for column, field in zip(by_field, REJECTS, strict=True)]
-    return pa.RecordBatch.from_arrays(arrays, schema=REJECTS)
-
-
-def _reason(field: str, row: Mapping[str, float], fault: int) -> str | None:
-    """What is wrong with one value of a row; None if it is legal."""
-    value = row[field]
-    if fault:
-        return _WHY[fault]
-    if math.isnan(value) and field != "k":
-        return "is missing"
-    positive = field in (*POSITIVE, *ENDS)
-    legal = (value > 0.0 if positive else value >= 0.0) and (math.isfinite(value) or field == "k")
-    if field == AMPLITUDE:
-        return None if legal and not value >= row["Fz"] else "must be >= 0 and below Fz: at Fz the contact lifts off"
-    if field in ENDS:
-        ordered = field == ENDS[0] or not value < row[ENDS[0]]
-        return "must be finite and > 0" if not legal else None if ordered else f"must be >= {ENDS[0]}"
-    return None if legal else refusal(field, value)
+        surrogate.evaluate(**row, **kind.names)
+    except InputError as error:
+        name = error.field if error.field in row else next((end for end in ENDS if math.isnan(row[end])), ENDS[0])
+        if math.isnan(row[name]):
+            return name, GAP if name == "k" else "is missing"
+        return name, refusal(name, row[name]) if name in SI else f"must be {error.bound}"
+    raise AssertionError(f"{row} has a result")

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
-import pyarrow as pa
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from mumacro.command import OneLineParser, add_kind, open_table
-from mumacro.files.columns import FilesError
-from mumacro.files.evaluation import Evaluation
-from mumacro.files.reading import one_line
+from mumacro.command import OneLineParser, add_format, add_kind, open_table
+from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
-from mumacro.separators import SEPARATORS
+from mumacro.tabular import SEPARATORS
 
 __all__ = ["main"]
 
@@ -42,7 +37,19 @@ exit codes: 0 every row evaluated, 3 some rows rejected, 1 could not run, 2 wron
 """
 
 
-def _parser() -> argparse.ArgumentParser:
+def _spooled(folder: Path) -> Path:
+    """Standard input as a file, in the format that it begins like."""
+    path = folder / "standard-input"
+    with path.open("w+b") as stream:
+        shutil.copyfileobj(sys.stdin.buffer, stream, 2**20)
+        stream.seek(0)
+        begin = stream.read(4)
+    kind = ".parquet" if begin == b"PAR1" else ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv"
+    return path.rename(f"{path}{kind}" + ".gz" * (begin[:2] == b"\x1f\x8b"))
+
+
+def main(words: Sequence[str]) -> int:
+    """Run ``mumacro eval``; return the exit code; what is wrong is an error for :func:`mumacro.command.run`."""
     parser = OneLineParser(
         prog="mumacro eval",
         description="Evaluate every case of Parquet, CSV or NDJSON files (text also compressed, .gz).",
@@ -52,87 +59,45 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--out", required=True, help="the file to write; its ending sets the format; - is output")
     add_kind(parser)
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table")
-    parser.add_argument("--sep", choices=SEPARATORS, default=",", help="between the cells of CSV; default: ,")
-    parser.add_argument("--decimal", choices=(".", ","), default=".", help="in the numbers of CSV; default: .")
+    add_format(parser)
     parser.add_argument("--rigid", action="store_true", help="there is no column k: all contacts are rigid")
     parser.add_argument(
         "--include", choices=("gradient",), action="append", default=[], help="add d mu_macro / d input"
     )
     parser.add_argument("--force", action="store_true", help="replace an output, delete the parts of another run")
-    return parser
-
-
-@contextmanager
-def _bar() -> Iterator[tuple[Callable[[float, int, int], None], Callable[[str], None]]]:
-    """A bar on a terminal, and lines above it; elsewhere lines alone."""
-    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
-    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def report(share: float, rows: int, rejected: int) -> None:
-            bar.update(task, completed=share, description=f"{rows:,} rows, {rejected:,} rejected")
-
-        yield report, lambda text: console.print(f"mumacro eval: {text}")
-
-
-def _spooled(folder: Path) -> Path:
-    """Standard input as a file, in the format that it begins like."""
-    path = folder / "standard-input"
-    with path.open("wb") as stream:
-        shutil.copyfileobj(sys.stdin.buffer, stream, 2**20)
-    with path.open("rb") as stream:
-        begin = stream.read(4)
-    kind = ".parquet" if begin == b"PAR1" else ".ndjson" if begin.lstrip()[:1] == b"{" else ".csv"
-    packed = ".gz" if begin[:2] == b"\x1f\x8b" else ""
-    return path.rename(path.with_name(path.name + kind + packed))
-
-
-def _to_output(work: Evaluation) -> tuple[int, int]:
-    """Write to standard output, and rejected rows to standard error; the numbers of rows and rejected rows."""
-    rows = rejected = 0
-    for piece in work.pieces():
-        sys.stdout.buffer.write(piece.text)
-        if piece.rejected:
-            sys.stderr.write(piece.rejects if rejected else work.rejects_head + piece.rejects)
-        rows, rejected = rows + piece.rows, rejected + piece.rejected
-    return rows, rejected
-
-
-def main(words: Sequence[str]) -> int:
-    """Run ``mumacro eval``; return the exit code.
-
-    Raises
-    ------
-    UsageError, FilesError, TableError, InputError
-        One line each; the command prints it.
-    """
-    chosen = _parser().parse_intermixed_args(words)
+    chosen = parser.parse_intermixed_args(words)
     surrogate = open_table(chosen.table)
-    options = {name: getattr(chosen, name) for name in ("rigid", "include", "decimal", "contact", "direction")}
-    options["sep"] = SEPARATORS[chosen.sep]
+    options = {name: getattr(chosen, name) for name in ("rigid", "include", "decimal", "contact", "direction", "force")}
+    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    bars = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+    # a bar on a terminal, and lines above it; elsewhere lines alone
+    bar = Progress(*bars, console=console, disable=not console.is_terminal)
+    task = bar.add_task("", total=1.0)
+
+    def progress(share: float, rows: int, rejected: int) -> None:
+        bar.update(task, completed=share, description=f"{rows:,} rows, {rejected:,} rejected")
+
     try:
-        with ExitStack() as stack:
-            cases = chosen.cases
-            if "-" in cases:
-                folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mumacro-")))
-                standard = _spooled(folder)
-                cases = [standard if name == "-" else name for name in cases]
+        with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
+            cases = [_spooled(Path(folder)) if name == "-" else name for name in chosen.cases]
+            out = chosen.out
+            if out == "-":
+                out = f"{folder}/standard-output.{'ndjson' if find_files(cases)[1] == 'ndjson' else 'csv'}"
+            with bar:
+                done = evaluate_files(
+                    cases, out, surrogate, sep=SEPARATORS[chosen.sep], progress=progress,
+                    say=lambda text: console.print(f"mumacro eval: {text}"), **options,
+                )  # fmt: skip
+            told = f"{done.answered:,} of {done.rows:,} rows evaluated with {surrogate.id}"
             if chosen.out == "-":
-                rows, rejected = _to_output(Evaluation(cases, None, surrogate, **options))
-                print(f"{rows - rejected:,} of {rows:,} rows evaluated with {surrogate.id}", file=sys.stderr)
-                return 3 if rejected else 0
-            report, say = stack.enter_context(_bar())
-            summary = evaluate_files(
-                cases, chosen.out, surrogate, force=chosen.force, progress=report, say=say, **options
-            )
+                with done.out.open("rb") as stream:
+                    shutil.copyfileobj(stream, sys.stdout.buffer)
+                sys.stderr.write((done.rejects.read_text("utf-8", "replace") if done.rejects else "") + f"{told}\n")
+            else:
+                rejects = f"; {done.rejected:,} rejected: {done.rejects}" if done.rejects else ""
+                resumed = f"; {done.resumed:,} were done already" if done.resumed else ""
+                print(f"{told}: {done.out}{rejects}{resumed}")
     except KeyboardInterrupt:
         print("mumacro eval: stopped; the same command goes on", file=sys.stderr)
         return 130
-    except pa.ArrowException as error:
-        raise FilesError(f"{chosen.cases[0]}: {one_line(error)}") from None
-    told = [f"{summary.answered:,} of {summary.rows:,} rows evaluated with {surrogate.id}: {summary.out}"]
-    told += [f"{summary.rejected:,} rejected: {summary.rejects}"] if summary.rejects else []
-    told += [f"{summary.resumed:,} were done already"] if summary.resumed else []
-    print("; ".join(told))
-    return 3 if summary.rejected else 0
+    return 3 if done.rejected else 0

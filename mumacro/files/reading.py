@@ -1,4 +1,4 @@
-"""The three formats: which columns there are, and blocks of records from a place on.
+"""The three formats: which files and columns there are, and blocks of records.
 
 Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else stays text.
 """
@@ -6,266 +6,210 @@ Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else sta
 from __future__ import annotations
 
 import csv
+import glob
 import gzip
 import json
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.dataset
-from numpy.typing import NDArray
 
-from mumacro.files.columns import Columns, FilesError
-from mumacro.separators import advice
+from mumacro.files.answering import FilesError
+from mumacro.tabular import read_head
 
-__all__ = ["Block", "CsvSource", "Fault", "NdjsonSource", "ParquetSource", "Place", "one_line"]
+__all__ = ["ENDINGS", "Block", "ParquetSource", "TextSource", "find_files", "format_of"]
 
+FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
+ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"
 ROWS = 65_536  # of a block, at most: a third of a second of work
 LONGEST = 64 * 2**20  # bytes of a line
-_SHOWN = 500  # characters of a bad record that are listed
-
-
-class Place(NamedTuple):
-    """Where the next record begins: file, byte (of unpacked text) or row (of Parquet), and records before it."""
-
-    file: int = 0
-    at: int = 0
-    rows: int = 0
-
-
-class Fault(NamedTuple):
-    """A record without a result: its number in its file (from 1), input, value, reason."""
-
-    row: int
-    field: str | None
-    value: str | None
-    reason: str
 
 
 class Block(NamedTuple):
-    """Some records in order: those that could be read, and what is wrong with the others.
+    """Some records in order; ``share`` is how much of the file is read after them.
 
-    ``rows`` are their numbers in the file, from 1; ``place`` is what follows, ``share`` how much of the file is read;
+    A record that could not be read is a row of nulls; ``wrong`` has by its index the text and the fault.
     ``texts`` are the records as they came in, where they are text: cells of CSV, lines of NDJSON.
     """
 
     batch: pa.RecordBatch
-    rows: NDArray[np.int64]
-    place: Place
     share: float
     texts: Sequence[Any] = ()
-    faults: Sequence[Fault] = ()
+    wrong: Sequence[tuple[int, str, str]] = ()
 
 
-def one_line(error: Any) -> str:
-    """The message of an exception without line ends."""
-    return " ".join(str(error).split())
+def format_of(path: Path) -> tuple[str, bool]:
+    """The format by a name's ending, empty for another ending, and whether it is compressed."""
+    name = path.name.lower()
+    kind, packed = FORMATS.get(Path(name.removesuffix(".gz")).suffix, ""), name.endswith(".gz")
+    return "" if packed and kind == "parquet" else kind, packed
+
+
+def find_files(given: Sequence[str | Path]) -> tuple[list[Path], str]:
+    """The files that paths, folders and patterns name, in order, and their format; FilesError where there is no one."""
+    files: list[Path] = []
+    for entry in given:
+        path = Path(entry)
+        pattern = f"{glob.escape(str(path))}/**/*" if path.is_dir() else str(path)
+        found = [path] if path.is_file() else sorted(map(Path, glob.glob(pattern, recursive=True)))
+        # in a folder, what begins with _ is metadata
+        fit = [p for p in found if p == path or not (p.name.startswith("_") or p.name.endswith(".rejects.csv"))]
+        files += (named := [p for p in fit if p.is_file() and format_of(p)[0]])
+        if not named:
+            raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
+    kinds = sorted({format_of(path)[0] for path in files})
+    if len(kinds) > 1:
+        raise FilesError(f"the files are of several formats: {', '.join(kinds)}")
+    return files, kinds[0]
 
 
 class ParquetSource:
     """Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
 
-    def __init__(self, files: Sequence[Path], folder: Path | None) -> None:
+    head: Sequence[str] = ()
+
+    def __init__(self, files: Sequence[Path], folder: str | None) -> None:
         names = [str(path) for path in files]
         hive = pa.dataset.partitioning(flavor="hive") if folder else None
-        options = {"format": "parquet", "partitioning": hive, "partition_base_dir": str(folder) if folder else None}
-        try:
-            found = pa.dataset.dataset(names, **options)
-            schemas = [part.physical_schema.remove_metadata() for part in found.get_fragments()]
-            self.schema = pa.unify_schemas([found.schema, *schemas], promote_options="permissive")
-            self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
-        except (pa.ArrowException, OSError) as error:
-            raise FilesError(f"{', '.join(names)}: no Parquet, or unlike columns ({one_line(error)})") from None
+        options = {"format": "parquet", "partitioning": hive, "partition_base_dir": folder}
+        found = pa.dataset.dataset(names, **options)
+        schemas = [part.physical_schema.remove_metadata() for part in found.get_fragments()]
+        self.schema = pa.unify_schemas([found.schema, *schemas], promote_options="permissive")
+        self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
 
-    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:  # noqa: ARG002
-        """The blocks of the file at ``place`` from there on."""
-        part, row = self.parts[place.file], 0
+    def blocks(self, file: int, skip: int, names: Sequence[str]) -> Iterator[Block]:
+        """The blocks of a file behind the first ``skip`` rows, of the columns ``names``."""
+        part, row = self.parts[file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
         options = {"batch_size": ROWS, "batch_readahead": 1, "fragment_scan_options": scan, "use_threads": False}
         try:
-            # group by group: blocks then begin at the same rows from wherever a run continues
-            for group in part.split_by_row_group():
-                rows = group.row_groups[0].num_rows
-                if row + rows <= place.at:
-                    row += rows
-                    continue
-                for batch in group.to_batches(self.schema, **options):
-                    before, row = row, row + batch.num_rows
-                    if row > place.at:
-                        share = row / part.metadata.num_rows
-                        yield Block(batch, np.arange(before + 1, row + 1), Place(place.file, row, row), share)
+            for batch in part.to_batches(self.schema, columns=names, **options):
+                row += len(batch)
+                if row > skip:
+                    yield Block(batch, row / part.metadata.num_rows)
         except (pa.ArrowException, OSError) as error:
-            raise FilesError(f"{part.path}: damaged after row {row} ({one_line(error)})") from None
+            raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
 
 
 class _Lines:
-    """The lines of a text file, also a compressed one, from a byte on; ``at`` is the byte after the last line."""
+    """The lines of a text file, also a compressed one; ``share`` is how much of it is read."""
 
-    def __init__(self, path: Path, at: int = 0) -> None:
-        self.path, self.at, self.share = path, at, 0.0
+    def __init__(self, path: Path) -> None:
+        self.path, self.share = path, 0.0
 
     def __iter__(self) -> Iterator[bytes]:
         try:
             with self.path.open("rb") as raw:
-                stream: Any = gzip.GzipFile(fileobj=raw) if self.path.name.lower().endswith(".gz") else raw
-                stream.seek(self.at)
+                stream: Any = gzip.GzipFile(fileobj=raw) if format_of(self.path)[1] else raw
                 size = max(self.path.stat().st_size, 1)
                 while line := stream.readline(LONGEST):
                     if len(line) == LONGEST:
                         raise FilesError(f"{self.path}: a line has more than {LONGEST >> 20} MiB")
-                    self.at, self.share = self.at + len(line), raw.tell() / size
+                    self.share = raw.tell() / size
                     yield line
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise FilesError(f"{self.path}: the compressed file is damaged ({error})") from None
 
 
-def _block(
-    place: Place, lines: _Lines, texts: Sequence[Any], wrong: dict[int, tuple[str, str]], columns: dict[str, Any]
-) -> Block:
-    """A block of records: ``columns`` of those that were read, what is ``wrong`` with the others, by index."""
-    rows = place.rows + 1 + np.arange(len(texts))
-    faults = [
-        Fault(int(rows[i]), None, text if len(text) <= _SHOWN else text[:_SHOWN] + "…", reason)
-        for i, (text, reason) in wrong.items()
-    ]
-    place = Place(place.file, lines.at, place.rows + len(texts))
-    try:
-        arrays = [x if isinstance(x, pa.Array) else pa.array(x, pa.string()) for x in columns.values()]
-    except UnicodeEncodeError as error:
-        raise FilesError(f"{lines.path}: rows {rows[0]} to {rows[-1]}: no text in UTF-8 ({error.reason})") from None
-    batch = pa.RecordBatch.from_arrays(arrays, list(columns))
-    if wrong:
-        texts = [text for i, text in enumerate(texts) if i not in wrong]
-    return Block(batch, np.delete(rows, list(wrong)), place, lines.share, texts, faults)
+class TextSource:
+    """CSV, RFC 4180 with a header, or without ``sep`` NDJSON, one object a line; both in UTF-8.
 
-
-class CsvSource:
-    """RFC 4180 with a header, in UTF-8; any separator and decimal sign.
-
-    Raises
-    ------
-    FilesError
-        No header, headers that differ, another separator or decimal sign; then the options to give are named.
+    The columns of NDJSON are those of the first block of every file, and others are refused unless ``verbatim``: then
+    records come out as they came in.  ``head`` has the names as they came in.  FilesError where there is no header, or
+    headers differ, or the separator or decimal sign is another one; then the options to give are named.
     """
 
-    def __init__(self, files: Sequence[Path], sep: str, decimal: str) -> None:
-        self.files, self.sep = files, sep
-        heads = [self._head(path, sep, decimal) for path in files]
-        self.head = heads[0]
-        names = [[cell.strip("\ufeff \t") for cell in head] for head in heads]
-        self.schema = pa.schema([(name, pa.string()) for name in names[0]])
-        for path, found in zip(files, names, strict=True):
-            if found != names[0]:
-                raise FilesError(f"{path}: its header differs from that of {files[0]}")
+    def __init__(self, files: Sequence[Path], sep: str, decimal: str, verbatim: bool) -> None:
+        self.files, self.sep, self.verbatim = files, sep, verbatim
+        if sep:
+            heads = [_head(path, sep, decimal) for path in files]
+            names = [[cell.strip("\ufeff \t") for cell in head] for head in heads]
+            if differ := [path for path, found in zip(files, names, strict=True) if found != names[0]]:
+                raise FilesError(f"{differ[0]}: its header differs from that of {files[0]}")
+        else:
+            starts = (record for path in files for record in islice(self._records(_Lines(path)), ROWS))
+            heads = names = [[*dict.fromkeys(name for record in starts for name in _object(record)[0])]]
+            if not names[0]:
+                raise FilesError(f"{files[0]}: holds no JSON object, one a line")
+        self.head, self.schema = heads[0], pa.schema([(name, pa.string()) for name in names[0]])
 
-    def _head(self, path: Path, sep: str, decimal: str) -> list[str]:
-        """The cells of the first line, after a look at the records behind it; a mark of byte order stays."""
-        first, *rows = [*islice(_Lines(path), 51)] or [b""]
-        try:
-            text = first.decode("utf-8-sig")
-            cells = next(csv.reader([text], delimiter=sep, strict=True), [])
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise FilesError(f"{path}: line 1 is no header of a CSV file in UTF-8 ({error})") from None
-        if not any(map(str.strip, cells)):
-            raise FilesError(f"{path}: is empty; the first line must name the columns")
-        if remedy := advice(text, [row.decode("utf-8", "replace") for row in rows], sep, decimal):
-            raise FilesError(f"{path}: {remedy}")
-        return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
+    def blocks(self, file: int, skip: int, names: Sequence[str]) -> Iterator[Block]:
+        """The blocks of a file behind the first ``skip`` records, of the columns ``names``."""
+        lines = _Lines(self.files[file])
+        records = islice(self._records(lines), skip, None)
+        while texts := [*islice(records, ROWS)]:
+            where, skip = f"{lines.path}: rows {skip + 1} to {skip + len(texts)}", skip + len(texts)
+            columns, faults = self._columns(texts, names, where)
+            try:
+                batch = pa.RecordBatch.from_arrays([pa.array(columns[x], pa.string()) for x in names], [*names])
+            except UnicodeEncodeError as error:
+                raise FilesError(f"{where}: no text in UTF-8 ({error.reason})") from None
+            wrong = [(i, self._shown(texts[i]), why) for i, why in enumerate(faults) if why]
+            yield Block(batch, lines.share, texts, wrong)
 
-    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
-        """The blocks of the file at ``place`` from there on."""
-        lines = _Lines(self.files[place.file], place.at)
+    def _records(self, lines: _Lines) -> Iterator[Any]:
+        """Lists of cells, or lines."""
+        if not self.sep:
+            yield from filter(None, map(bytes.strip, lines))
+            return
         texts = (line.decode("utf-8", "surrogateescape") for line in lines)  # bytes come out as they came in
-        reader = csv.reader(texts, delimiter=self.sep, strict=True)
-        if not place.at:
-            next(reader, None)
-        names, width = self.schema.names, len(self.head)
-        while rows := self._rows(reader, lines.path, place.rows):
-            wrong = {
-                i: (self.sep.join(row), f"has {len(row)} cells, the header has {width}")
-                for i, row in enumerate(rows)
-                if len(row) != width
-            }
-            by_name = dict(zip(names, zip(*(row for row in rows if len(row) == width), strict=True), strict=False))
-            wanted = columns.inputs if verbatim else names
-            yield (block := _block(place, lines, rows, wrong, {name: by_name.get(name, ()) for name in wanted}))
-            place = block.place
-
-    @staticmethod
-    def _rows(reader: Iterator[list[str]], path: Path, before: int) -> list[list[str]]:
-        """The next records; blank lines are left out."""
-        rows: list[list[str]] = []
+        count = 0
         try:
-            for row in reader:
+            for row in islice(csv.reader(texts, delimiter=self.sep, strict=True), 1, None):
                 if len(row) > 1 or (row and row[0].strip()):
-                    rows.append(row)
-                    if len(rows) == ROWS:
-                        break
+                    count += 1
+                    yield row
         except csv.Error as error:
-            number = before + len(rows) + 1
             fault = f"a quote is not closed, or not at the end of its cell ({error})"
-            raise FilesError(f"{path}: row {number}: {fault}") from None
-        return rows
+            raise FilesError(f"{lines.path}: row {count + 1}: {fault}") from None
+
+    def _columns(self, records: Any, names: Sequence[str], where: str) -> tuple[dict[str, Any], Sequence[str | None]]:
+        """Values by column, and what is wrong with each record."""
+        if self.sep:
+            width = len(self.head)
+            faults = [None if len(x) == width else f"has {len(x)} cells, the header has {width}" for x in records]
+            whole = (row if len(row) == width else [None] * width for row in records)
+            return dict(zip(self.schema.names, zip(*whole, strict=True), strict=True)), faults
+        objects, faults = zip(*map(_object, records), strict=True)
+        if not self.verbatim and (new := {name for found in objects for name in found} - {*names}):
+            raise FilesError(f"{where}: {min(new)!r} is in no earlier row; name it in the first, or write NDJSON")
+        return {name: [_text(found.get(name)) for found in objects] for name in names}, faults
+
+    def _shown(self, record: Any) -> str:
+        text: str = self.sep.join(record) if self.sep else record.decode("utf-8", "replace")
+        return text if len(text) <= 500 else text[:500] + "…"
 
 
-class NdjsonSource:
-    """One JSON object a line; the columns are those of the first block of every file."""
-
-    def __init__(self, files: Sequence[Path]) -> None:
-        self.files = files
-        names: dict[str, None] = {}
-        for path in files:
-            for found, _ in _objects(islice(_Lines(path), ROWS)):
-                names |= dict.fromkeys(found)
-        if not names:
-            raise FilesError(f"{files[0]}: holds no JSON object, one a line")
-        self.schema = pa.schema([(name, pa.string()) for name in names])
-
-    def blocks(self, place: Place, columns: Columns, verbatim: bool) -> Iterator[Block]:
-        """The blocks of the file at ``place`` from there on."""
-        lines = _Lines(self.files[place.file], place.at)
-        texts, names = iter(lines), columns.inputs if verbatim else self.schema.names
-        while block := [*islice(texts, ROWS)]:
-            records = [line.strip() for line in block if line.strip()]
-            read = [*_objects(records)]
-            wrong = {i: (records[i].decode("utf-8", "replace"), why) for i, (_, why) in enumerate(read) if why}
-            objects = [found for found, why in read if not why]
-            if not verbatim and (new := {name for found in objects for name in found} - set(names)):
-                last = place.rows + len(records)
-                late = f"{min(new)!r} is in no earlier row; name it in the first, or write NDJSON"
-                raise FilesError(f"{lines.path}: rows {place.rows + 1} to {last}: {late}")
-            given = {name: _column([found.get(name) for found in objects], name in columns.inputs) for name in names}
-            yield (found := _block(place, lines, records, wrong, given))
-            place = found.place
+def _head(path: Path, sep: str, decimal: str) -> list[str]:
+    """The cells of the first line, after a look at the records behind it; a mark of byte order stays."""
+    first, *rows = [*islice(_Lines(path), 51)] or [b""]
+    try:
+        cells = read_head(first.decode("utf-8-sig"), [row.decode("utf-8", "replace") for row in rows], sep, decimal)
+    except ValueError as error:  # also of UTF-8
+        raise FilesError(f"{path}: line 1: {error}") from None
+    return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
 
 
-def _objects(texts: Iterable[bytes]) -> Iterator[tuple[dict[str, Any], str | None]]:
-    """The object of each line that is not blank, and what is wrong with it."""
-    decoder = json.JSONDecoder(object_pairs_hook=_without_repeats, parse_constant=_refuse_constant)
-    for text in filter(bytes.strip, texts):
-        try:
-            found = decoder.decode(text.decode("utf-8-sig"))
-            if b"\\u" in text:
-                json.dumps(found, ensure_ascii=False).encode()  # half of a surrogate pair is no text
-            fault = None if isinstance(found, dict) else "is no JSON object"
-        except RecursionError:
-            fault = "is no JSON: too deep"
-        except ValueError as error:
-            fault = str(error) if str(error).startswith("repeats") else f"is no JSON: {error}"
-        yield ({} if fault else found), fault
+def _object(text: bytes) -> tuple[dict[str, Any], str | None]:
+    """The object of a line, and what is wrong with it."""
+    try:
+        found = _DECODER.decode(text.decode("utf-8-sig"))
+        if b"\\u" in text:
+            json.dumps(found, ensure_ascii=False).encode()  # half of a surrogate pair is no text
+        return (found, None) if isinstance(found, dict) else ({}, "is no JSON object")
+    except (ValueError, RecursionError) as error:
+        return {}, f"is no JSON object: {error}"
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        name = next(name for i, (name, _) in enumerate(pairs) if name in dict(pairs[:i]))
-        raise ValueError(f"repeats the key {name!r}")
+    if len(found := dict(pairs)) < len(pairs):
+        raise ValueError(f"repeats the key {Counter(name for name, _ in pairs).most_common(1)[0][0]!r}")
     return found
 
 
@@ -273,18 +217,13 @@ def _refuse_constant(word: str) -> None:
     raise ValueError(f"{word} is not in it; write null")
 
 
-def _column(values: list[Any], is_input: bool) -> Any:
-    """Values of JSON: inputs as doubles where all are numbers; else text: strings as they are, others as JSON."""
-    if is_input and {*map(type, values)} <= {float, int}:
-        with suppress(OverflowError):
-            numbers = np.array(values, np.float64)
-            if np.isfinite(numbers).all():
-                return pa.array(numbers)
-    return [_text(value) for value in values]
+_DECODER = json.JSONDecoder(object_pairs_hook=_without_repeats, parse_constant=_refuse_constant)
 
 
 def _text(value: Any) -> str | None:
+    """A value as text: strings as they are, others as JSON."""
     if value is None or isinstance(value, str):
         return value
-    # JSON has no infinity: this is a number of too many digits, which must not pass for a rigid contact
-    return "1e999" if isinstance(value, float) and math.isinf(value) else json.dumps(value)
+    if isinstance(value, float):  # JSON has no infinity: too many digits must not pass for a rigid contact
+        return repr(value) if math.isfinite(value) else "1e999"
+    return json.dumps(value)

@@ -7,17 +7,14 @@ import gzip
 import io
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
 
-from mumacro.files.columns import FilesError
-
-__all__ = ["Output", "csv_lines", "write_parquet"]
+__all__ = ["Output", "csv_lines"]
 
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
@@ -27,8 +24,7 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
     return text.getvalue()
 
 
-@dataclass(frozen=True)
-class Output:
+class Output(NamedTuple):
     """How rows are written: ``csv``, ``ndjson`` or ``parquet``; text ``packed`` (.gz) piece by piece.
 
     ``sep`` and ``decimal`` are those of CSV; in the column ``stiffness`` infinity is written as ``rigid``.
@@ -46,50 +42,49 @@ class Output:
         # without name and time, so that the same text gives the same bytes
         return gzip.compress(data, 6, mtime=0) if self.packed else data
 
-    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes | memoryview:
+    def piece(self, batch: pa.RecordBatch, texts: Sequence[Any] | None = None) -> bytes:
         """Rows; where ``texts`` holds the records as they came in, the columns are put behind them."""
         if self.kind == "parquet":
             sink = pa.BufferOutputStream()
             with pa.ipc.new_stream(sink, batch.schema) as writer:
                 writer.write_batch(batch)
-            return memoryview(sink.getvalue())
+            return bytes(sink.getvalue())
         cells = [self._cells(name, column) for name, column in zip(batch.schema.names, batch.columns, strict=True)]
         rows: Iterable[Sequence[Any]] = zip(*cells, strict=True)
         if self.kind == "csv":
             rows = rows if texts is None else ([*first, *row] for first, row in zip(texts, rows, strict=True))
             return self.pack(csv_lines(rows, self.sep))
         line = ", ".join(f"{json.dumps(name).replace('%', '%%')}: %s" for name in batch.schema.names) + "}\n"
-        if texts is None:
-            return self.pack("".join(map(f"{{{line}".__mod__, rows)))
-        begun = (text[:-1].decode().rstrip() for text in texts)  # without the brace that closes it
-        return self.pack("".join(f"{first}, {line % row}" for first, row in zip(begun, rows, strict=True)))
+        # a record without the brace that closes it
+        first = ["{"] * batch.num_rows if texts is None else [f"{text[:-1].decode().rstrip()}, " for text in texts]
+        return self.pack("".join(begun + line % row for begun, row in zip(first, rows, strict=True)))
 
     def _cells(self, name: str, column: pa.Array) -> list[str | None]:
         """A column as cells of text."""
-        if pa.types.is_dictionary(column.type):
-            words = [*self._cells(name, column.dictionary), "null" if self.kind == "ndjson" else None]
-            return [words[i] for i in pc.fill_null(column.indices, len(words) - 1).to_pylist()]
         kind, is_json = column.type, self.kind == "ndjson"
+        if pa.types.is_dictionary(kind):
+            words = [*self._cells(name, column.dictionary), "null" if is_json else None]
+            return [words[i] for i in pc.fill_null(column.indices, len(words) - 1).to_pylist()]
         if pa.types.is_nested(kind):
             return [json.dumps(value, default=str) for value in column.to_pylist()]
-        try:
-            text = pc.cast(column, pa.string())
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
-            raise FilesError(f"the column {name!r} holds {kind}, which text cannot ({error})") from None
+        text = pc.cast(column, pa.string())
         if pa.types.is_floating(kind):
-            infinite = pc.if_else(pc.is_inf(column), "rigid" if name == self.stiffness else None, None)
-            text = pc.if_else(pc.is_finite(column), text, infinite)
+            rigid = ('"rigid"' if is_json else "rigid") if name == self.stiffness else None
+            text = pc.if_else(pc.is_finite(column), text, pc.if_else(pc.is_inf(column), rigid, None))
         if not is_json:
             is_real = pa.types.is_floating(kind) or pa.types.is_decimal(kind)
             return list((pc.replace_substring(text, ".", self.decimal) if is_real else text).to_pylist())
         if pa.types.is_primitive(kind) and not pa.types.is_temporal(kind):
-            return [cell if cell != "rigid" else '"rigid"' for cell in pc.fill_null(text, "null").to_pylist()]
+            return list(pc.fill_null(text, "null").to_pylist())
         return [json.dumps(cell) for cell in text.to_pylist()]
 
-
-def write_parquet(path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
-    """One Parquet file of the pieces; doubles are written plainly, which is three times as fast."""
-    coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
-    with pa.parquet.ParquetWriter(path, schema, use_dictionary=coded, compression="snappy") as writer:
-        for piece in pieces:
-            writer.write_table(pa.ipc.open_stream(piece).read_all())
+    def whole(self, path: Path, schema: pa.Schema, pieces: Iterable[bytes]) -> None:
+        """The file of all pieces; doubles in Parquet are written plainly, which is three times as fast."""
+        if self.kind != "parquet":
+            with path.open("wb") as stream:
+                stream.writelines(pieces)
+            return
+        coded = [field.name for field in schema if not pa.types.is_floating(field.type)]
+        with pa.parquet.ParquetWriter(path, schema, use_dictionary=coded, compression="snappy") as writer:
+            for piece in pieces:
+                writer.write_table(pa.ipc.open_stream(piece).read_all())

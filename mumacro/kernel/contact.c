@@ -225,6 +225,8 @@ typedef struct {
     double bound, bound_v, bound_y, power_bound, stick_bound;
 } mu_driven;
 
+#define MU_LINE_ROUNDING 5e-16 /* of v~ and y~ four roundings each, and of mu~, relative */
+
 /* Bounds of one spring: rounding and the last digits of v~ and y~.  They count where a - v~ has few digits; and at
  * D = 2, where reverse slip begins, the slopes jump, and the duration of stick has a square root on one side. */
 static mu_driven mu_drive_spring(int direction, double v, double y) {
@@ -237,7 +239,7 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
     gap = mu_max((y - v) / y, near);
     at = mu_turning_of(mu_min(v, y * (1.0 - near)), y);
     /* nearer than that the deficit is at most y~ c^4 / 9 pi times 81/16, or 2 c / pi */
-    out.bound = gap > near ? MU_ROUNDING * size : mu_min(4.0 * y * near * near, sqrt(near));
+    out.bound = gap > near ? MU_LINE_ROUNDING * size : mu_min(4.0 * y * near * near, sqrt(near));
     off = MU_ROUNDING * (2.0 + 2.0 * y * at.sine + 2.0 * v * at.c);
     root = direction == MU_ALONG && y * at.travel > 2.0 - off ? off / sqrt(mu_max(y * at.travel - 2.0, off)) : 0.0;
     jump = direction == MU_ALONG && fabs(y * at.travel - 2.0) < off ? v + y : 0.0;

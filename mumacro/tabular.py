@@ -1,0 +1,148 @@
+"""Tables with a head: separator and decimal sign of CSV, which column is which input, its unit, cells as numbers."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from mumacro.inputs import (
+    LIKE,
+    PLAIN,
+    UNITS_OF,
+    Scale,
+    is_rigid,
+    number_hint,
+    scale_of,
+    split_unit,
+    suggestion,
+    unit_of,
+)
+
+__all__ = ["SEPARATORS", "TOO_LARGE", "absent", "find_heads", "meant_by", "read_cell", "read_head"]
+
+#: what may stand between the cells of CSV, by the word for it
+SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
+TOO_LARGE = "is beyond double range"
+_SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
+
+
+def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | None:
+    """The options to give, where a file is not as they say; None where it is.
+
+    >>> _advice("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
+    "the columns are separated by ';' and the decimal sign is ',': give --sep ';' --decimal ','"
+    """
+    found, sign = _recognised(header, rows, sep, decimal)
+    if (found, sign) == (sep, decimal):
+        return None
+    word = next(word for word, known in SEPARATORS.items() if known == found)
+    told = f"the columns are separated by {word!r} and the decimal sign is {sign!r}"
+    return f"{told}: give --sep '{word}' --decimal '{sign}'"
+
+
+def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tuple[str, str]:
+    """The separator that gives the most names of inputs, and the decimal sign of most numbers; if unsure, as given."""
+
+    def inputs(given: str) -> list[int]:
+        names = header.replace('"', "").split(given)
+        return [i for i, name in enumerate(names) if suggestion(split_unit(name)[0], loosely=False)]
+
+    best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
+    places = inputs(best)
+    cells = [cell.strip() for row in csv.reader(rows, delimiter=best) for i, cell in enumerate(row) if i in places]
+
+    def cells_with(sign: str) -> int:
+        return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
+
+    return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
+
+
+def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[str]:
+    """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it ask for other options.
+
+    >>> read_head("v0 [mm/s],note", ["1.5,a"], ",", ".")
+    ['v0 [mm/s]', 'note']
+    """
+    try:
+        cells = next(csv.reader([line], delimiter=sep, strict=True), [])
+    except csv.Error as error:
+        raise ValueError(f"is no header of CSV ({error})") from None
+    if not any(map(str.strip, cells)):
+        raise ValueError("must name the columns, and is empty")
+    if remedy := _advice(line, rows, sep, decimal):
+        raise ValueError(remedy)
+    return cells
+
+
+def find_heads(heads: Sequence[str], like: Mapping[str, str]) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
+    """Where the columns are, what one unit of each is, and what is wrong with the heads.
+
+    ``like`` has the names of the columns, and for each the input whose units it has; other columns are left out.
+
+    >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
+    ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
+    """
+    places: dict[str, tuple[int, Scale]] = {}
+    faults = []
+    for i, head in enumerate(heads):
+        name, unit = split_unit(head)
+        if name not in like:
+            continue
+        scale = Scale() if unit is None else scale_of(like[name], unit)
+        if scale is None:
+            hint = "; a frequency is f [Hz]" if name == "omega" and scale_of("f", unit or "") else ""
+            known = ", ".join(sorted(UNITS_OF[like[name]]))
+            faults.append(f"the column {head!r} has a unit that {name} cannot have{hint}; known are {known}")
+        if name in places:
+            faults.append(f"{name} is there twice: {heads[places[name][0]]!r} and {head!r}; rename one")
+        places[name] = i, scale or Scale()
+    if {"f", "omega"} <= places.keys():
+        faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
+    return places, faults
+
+
+def meant_by(head: str, *, loosely: bool = True) -> str | None:
+    """The input that a head is taken for, as a whole or by its first word: ``k_N_per_mm`` for k."""
+    name = split_unit(head)[0]
+    first = re.split(r"[\W_]+", name.strip("_ "))[0]
+    return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
+
+
+def absent(name: str, heads: Sequence[str]) -> str:
+    """What to do about a column that is not there.
+
+    >>> absent("v0", ["speed", "mu_macro"])
+    "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in brackets)"
+    """
+    for head in heads:
+        meant = meant_by(head)
+        if meant and meant in (name, {"omega": "f"}.get(name)):
+            remedy = f"rename that column to {meant} [{unit_of(meant)}] (or another unit in brackets)"
+            return f"there is no column {name}; {head!r} is similar: {remedy}"
+    unit = f"{name} [{unit_of(name) if name in (*UNITS_OF, *LIKE) else '-'}]"
+    told = f"{unit} or f [Hz]" if name == "omega" else unit
+    return f"there is no column {told}; there are {', '.join(map(repr, heads))}"
+
+
+def read_cell(name: str, cell: str, decimal: str = ".") -> float:
+    """The number in a cell of the column ``name``: NaN where it is empty, infinity for the word rigid in k.
+
+    With a decimal comma 1.5 is refused: it may be meant for 1500.  ValueError says what is wrong.
+
+    >>> read_cell("v0", " 0,5 ", ","), read_cell("k", "Rigid"), read_cell("k", "")
+    (0.5, inf, nan)
+    """
+    text = cell.strip()
+    if not text:
+        return math.nan
+    if name == "k" and is_rigid(text):
+        return math.inf
+    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
+    if not PLAIN.fullmatch(plain):
+        raise ValueError(number_hint(name, text) if decimal == "." else f"must be a number such as 0{decimal}5")
+    value = float(plain)
+    if math.isinf(value) and any(map(str.isdigit, plain)):  # too many digits must not pass for an infinite stiffness
+        raise ValueError(TOO_LARGE)
+    return value
