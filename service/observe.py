@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
@@ -30,8 +30,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from mumacro.errors import MumacroError
 
 from .answers import REGIME_NAMES, SOURCES
-from .limits import Keys, check_head, drained
-from .problems import CLOSE, Kind, RequestError, problem_of
+from .limits import check_head, drained, holder_of
+from .problems import Kind, RequestError, problem_of
 from .routes import path_of
 from .tables import LoadedTable, Tables
 
@@ -218,7 +218,7 @@ class Observe:
     ``open_paths`` need no key; ``/guide`` among them opens all that is below it.
     """
 
-    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: AbstractSet[str]) -> None:
+    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Mapping[str, str], open_paths: AbstractSet[str]) -> None:
         self.app = app
         self._metrics, self._keys, self._open_paths = metrics, keys, open_paths
         self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
@@ -241,10 +241,10 @@ class Observe:
 
         try:
             if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
-                raise RequestError(Kind.OVERLOADED, "too many connections are open", headers=CLOSE)
+                raise RequestError(Kind.OVERLOADED, "too many connections are open")
             check_head(scope, headers)
             if self._keys and path not in self._open_paths and not self._in_guide(path):
-                holder = self._keys.holder(headers)
+                holder = holder_of(headers, self._keys)
             await self.app(scope, receive, send_marked)
         except ClientDisconnect:
             status = 499  # the usual status for a client that disconnected before the answer
@@ -257,7 +257,7 @@ class Observe:
                 raise ClientDisconnect from error
             answer = problem_of(error, scope)
             late = getattr(error, "kind", None) in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
-            if answer.headers.get("connection") == "close" and not late and b"expect" not in headers:
+            if "connection" in answer.headers and not late and b"expect" not in headers:
                 await drained(receive)
             await answer(scope, receive, send_marked)
         finally:

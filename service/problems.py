@@ -22,13 +22,11 @@ from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs import BOUNDS, number_hint, unknown_name
 from mumacro.inputs import NAMES as INPUTS
 
-__all__ = ["CLOSE", "FieldFault", "Kind", "RequestError", "document_of", "faults_of", "problem_of", "refuse"]
+__all__ = ["FieldFault", "Kind", "RequestError", "document_of", "faults_of", "problem_of", "refuse"]
 
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
-#: header of a response that is sent before the whole request was read
-CLOSE = {"Connection": "close"}
 
 
 # --- bad fields -----------------------------------------------------------------------------------------
@@ -118,28 +116,32 @@ def faults_of(
 
 
 class Kind(Enum):
-    """A type of problem: its status, its title, and the seconds after which to ask again."""
+    """A type of problem: status, title, whether the connection closes, and seconds after which to ask again.
 
+    It closes where the rest of the request is not read.
+    """
+
+    MALFORMED_HEAD = 400, "The head cannot be read", True
     MALFORMED_BODY = 400, "The request cannot be read"
-    UNAUTHORIZED = 401, "An API key is needed"
+    UNAUTHORIZED = 401, "An API key is needed", True
     NOT_FOUND = 404, "Not Found"
     METHOD_NOT_ALLOWED = 405, "Method Not Allowed"
-    SLOW_CLIENT = 408, "The request did not come in time"
-    BODY_TOO_LARGE = 413, "The body is too large"
+    SLOW_CLIENT = 408, "The request did not come in time", True
+    BODY_TOO_LARGE = 413, "The body is too large", True
     BATCH_TOO_LARGE = 413, "The batch is too large"
-    UNSUPPORTED_BODY = 415, "The body's media type is not supported"
+    UNSUPPORTED_BODY = 415, "The body's media type is not supported", True
     RANGE_NOT_SATISFIABLE = 416, "The file has no such part"
     INVALID_VALUE = 422, "The request holds invalid values"
-    HEAD_TOO_LARGE = 431, "The head is too large"
+    HEAD_TOO_LARGE = 431, "The head is too large", True
     UNEXPECTED = 500, "An unexpected error"
     NOT_INSTALLED = 501, "This service lacks a package"
-    NOT_READY = 503, "The service is not ready", 5
-    OVERLOADED = 503, "The service is overloaded", 1
-    OUT_OF_MEMORY = 503, "The service has too little memory", 1
-    TOOK_TOO_LONG = 503, "The request took too long", 1
+    NOT_READY = 503, "The service is not ready", False, 5
+    OVERLOADED = 503, "The service is overloaded", True, 1
+    OUT_OF_MEMORY = 503, "The service has too little memory", False, 1
+    TOOK_TOO_LONG = 503, "The request took too long", True, 1
 
-    def __init__(self, status: int, title: str, retry_after_s: int | None = None) -> None:
-        self.status, self.title, self.retry_after_s = status, title, retry_after_s
+    def __init__(self, status: int, title: str, closes: bool = False, retry_after_s: int | None = None) -> None:
+        self.status, self.title, self.closes, self.retry_after_s = status, title, closes, retry_after_s
 
 
 class RequestError(MumacroError):
@@ -159,7 +161,8 @@ def request_error(error: Exception) -> RequestError:
     if isinstance(error, RequestError):
         return error
     if isinstance(error, HTTPException):  # of Starlette: no such path, method or part of a file
-        kind = next((kind for kind in Kind if kind.status == error.status_code), Kind.UNEXPECTED)
+        named = {Kind.MALFORMED_BODY, Kind.NOT_FOUND, Kind.METHOD_NOT_ALLOWED, Kind.RANGE_NOT_SATISFIABLE}
+        kind = next((kind for kind in named if kind.status == error.status_code), Kind.UNEXPECTED)
         return RequestError(kind, error.detail, headers=error.headers)
     if isinstance(error, InputError):
         fault = FieldFault.of(error.field, f"must be {error.bound}", error.value)
@@ -191,6 +194,8 @@ def problem_of(error: Exception, scope: Scope) -> Response:
     """The response to an exception."""
     found = request_error(error)
     headers = {"Cache-Control": "no-store", **found.headers}
+    if found.kind.closes:
+        headers["Connection"] = "close"
     if found.kind.retry_after_s is not None:
         headers["Retry-After"] = str(found.kind.retry_after_s)
     content = orjson.dumps(document_of(found, scope))

@@ -61,9 +61,9 @@ class Connection(HttpToolsProtocol):
             self.transport.abort()
         elif not self.transport.is_closing():
             answer = problem_of(error, {"path": "", "method": "GET", **(self.scope or {})})
-            fields = b"".join(b"%b: %b\r\n" % field for field in [*answer.raw_headers, (b"connection", b"close")])
+            fields = b"".join(b"%b: %b\r\n" % field for field in answer.raw_headers)
             start = b"HTTP/1.1 %d %b" % (error.kind.status, error.kind.title.encode())
-            self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, answer.body))
+            self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))
             self.transport.close()
 
     # --- the connection -------------------------------------------------------------------------------
@@ -106,7 +106,7 @@ class Connection(HttpToolsProtocol):
     def send_400_response(self, msg: str) -> None:
         """Refuse what the parser, or a limit here, has refused."""
         if not self._second:
-            self._refuse(self._refusal or RequestError(Kind.MALFORMED_BODY, msg))
+            self._refuse(self._refusal or RequestError(Kind.MALFORMED_HEAD, msg))
 
     def pause_writing(self) -> None:
         """Give the client its time to read."""
@@ -134,7 +134,7 @@ class Connection(HttpToolsProtocol):
         if len(self.headers) > MAX_FIELDS or sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD:
             self._refusal = _TOO_LARGE
         elif hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
-            self._refusal = RequestError(Kind.MALFORMED_BODY, "a request has one Host")
+            self._refusal = RequestError(Kind.MALFORMED_HEAD, "a request has one Host")
         if self._refusal:
             raise self._refusal
         self._in_head = False
