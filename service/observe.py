@@ -61,7 +61,7 @@ class JsonFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
         line: dict[str, Any] = {
-            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "time": datetime.fromtimestamp(record.created, UTC),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),
@@ -215,7 +215,7 @@ class Metrics:
 class Observe:
     """Middleware: id, key, log line, counters, and problem details for every exception.
 
-    ``open_paths`` need no key; ``/guide`` among them opens all that is below it.
+    ``open_paths``, and what is below ``/guide/``, need no key.
     """
 
     def __init__(self, app: ASGIApp, metrics: Metrics, keys: Mapping[str, str], open_paths: AbstractSet[str]) -> None:
@@ -243,7 +243,7 @@ class Observe:
             if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
                 raise RequestError(Kind.OVERLOADED, "too many connections are open")
             check_head(scope, headers)
-            if self._keys and path not in self._open_paths and not self._in_guide(path):
+            if self._keys and path not in self._open_paths and not path.startswith("/guide/"):
                 holder = holder_of(headers, self._keys)
             await self.app(scope, receive, send_marked)
         except ClientDisconnect:
@@ -272,6 +272,3 @@ class Observe:
                     **({} if holder is None else {"key": holder}),
                 }  # fmt: skip
                 _access.handle(AccessRecord(level, fields))
-
-    def _in_guide(self, path: str) -> bool:
-        return path.startswith("/guide/") and "/guide" in self._open_paths

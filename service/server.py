@@ -31,7 +31,7 @@ class Connection(HttpToolsProtocol):
     #: connections without a request, the longest waiting first
     waiting: ClassVar[dict["Connection", None]] = {}
     _due = _end = math.inf  # when the client must have moved, and the answer be complete
-    _head = 0  # bytes since the head began
+    _bytes = 0  # since the last answer
     _in_head = _second = False
     _refusal: RequestError | None = None
 
@@ -96,11 +96,11 @@ class Connection(HttpToolsProtocol):
         """Read some bytes, unless they follow a request that is not answered yet."""
         if self._second or self.transport.is_closing():
             return
+        self._bytes += len(data)
         super().data_received(data)
         if self._in_head or not self._busy:
             self._watch()
-            self._head += len(data)
-        if (self._in_head and self._head > MAX_HEAD) or len(self.headers or ()) > MAX_FIELDS:
+        if (self._in_head and self._bytes > MAX_HEAD) or len(self.headers or ()) > MAX_FIELDS:
             self._refuse(_TOO_LARGE)
 
     def send_400_response(self, msg: str) -> None:
@@ -125,13 +125,14 @@ class Connection(HttpToolsProtocol):
         if self._busy:
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
-        self._in_head, self._head = True, 0
+        self._in_head = True
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:
         """Begin a request."""
         hosts = [name for name, _ in self.headers].count(b"host")
-        if len(self.headers) > MAX_FIELDS or sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD:
+        too_long = self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD
+        if too_long or len(self.headers) > MAX_FIELDS:
             self._refusal = _TOO_LARGE
         elif hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
             self._refusal = RequestError(Kind.MALFORMED_HEAD, "a request has one Host")
@@ -154,6 +155,6 @@ class Connection(HttpToolsProtocol):
 
     def on_response_complete(self) -> None:
         """Wait for the next request."""
-        self._due = self._end = math.inf
+        self._due, self._end, self._bytes = math.inf, math.inf, 0
         self.waiting[self] = None
         super().on_response_complete()

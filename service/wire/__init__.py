@@ -1,10 +1,11 @@
-"""Wire forms of batches: text -> columns, answers -> text.  One file each; :data:`FORMS` has all that are installed.
+"""Wire forms of batches: text -> columns, answers -> text.  One file each; ``forms`` names all that are installed.
 
 Answers are evaluated and written in slices, so that memory stays small and other threads run between them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from ..case import MAX_ERRORS, Columns, asked_of, faults_in, names_of, stranger
 from ..problems import FieldFault, refuse
 from ..tables import LoadedTable
 
-__all__ = ["FORMS", "Batch", "Form", "check_names", "forms", "text_form"]
+__all__ = ["Batch", "Form", "check_names", "forms", "text_form"]
 
 
 def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]) -> None:
@@ -95,18 +96,14 @@ def text_form(description: str, **more: Any) -> dict[str, Any]:
     return {"schema": {"type": "string", "description": description, **more}}
 
 
-FORMS: dict[str, Form] = {}
-
-
+@cache
 def forms() -> dict[str, Form]:
-    """All forms by media type; loaded at the first call, Arrow only where pyarrow is installed."""
-    if not FORMS:
-        from . import csv, json
+    """All forms by media type; Arrow only where pyarrow is installed."""
+    from . import csv, json
 
-        made = [*json.FORMS, csv.FORM]
-        if find_spec("pyarrow"):
-            from . import arrow
+    made = [*json.FORMS, csv.FORM]
+    if find_spec("pyarrow"):
+        from . import arrow
 
-            made.append(arrow.FORM)
-        FORMS.update({form.media_type: form for form in made})
-    return FORMS
+        made.append(arrow.FORM)
+    return {form.media_type: form for form in made}
