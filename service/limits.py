@@ -107,13 +107,13 @@ async def read_body(
 
 async def drained(receive: Receive) -> None:
     """Read and drop the rest of a body that is refused, for a while: else many clients see a reset and no reason."""
-    until, count, more = asyncio.get_running_loop().time() + _LINGER_S, 0, True
+    count, more = 0, True
     with suppress(TimeoutError):
-        while more and count < _LINGER:
-            async with asyncio.timeout(min(_PAUSE_S, until - asyncio.get_running_loop().time())):
-                message = await receive()
-            count += len(message.get("body", b""))
-            more = message.get("more_body", False)
+        async with asyncio.timeout(_LINGER_S):
+            while more and count < _LINGER:
+                message = await asyncio.wait_for(receive(), _PAUSE_S)
+                count += len(message.get("body", b""))
+                more = message.get("more_body", False)
 
 
 def _stand_back() -> None:
@@ -128,11 +128,9 @@ def _stand_back() -> None:
 class Slots:
     """The right to run a large request: so many at the same time, and the threads that run them."""
 
-    def __init__(self, number: int, threads: int, name: str, behind: bool) -> None:
-        self.number = number
-        self.used = 0
-        self.threads = ThreadPoolExecutor(threads, name, initializer=_stand_back if behind else None)
-        self._name = name
+    def __init__(self, number: int, name: str, initializer: Callable[[], None] | None = None) -> None:
+        self.number, self.used, self._name = number, 0, name
+        self.threads = ThreadPoolExecutor(processors(), name, initializer=initializer)
 
     def take(self) -> None:
         """Take a slot; the code that called this gives it back."""
@@ -144,11 +142,9 @@ class Slots:
         """Give a slot back."""
         self.used -= 1
 
-    async def run(self, work: Callable[[], T], cost: float = float("inf")) -> T:
+    async def run(self, work: Callable[[], T], cost: float) -> T:
         """Do the work at once if it is small, else in a thread, so that it delays no other request."""
-        if cost <= AT_ONCE:
-            return work()
-        return await asyncio.get_running_loop().run_in_executor(self.threads, work)
+        return work() if cost <= AT_ONCE else await asyncio.wrap_future(self.threads.submit(work))
 
 
 class Work:
@@ -156,9 +152,8 @@ class Work:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        count = processors()
-        self.batches = Slots(settings.max_batches, count, "batches", behind=True)
-        self.questions = Slots(QUESTIONS, count, "questions", behind=False)
+        self.batches = Slots(settings.max_batches, "batches", _stand_back)
+        self.questions = Slots(QUESTIONS, "questions")
 
     def close(self) -> None:
         """Let no thread keep the process alive."""

@@ -81,8 +81,7 @@ class LogLines(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
         self.setFormatter(JsonFormatter())
-        self._waiting = deque[logging.LogRecord]()
-        self._dropped, self._writes = 0, False
+        self._waiting, self._dropped, self._writes = deque[logging.LogRecord](), 0, False
         threading.Thread(target=self._write, name="log", daemon=True).start()
 
     def emit(self, record: logging.LogRecord) -> None:

@@ -8,7 +8,7 @@ must be.  All faults of a request are reported at once.  No traceback reaches a 
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NoReturn
 
@@ -99,16 +99,17 @@ def faults_of(
     for entry in error.errors(include_url=False):
         path, kind, value = entry["loc"], entry["type"], entry["input"]
         if kind == "missing":
-            fault = FieldFault(path, "is required")
+            value, reason = _NO_VALUE, "is required"
         elif kind == "extra_forbidden":
-            fault = FieldFault(path, unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS), value)
+            reason = unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS)
         elif kind == "relation":  # between fields: the model names the one to change
-            fault = FieldFault((*path, entry["ctx"]["field"]), entry["ctx"]["reason"])
+            path, value, reason = (*path, entry["ctx"]["field"]), _NO_VALUE, entry["ctx"]["reason"]
+        elif kind == "float_type":
+            reason = number_hint(str(path[0]), value)
         else:
             extra: Any = model.model_fields[str(path[0])].json_schema_extra
-            hint = number_hint(str(path[0]), value) if kind == "float_type" else f"must be {extra['bound']}"
-            fault = FieldFault(path, hint, value)
-        found.setdefault(fault.path, replace(fault, parameter=parameter))
+            reason = f"must be {extra['bound']}"
+        found.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(found.values())
 
 

@@ -51,12 +51,12 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) < 4300 else float(digits)  # infinite, which is refused as a value
-
-
-# Numbers are read by functions of Python, so that other threads run meanwhile.
-_DECODER = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole, parse_float=lambda digits: float(digits))
+# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300 digits.
+_DECODER = json.JSONDecoder(
+    object_pairs_hook=_unique,
+    parse_int=lambda digits: int(digits) if len(digits) < 4300 else float(digits),
+    parse_float=lambda digits: float(digits),
+)
 
 
 def decode(text: bytes | bytearray, large: bool = False) -> Any:
@@ -147,29 +147,19 @@ def _row_of(names: tuple[str, ...]) -> tuple[Callable[[bytes], list[Any]], Calla
 
 
 def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns | None:
-    """Rows of numbers with the same names; None for any other text."""
+    """Rows of numbers with the same names; None for any other text.
+
+    The text is read piece by piece.  A piece that does not end between two rows is no JSON.
+    """
     asked = asked_of((), kind)
-    for frequency in ("omega", "f"):
-        names = tuple(frequency if name == "omega" else name for name in asked.fields)
-        parts = _pieces(text, max_batch, names)
-        if parts:
-            six = [np.concatenate(column) for column in zip(*parts, strict=True)]
-            if frequency == "f":
-                with np.errstate(over="ignore"):  # infinite, which is refused
-                    six[names.index("f")] *= RAD_PER_CYCLE
-            return Columns(six[0].size, six, hertz=frequency == "f", rows=True, asked=asked)
-    return None
-
-
-def _pieces(text: bytearray, max_batch: int, names: tuple[str, ...]) -> list[Any] | None:
-    """The columns of rows with these names, piece by piece.  A piece that does not end between two rows is no JSON."""
+    hertz = b'"f"' in text[:_SHORT]
+    names = tuple("f" if hertz and name == "omega" else name for name in asked.fields)
     decode_rows, values = _row_of(names)
     parts: list[Any] = []
     at = size = 0
     while at < len(text):
         cut = _BETWEEN.search(text, at + _READ)
-        end = cut.start() + 1 if cut else len(text)
-        piece = (b"[" if at else b"") + text[at:end] + (b"]" if cut else b"")
+        piece = (b"[" if at else b"") + text[at : cut.start() + 1 if cut else None] + (b"]" if cut else b"")
         try:
             rows = decode_rows(piece)
         except (msgspec.MsgspecError, ValueError, RecursionError):
@@ -181,9 +171,13 @@ def _pieces(text: bytearray, max_batch: int, names: tuple[str, ...]) -> list[Any
             raise too_large(max_batch)
         columns = dict(zip(names, zip(*map(values, rows), strict=True), strict=True))
         columns["k"] = tuple(math.inf if value == "rigid" else value for value in columns["k"])
-        parts.append([np.frombuffer(array("d", column)) for column in columns.values()])
+        parts.append([array("d", column) for column in columns.values()])
         at = cut.end() if cut else len(text)
-    return parts
+    six = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    if hertz:
+        with np.errstate(over="ignore"):  # infinite, which is refused
+            six[names.index("f")] *= RAD_PER_CYCLE
+    return Columns(size, six, hertz=hertz, rows=True, asked=asked)
 
 
 def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
@@ -224,8 +218,8 @@ def write(batch: Batch) -> Iterator[bytes]:
 
 def _write_columns(batch: Batch) -> Iterator[bytes]:
     slices = [found for found, _, _ in batch.slices(_ROWS)]
-    form, parts = _form(batch, b"[\0]")
-    for opening, part in zip(form, parts, strict=False):
+    form = _form(batch.parts, b"[\0]")
+    for opening, part in zip(form, batch.parts, strict=False):
         for found in slices:
             yield opening + _texts(part, found[part.path])
             opening = b","
@@ -233,11 +227,10 @@ def _write_columns(batch: Batch) -> Iterator[bytes]:
 
 
 def _write_rows(batch: Batch) -> Iterator[bytes]:
-    form, parts = _form(batch, b"\0")
-    row = b"%b".join(text.replace(b"%", b"%%") for text in form)
+    row = b"%b".join(text.replace(b"%", b"%%") for text in _form(batch.parts, b"\0"))
     opening = b'{"results":['
     for found, source, _ in batch.slices(_ROWS):
-        columns = [_texts(part, found[part.path]).split(b",") for part in parts]
+        columns = [_texts(part, found[part.path]).split(b",") for part in batch.parts]
         made = [row % cells for cells in zip(*columns, strict=True)] if source.size else []
         for i in np.flatnonzero(source < 0).tolist():
             made[i] = b"null"
@@ -246,13 +239,10 @@ def _write_rows(batch: Batch) -> Iterator[bytes]:
     yield b"]," + dump(batch.end)[1:]
 
 
-def _form(batch: Batch, place: bytes) -> tuple[list[bytes], list[Part]]:
-    """What stands around the values of an answer, and their columns in order; each ``place`` has a zero for a value."""
-    parts = {part.path: part for part in batch.parts}
-    shape = nested({path: path for path in parts})
-    order = [path for inner in shape.values() for path in (inner.values() if isinstance(inner, dict) else [inner])]
-    text = dump(nested(dict.fromkeys(order, "\0"))).replace(b'"\\u0000"', place)
-    return text.split(b"\0"), [parts[path] for path in order]
+def _form(parts: list[Part], place: bytes) -> list[bytes]:
+    """What stands around the values of an answer; each ``place`` has a zero for a value."""
+    text = dump(nested({part.path: "\0" for part in parts}))
+    return text.replace(b'"\\u0000"', place).split(b"\0")
 
 
 def _texts(part: Part, column: Any) -> bytes:
@@ -264,35 +254,29 @@ def _texts(part: Part, column: Any) -> bytes:
     return dump(column if part.kind is float else part.values(column))[1:-1]
 
 
-def _refs(*names: str) -> list[dict[str, Any]]:
-    return [{"$ref": f"#/components/schemas/{name}"} for name in names]
+def _described(kind: str, *names: str, **more: Any) -> dict[str, Any]:
+    """The description of a text that is one of these models, or a list of one, whose name ends with ``[]``."""
+    found: list[dict[str, Any]] = [{"$ref": f"#/components/schemas/{name.removesuffix('[]')}"} for name in names]
+    lists = (
+        {"type": "array", "items": one} if name[-1] == "]" else one for name, one in zip(names, found, strict=True)
+    )
+    return {"schema": {kind: list(lists), **more}}
 
 
-_LIST = {"type": "array", "items": _refs("Case")[0]}
+_MANY = {"example": {**example, "v0": [0.01, 0.1]}}
 FORMS = (
     Form(
-        "application/json",
-        (),
-        read,
-        write,
-        body={"schema": {"oneOf": [*_refs("CaseColumns"), _LIST]}, "example": {**example, "v0": [0.01, 0.1]}},
-        answer={"schema": {"oneOf": _refs("ColumnsAnswer", "RowsAnswer")}},
+        "application/json", (), read, write,
+        body=_described("oneOf", "CaseColumns", "Case[]") | _MANY,
+        answer=_described("oneOf", "ColumnsAnswer", "RowsAnswer"),
     ),
     Form(
-        "application/x-ndjson",
-        ("application/ndjson", "application/jsonl", "application/x-jsonlines"),
-        read,
-        write,
-        body={
-            "schema": {"anyOf": [*_refs("CaseColumns", "Case"), _LIST], "description": "One of these per line"},
-            "example": {**example, "v0": [0.01, 0.1]},
-        },
-        answer={
-            "schema": {
-                "anyOf": _refs("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem"),
-                "description": "One of these per line, in the order of the lines",
-            }
-        },
+        "application/x-ndjson", ("application/ndjson", "application/jsonl", "application/x-jsonlines"), read, write,
+        body=_described("anyOf", "CaseColumns", "Case", "Case[]", description="One of these per line") | _MANY,
+        answer=_described(
+            "anyOf", "ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem",
+            description="One of these per line, in the order of the lines",
+        ),
         streams=True,
     ),
-)
+)  # fmt: skip
