@@ -52,9 +52,6 @@ _access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
 
 
-# --- logs ---------------------------------------------------------------------------------------------
-
-
 class JsonFormatter(logging.Formatter):
     """One record, one line of JSON: time, level, logger, message, the record's ``fields``."""
 
@@ -137,9 +134,6 @@ def log_config(level: str) -> dict[str, Any]:
     }
 
 
-# --- counters -----------------------------------------------------------------------------------------
-
-
 @contextmanager
 def shared_counters() -> Iterator[None]:
     """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end.
@@ -206,9 +200,6 @@ class Metrics:
             registry = CollectorRegistry()
             MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
         return generate_latest(registry)
-
-
-# --- one request --------------------------------------------------------------------------------------
 
 
 class Observe:

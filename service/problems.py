@@ -29,9 +29,6 @@ _MAX_TEXT = 80
 _NO_VALUE = object()
 
 
-# --- bad fields -----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class FieldFault:
     """One bad field of a request: where it is, what was given, why it is refused.
@@ -111,9 +108,6 @@ def faults_of(
             reason = f"must be {extra['bound']}"
         found.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(found.values())
-
-
-# --- errors ---------------------------------------------------------------------------------------------
 
 
 class Kind(Enum):

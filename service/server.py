@@ -66,8 +66,6 @@ class Connection(HttpToolsProtocol):
             self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))
             self.transport.close()
 
-    # --- the connection -------------------------------------------------------------------------------
-
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
         super().connection_made(transport)
@@ -117,8 +115,6 @@ class Connection(HttpToolsProtocol):
         """The client has read."""
         super().resume_writing()
         self._due = math.inf
-
-    # --- calls of the parser; what they raise ends in send_400_response ---------------------------------
 
     def on_message_begin(self) -> None:
         """Begin a head, if the request before it is answered."""

@@ -109,10 +109,7 @@ def _record(batch: Batch, found: dict[str, Any], source: Any, faults: list[str |
 
 
 FORM = Form(
-    "application/vnd.apache.arrow.stream",
-    (),
-    _read,
-    _write,
+    "application/vnd.apache.arrow.stream", (), _read, _write,
     body=text_form(
         "Arrow IPC stream, uncompressed, number columns mu0, Fz, k, y0, omega or f, v0; k_low and k_high in place of "
         "k, Fz_amplitude in place of y0 for direction normal; infinity in k is rigid contact, null is refused",
@@ -124,4 +121,4 @@ FORM = Form(
         "schema's metadata",
         format="binary",
     ),
-)
+)  # fmt: skip

@@ -119,20 +119,14 @@ def _write(batch: Batch) -> Iterator[bytes]:
 
 
 FORM = Form(
-    "text/csv",
-    ("application/csv",),
-    _read,
-    _write,
-    body={
-        **text_form(
-            "RFC 4180 with a head: mu0, Fz, k, y0, omega or f, v0, each in SI or with a unit in brackets; k_low and "
-            "k_high in place of k, Fz_amplitude in place of y0 for direction normal; the word rigid in k is rigid "
-            "contact, an empty cell is refused"
-        ),
-        "example": "mu0,Fz,k [N/mm],y0 [um],f,v0\r\n0.3,10,1000,2,20690,0.01\r\n",
-    },
+    "text/csv", ("application/csv",), _read, _write,
+    body=text_form(
+        "RFC 4180 with a head: mu0, Fz, k, y0, omega or f, v0, each in SI or with a unit in brackets; k_low and k_high "
+        "in place of k, Fz_amplitude in place of y0 for direction normal; the word rigid in k is rigid contact, an "
+        "empty cell is refused"
+    ) | {"example": "mu0,Fz,k [N/mm],y0 [um],f,v0\r\n0.3,10,1000,2,20690,0.01\r\n"},
     answer=text_form(
         "One line per case: mu_macro, mu_ratio, regime, error_bound, source, what include adds, error; the name of "
         "the table is in the header X-Table"
     ),
-)
+)  # fmt: skip

@@ -40,9 +40,6 @@ _SHORT = 4096  # bytes of a list that json reads
 _ROWS = 8192  # cases that are written at a time
 
 
-# --- reading ------------------------------------------------------------------------------------------
-
-
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
@@ -201,9 +198,6 @@ def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
         if len(reasons) < MAX_ERRORS:
             reasons[i] = reason
     return Columns(len(found), list(six), reasons, rows=True, asked=asked)
-
-
-# --- writing ------------------------------------------------------------------------------------------
 
 
 def dump(values: Any) -> bytes:
