@@ -54,9 +54,9 @@ def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
             if names.count(name) > 1:
-                raise RequestError(Kind.MALFORMED_HEAD, f"the header {name.decode()} is given more than once")
+                raise RequestError(Kind.MALFORMED_HTTP, f"the header {name.decode()} is given more than once")
     if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
-        raise RequestError(Kind.MALFORMED_HEAD, "this service does not upgrade connections: send no Upgrade")
+        raise RequestError(Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade")
 
 
 def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:

@@ -116,7 +116,7 @@ class Kind(Enum):
     It closes where the rest of the request is not read.
     """
 
-    MALFORMED_HEAD = 400, "The head cannot be read", True
+    MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", True
     MALFORMED_BODY = 400, "The request cannot be read"
     UNAUTHORIZED = 401, "An API key is needed", True
     NOT_FOUND = 404, "Not Found"

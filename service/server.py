@@ -98,13 +98,13 @@ class Connection(HttpToolsProtocol):
         super().data_received(data)
         if self._in_head or not self._busy:
             self._watch()
-        if (self._in_head and self._bytes > MAX_HEAD) or len(self.headers or ()) > MAX_FIELDS:
+        if self._in_head and self._bytes > MAX_HEAD:
             self._refuse(_TOO_LARGE)
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what the parser, or a limit here, has refused."""
         if not self._second:
-            self._refuse(self._refusal or RequestError(Kind.MALFORMED_HEAD, msg))
+            self._refuse(self._refusal or RequestError(Kind.MALFORMED_HTTP, msg))
 
     def pause_writing(self) -> None:
         """Give the client its time to read."""
@@ -124,14 +124,20 @@ class Connection(HttpToolsProtocol):
         self._in_head = True
         super().on_message_begin()
 
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Take a field of the head, or one that follows a body."""
+        super().on_header(name, value)
+        if len(self.headers) > MAX_FIELDS:
+            self._refusal = _TOO_LARGE
+            raise _TOO_LARGE
+
     def on_headers_complete(self) -> None:
         """Begin a request."""
         hosts = [name for name, _ in self.headers].count(b"host")
-        too_long = self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD
-        if too_long or len(self.headers) > MAX_FIELDS:
+        if self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD:
             self._refusal = _TOO_LARGE
         elif hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
-            self._refusal = RequestError(Kind.MALFORMED_HEAD, "a request has one Host")
+            self._refusal = RequestError(Kind.MALFORMED_HTTP, "a request has one Host")
         if self._refusal:
             raise self._refusal
         self._in_head = False
