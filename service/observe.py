@@ -72,7 +72,7 @@ class JsonFormatter(logging.Formatter):
 class LogLines(logging.Handler):
     """Keeps records for a thread that writes them twenty times a second: a stalled reader delays no request.
 
-    ``logging.handlers.QueueListener`` wakes its thread for every record, which costs as much as a whole answer.
+    ``logging.handlers.QueueListener`` would wake its thread for every record.
     """
 
     def __init__(self) -> None:
@@ -90,13 +90,14 @@ class LogLines(logging.Handler):
 
     def _write(self) -> None:
         """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
+        told = 0
         while True:
             time.sleep(_WRITE_EVERY_S)
             self._writes = True
             records = [self._waiting.popleft() for _ in range(len(self._waiting))]
-            dropped, self._dropped = self._dropped, 0
-            if dropped:
-                _log.warning("%d lines of the log were dropped: standard output was not read in time", dropped)
+            if more := self._dropped - told:
+                told += more
+                _log.warning("%d lines of the log were dropped: standard output was not read in time", more)
             rest = memoryview("".join(f"{self.format(record)}\n" for record in records).encode())
             with suppress(OSError):  # the reader is gone
                 while rest:

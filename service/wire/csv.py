@@ -21,7 +21,7 @@ __all__ = ["FORM"]
 
 _LONGEST_LINE = 64 * 1024  # characters
 _SLICE = 4096  # lines that are read or written at a time
-_DIGITS = "0123456789.eE+-"
+_DIGITS = b"0123456789.eE+-"
 
 
 def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
@@ -79,7 +79,7 @@ def _head(cells: list[str], kind: ContactKind) -> dict[str, Scale]:
 
 def _values(name: str, scale: Scale, cells: tuple[str, ...]) -> Any:
     """A part of a column: an array, or a list where a cell is no number within double range."""
-    if all(cells) and not "".join(cells).strip(_DIGITS):
+    if all(cells) and not "".join(cells).encode().translate(None, _DIGITS):
         with suppress(ValueError), np.errstate(over="ignore"):
             column = np.array(list(map(float, cells))) * scale.times / scale.over
             if np.isfinite(column).all():
@@ -94,7 +94,7 @@ def _value(name: str, scale: Scale, text: str) -> Any:
     if name == "k" and is_rigid(text):
         return RIGID
     with suppress(ValueError):
-        if not text.strip(_DIGITS):
+        if not text.encode().translate(None, _DIGITS):
             return scale.si(float(text))
     return text
 

@@ -8,10 +8,12 @@ the reasons.
 import json
 import math
 import re
+import secrets
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
+from itertools import chain
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -36,6 +38,7 @@ __all__ = ["FORMS", "decode", "dump", "read"]
 NAMES = (*INPUTS, *LIKE, "k_range", *OPTIONS)
 _MEMBERS = 18  # of one object: the inputs and the options
 _READ = 256 * 1024  # bytes of rows that are read at a time
+_TOKEN = secrets.token_hex(16).encode()  # stands in place of a list; nobody else knows it
 _SHORT = 4096  # bytes of a list that json reads
 _ROWS = 8192  # cases that are written at a time
 
@@ -80,7 +83,7 @@ def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Col
     if _OPENS_LIST.match(text):
         kind = kind_in(query)
         return _quick_rows(text, max_batch, kind) or _rows(decode(text, large=True), max_batch, kind), {}
-    given = _columns(text) or decode(text, large=True)
+    given = _columns(text)
     if not isinstance(given, dict):
         refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
     _, rest, faults = options_of(OptionsModel, given, NAMES)
@@ -103,31 +106,28 @@ def _limit_values(text: bytearray, max_batch: int) -> None:
         raise RequestError(Kind.INVALID_VALUE, "the body has objects with more members than there are fields")
 
 
-_members = msgspec.json.Decoder(dict[str, msgspec.Raw]).decode
+def _columns(text: bytearray) -> Any:
+    """What ``json`` reads, with long lists of numbers as arrays: a text stands in place of each while it reads."""
+    parser, kept, lists, at = simdjson.Parser(), list[bytes | bytearray](), list[Any](), 0
+    while (start := text.find(b"[", at)) >= 0 and (end := text.find(b"]", start) + 1) > 0:
+        found = _numbers(parser, text[start:end]) if end - start > _SHORT else None
+        kept.append(text[at:end] if found is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists)))
+        lists += [] if found is None else [found]
+        at = end
+    given = decode(b"".join([*kept, text[at:]]), large=True)
+    if isinstance(given, dict):
+        token = _TOKEN.decode()
+        for name, value in given.items():
+            if isinstance(value, str) and value.startswith(token):
+                given[name] = lists[int(value[len(token) :])]
+    return given
 
 
-def _columns(text: bytearray) -> dict[str, Any] | None:
-    """The members of an object, long lists of numbers as arrays; None where a name may stand twice, or it is none."""
-    try:
-        found = _members(text)
-    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
-        return None
-    given, colons = dict[str, Any](), len(found)
-    for name, raw in found.items():
-        member = bytes(memoryview(raw))
-        given[name] = _numbers(member)
-        if given[name] is None:
-            given[name] = decode(member, large=True)
-            colons += member.count(b":")
-    return given if text.count(b":") == colons else None
-
-
-def _numbers(member: bytes) -> Any:
-    """A long list of numbers as an array; None for anything else, such as 1e400, which json reads."""
+def _numbers(parser: simdjson.Parser, text: bytearray) -> Any:
+    """A list of numbers as an array; None for anything else, such as 1e400, which json reads."""
     with suppress(ValueError, TypeError, RuntimeError):
-        found: Any = simdjson.Parser().parse(member) if len(member) > _SHORT else None
-        if isinstance(found, simdjson.Array) and member.count(b"[") == 1:  # it would flatten lists within
-            return np.frombuffer(found.as_buffer(of_type="d"))
+        found: Any = parser.parse(text)
+        return np.frombuffer(found.as_buffer(of_type="d"))
     return None
 
 
@@ -166,15 +166,18 @@ def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns |
         size += len(rows)
         if size > max_batch:
             raise too_large(max_batch)
-        columns = dict(zip(names, zip(*map(values, rows), strict=True), strict=True))
-        columns["k"] = tuple(math.inf if value == "rigid" else value for value in columns["k"])
-        parts.append([array("d", column) for column in columns.values()])
+        try:
+            flat = array("d", chain.from_iterable(map(values, rows)))
+        except TypeError:
+            every = chain.from_iterable(map(values, rows))
+            flat = array("d", (math.inf if value == "rigid" else value for value in every))
+        parts.append(np.frombuffer(flat).reshape(len(rows), -1).T)
         at = cut.end() if cut else len(text)
-    six = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    six = np.concatenate(parts, axis=1)
     if hertz:
         with np.errstate(over="ignore"):  # infinite, which is refused
             six[names.index("f")] *= RAD_PER_CYCLE
-    return Columns(size, six, hertz=hertz, rows=True, asked=asked)
+    return Columns(size, list(six), hertz=hertz, rows=True, asked=asked)
 
 
 def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
