@@ -7,7 +7,7 @@ Each case computes the naive number too.
 
 from __future__ import annotations
 
-from benchmarks.measuring import FINEST, ROOT, main, markdown, progress, quantity  # isort: split
+from benchmarks.measuring import ROOT, main, markdown, progress, quantity  # isort: split
 
 import csv
 import math
@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from benchmarks.marching import march
-from builder.limits import Y_RANGE
 from builder.model import ANGLE, CHART, FALL, MIN_SPEED, OK, SIGMA, STEPS, SUM_UX, slip
 from builder.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, stick_slip
 from builder.steady import border, continuous, solve, workspace
 from builder.stick import stick_excess
-from mumacro import Surrogate, closed_forms
+from mumacro import closed_forms
 from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
 
 Array = NDArray[np.float64]
@@ -312,26 +311,6 @@ def stiffness() -> str:
     return f"{markdown(header, rows, 0)}\n\nAt the reference points of large speed: max rel error {worst('tail_vinf')}."
 
 
-# --- the ends of double precision ---------------------------------------------------------------------
-
-
-def denormals() -> str:
-    """Amplitudes whose square is denormal."""
-    s = Surrogate.open(FINEST)
-    rows = []
-    w, out, orbit, _ = workspace()
-    for y in (1e-6, Y_RANGE[0], 1e-20, 1e-150):
-        v = 0.3 * y * y
-        solved = stick_slip(v, y, y - 1.0, math.nan, w, out, orbit) == OK
-        stick = f"{orbit[DURATION] / math.pi:.11f}" if solved else "not converged"
-        rows.append([f"{y:.0e}", f"{v:.0e}", stick, f"{s.stick_fraction(v, y):.11f}"])
-    text = "v~ = 0.3 y~^2:\n\n" + markdown(("y~", "v~", "stick fraction, solved", "of the table"), rows, 0)
-    rows = []
-    for v, y in ((5e-324, 0.5), (5e-324, 2.0), (1e-310, 2.0), (1e-310, 1.0), (1.0, 5e-324)):
-        rows.append([f"{v:g}", f"{y:g}", f"{s.mu_ratio(v, y):.12g}"])
-    return text + "\n\nThe table `mumacro-1e-12` at denormal inputs:\n\n" + markdown(("v~", "y~", "mu~"), rows, 0)
-
-
 SECTIONS: dict[str, Callable[[], str]] = {
     "grazing": grazing,
     "surplus": surplus,
@@ -342,7 +321,6 @@ SECTIONS: dict[str, Callable[[], str]] = {
     "small_amplitude": small_amplitude,
     "short_stick": short_stick,
     "stiffness": stiffness,
-    "denormals": denormals,
 }
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Convergence of each chart, and range of each limit.
+"""Range of each limit of the model.
 
 python benchmarks/model_facts.py [--write]
 """
 
 from __future__ import annotations
 
-from benchmarks.measuring import FINEST, main, markdown, progress, quantity  # isort: split
+from benchmarks.measuring import FINEST, main, markdown, quantity  # isort: split
 
 import math
 from collections.abc import Callable
@@ -17,60 +17,16 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from benchmarks.validation import orbit
-from builder.blocks import tabulated
-from builder.steady import REGIME, STICK_SLIP, border, solve, solve_raw, workspace
-from builder.sweep import Sweep
+from builder.steady import border, solve
 from mumacro import Surrogate, closed_forms
-from mumacro.cells import chebyshev_coefficients, interpolation_matrix, nodes
-from mumacro.charts import CHARTS, NAMES, SOURCES
-from mumacro.settling import settling
+from mumacro.charts import SOURCES
 
 Array = NDArray[np.float64]
-SIZES = (8, 16, 24, 32, 48)
-POINTS = 1000
 
 
 def g(x: float) -> str:
     """Two significant digits."""
     return quantity(float(x), 2)
-
-
-def _block_errors(index: int, s: Surrogate, sweep: Sweep) -> list[float]:
-    """Largest errors of the n x n interpolants of the block's tabulated function, on random points of its rectangle."""
-    chart = CHARTS[index]
-
-    def values(a: Array, b: Array) -> Array:
-        return tabulated(index, *chart.point(a, b, s.border), sweep)["mu_ratio"]
-
-    rng = np.random.default_rng(3)
-    axes = (chart.a, chart.b)
-    a, b = (rng.uniform(axis.low + 1e-3 * (axis.high - axis.low), axis.high, POINTS) for axis in axes)
-    b = np.minimum(b, chart.b.high - 1e-3 * (chart.b.high - chart.b.low))
-    exact = values(a, b)
-    errors = []
-    for n in SIZES:
-        grid = [nodes(n, axis.low, axis.high) for axis in axes]
-        c = chebyshev_coefficients(values(grid[0][:, None], grid[1][None, :]))
-        left, right = (
-            interpolation_matrix(n, (2.0 * x - axis.low - axis.high) / (axis.high - axis.low))
-            for x, axis in zip((a, b), axes, strict=True)
-        )
-        errors.append(float(np.abs(np.einsum("pi,ij,pj->p", left, c, right) - exact).max()))
-    return errors
-
-
-def blocks() -> str:
-    """Error of every block's interpolant by the number of nodes."""
-    s = Surrogate.open(FINEST)
-    rows = []
-    with Sweep(1) as sweep:
-        for index, name in enumerate(NAMES):
-            progress(name)
-            rows.append([name, *map(g, _block_errors(index, s, sweep))])
-    return (
-        "Largest error of the tabulated quantity of a block, interpolated between n x n Chebyshev nodes, on "
-        f"{POINTS:,} random points of its rectangle:\n\n"
-    ) + markdown(("block", *(f"{n} x {n}" for n in SIZES)), rows)
 
 
 def limits() -> str:
@@ -209,54 +165,6 @@ def next_terms() -> str:
     return f"y~ = 0.1, solved; both differ from the derived terms by O(y~^2):\n\n{markdown(header, rows, 0)}"
 
 
-def _forgotten(v: float, y: float, starts: Array, share: float = 0.01, steps: int = 1000) -> float:
-    """Periods until the last of the ``starts`` (2, n) has come within ``share`` of its first distance to the cycle."""
-    phase = 2.0 * math.pi * np.arange(steps + 1) / steps
-    ahead, across = 2.0 * math.pi * v / steps, y * np.diff(np.sin(phase))
-    u = np.concatenate([starts, np.zeros((2, 1))], axis=1)
-    for _ in range(math.ceil(4.0 / v)):  # the last column becomes the steady cycle
-        u[:, -1:] = _period(u[:, -1:], ahead, across)
-    first = np.hypot(*(u[:, :-1] - u[:, -1:]))
-    for period in range(1, 100_000):
-        u = _period(u, ahead, across)
-        if np.all(np.hypot(*(u[:, :-1] - u[:, -1:])) <= share * first):
-            return float(period)
-    return math.inf
-
-
-def _period(u: Array, ahead: float, across: Array) -> Array:
-    u = u.copy()
-    for step in across:
-        u[0] += ahead
-        u[1] += step
-        u /= np.maximum(np.hypot(u[0], u[1]), 1.0)
-    return u
-
-
-def settle() -> str:
-    """Periods to 1 % by the table and by marching 40 random starts."""
-    s = Surrogate.open(FINEST)
-    rng = np.random.default_rng(1)
-    angle, radius = rng.uniform(0.0, 2.0 * math.pi, 40), np.sqrt(rng.uniform(0.0, 1.0, 40))
-    starts = radius * np.array([np.cos(angle), np.sin(angle)])
-    rows = []
-    for v, y in ((0.5, 0.3), (0.1, 0.2), (0.05, 0.1), (0.1, 0.6), (0.02, 0.5), (0.05, 1.0), (0.05, 1.5), (0.3, 3.0)):
-        found = settling(s, mu0=1.0, Fz=1.0, k=1.0, y0=y, omega=1.0, v0=v)
-        w, out, orbit_, res = workspace()
-        solve_raw(v, y, y - 1.0, w, out, orbit_, res)
-        sticks = res[REGIME] == STICK_SLIP
-        turned = "1"
-        if sticks:
-            moved = y * (math.cos(orbit_[4] + orbit_[0]) - math.cos(orbit_[4]))
-            turned = f"{(1.0 - 0.5 * ((v * orbit_[0]) ** 2 + moved * moved)) ** 2:.4f}"
-        cells = [f"{found.slip_path:.4f}", turned, f"{found.periods:.2f}", f"{found.periods_any:.2f}"]
-        rows.append(
-            [f"{v:g}", f"{y:g}", "stick-slip" if sticks else "continuous", *cells, f"{_forgotten(v, y, starts):g}"]
-        )
-    header = ("v~", "y~", "regime", "S", "cos^2(th1 - th0)", "periods, small", "any", "marched, slowest of 40")
-    return markdown(header, rows, 3)
-
-
 def corner() -> str:
     """The corrections to the normal form, in polar coordinates."""
     rows = []
@@ -273,7 +181,6 @@ def corner() -> str:
 
 
 SECTIONS: dict[str, Callable[[], str]] = {
-    "blocks": blocks,
     "limits": limits,
     "outer": outer,
     "layer": layer,
@@ -281,7 +188,6 @@ SECTIONS: dict[str, Callable[[], str]] = {
     "creep": creep,
     "contact": contact,
     "next_terms": next_terms,
-    "settle": settle,
 }
 
 if __name__ == "__main__":

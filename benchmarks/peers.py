@@ -13,11 +13,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.interpolate import NdBSpline, RectBivariateSpline, RegularGridInterpolator, interpn, make_interp_spline
-from scipy.sparse.linalg import spsolve
+from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make_interp_spline
 
 import builder
 from builder.sweep import Sweep
@@ -28,7 +26,6 @@ Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
 
 SQUARE = (1e-3, 1e3)  # of v~ and of y~
-SPSOLVE_LIMIT = 256  # nodes a side; with more, the sparse factorisation takes minutes and gigabytes
 
 
 @dataclass(frozen=True)
@@ -74,30 +71,7 @@ def _pairs(v: Array, y: Array) -> Array:
     return out
 
 
-def _tensor_spline(x: Array, values: Array, k: int) -> Evaluate:
-    """The interpolating tensor spline, one banded solve per axis instead of one sparse system for all nodes."""
-    first = make_interp_spline(x, values, k=k, axis=0)
-    second = make_interp_spline(x, first.c.T, k=k, axis=0)
-    spline = NdBSpline((first.t, second.t), np.ascontiguousarray(second.c.T), k)
-
-    def evaluate(v: Array, y: Array) -> Array:
-        out: Array = spline(_pairs(v, y))
-        return out
-
-    return evaluate
-
-
-def _rectangle_spline(x: Array, values: Array, k: int) -> Evaluate:
-    spline = RectBivariateSpline(x, x, values, kx=k, ky=k)
-
-    def evaluate(v: Array, y: Array) -> Array:
-        out: Array = spline.ev(np.log(v), np.log(y))
-        return out
-
-    return evaluate
-
-
-def _map_coordinates(x: Array, values: Array, order: Literal[1, 3, 5]) -> Evaluate:
+def _map_coordinates(x: Array, values: Array, order: Literal[1, 3]) -> Evaluate:
     filtered: Array = ndimage.spline_filter(values, order=order, mode="nearest") if order > 1 else values
     start, scale = x[0], 1.0 / (x[1] - x[0])
 
@@ -114,36 +88,21 @@ def _map_coordinates(x: Array, values: Array, order: Literal[1, 3, 5]) -> Evalua
 
 
 def on_grid(values: Array) -> Iterator[Contender]:
-    """Every interpolator on the plain grid that ``values`` (n, n) were solved on."""
+    """Interpolators on the plain grid that ``values`` (n, n) were solved on.
+
+    Others of scipy and xarray give the errors of these, for they interpolate alike, and take longer.
+    """
     n = values.shape[0]
     x = np.log(grid_axis(n))
-    axes = (x, x)
-
-    def entry(name: str, evaluate: Evaluate, copies: int = 1) -> Contender:
-        return Contender(name, f"{n} x {n}", evaluate, copies * values.nbytes, n * n)
-
-    linear = RegularGridInterpolator(axes, values)
-    yield entry("scipy RegularGridInterpolator linear", lambda v, y: np.asarray(linear(_pairs(v, y))))
-    if n <= SPSOLVE_LIMIT:
-        cubic = RegularGridInterpolator(axes, values, method="cubic", solver=spsolve)
-        yield entry("scipy RegularGridInterpolator cubic, spsolve", lambda v, y: np.asarray(cubic(_pairs(v, y))), 2)
-    for k in (3, 5):
-        yield entry(f"scipy NdBSpline k={k}", _tensor_spline(x, values, k))
-    for k in (3, 5):
-        yield entry(f"scipy RectBivariateSpline.ev k={k}", _rectangle_spline(x, values, k))
-    logarithm = _rectangle_spline(x, np.log(values), 3)
-    yield entry("scipy RectBivariateSpline.ev k=3 of ln mu~", lambda v, y: np.exp(logarithm(v, y)))
-    orders: tuple[Literal[1, 3, 5], ...] = (1, 3, 5)
-    for order in orders:
-        yield entry(f"scipy map_coordinates order {order}", _map_coordinates(x, values, order))
-    yield entry("scipy interpn linear", lambda v, y: np.asarray(interpn(axes, values, _pairs(v, y))))
-    labelled = xr.DataArray(values, coords={"v": x, "y": x}, dims=("v", "y"))
-
-    def through_xarray(v: Array, y: Array) -> Array:
-        at = {"v": xr.DataArray(np.log(v), dims="p"), "y": xr.DataArray(np.log(y), dims="p")}
-        return np.asarray(labelled.interp(at, assume_sorted=True).values)
-
-    yield entry("xarray interp linear", through_xarray)
+    linear, cubic = RegularGridInterpolator((x, x), values), RectBivariateSpline(x, x, values)
+    methods: dict[str, Evaluate] = {
+        "scipy RegularGridInterpolator linear": lambda v, y: np.asarray(linear(np.log(np.stack((v, y), axis=1)))),
+        "scipy RectBivariateSpline.ev k=3": lambda v, y: np.asarray(cubic.ev(np.log(v), np.log(y))),
+        "scipy map_coordinates order 1": _map_coordinates(x, values, 1),
+        "scipy map_coordinates order 3": _map_coordinates(x, values, 3),
+    }
+    for name, evaluate in methods.items():
+        yield Contender(name, f"{n} x {n}", evaluate, values.nbytes, n * n)
 
 
 def fitted_to_the_border(sweep: Sweep, n: int) -> Contender:

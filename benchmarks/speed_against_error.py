@@ -11,7 +11,6 @@ from __future__ import annotations
 from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
 import math
-import os
 import timeit
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,18 +20,15 @@ from pathlib import Path
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
 from benchmarks import peers
 from benchmarks.peers import Contender
 from builder.differences import differences
 from builder.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
-from mumacro.inverse import solve_for
 
 Array = NDArray[np.float64]
 OURS, PEER, EXACT = "ours", "peer", "exact"
-CORES = os.cpu_count() or 1
 TRIAL = 2000  # points of the trial that determines the points of one round
 BUDGET = 2.0  # seconds allowed for one round of one contender; slower ones are timed on fewer points
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
@@ -68,9 +64,9 @@ def draw(n: int, seed: int, low: float = peers.SQUARE[0]) -> tuple[Array, Array]
     return v, np.exp(rng.uniform(np.log(peers.SQUARE[0]), np.log(high), n))
 
 
-def tables(threads: int = 1) -> list[Surrogate]:
+def tables() -> list[Surrogate]:
     """The committed tables, coarse to fine."""
-    opened = [Surrogate.open(path, threads) for path in (ROOT / "tables").glob("*.nc")]
+    opened = [Surrogate.open(path, threads=1) for path in (ROOT / "tables").glob("*.nc")]
     return sorted(opened, key=lambda s: -s.tolerance)
 
 
@@ -112,23 +108,17 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     work: dict[str, Callable[[], object]] = {
         str(i): partial(c.evaluate, v[: used[str(i)]], y[: used[str(i)]]) for i, (_, c) in enumerate(entries)
     }
-    on_all_cores = {s.id: s for s in tables(CORES)}
-    parallel: dict[str, Callable[[], object]] = {
-        str(i): partial(on_all_cores[c.name].mu_ratio, v, y) for i, (kind, c) in enumerate(entries) if kind == OURS
-    }
     logs = np.empty((points, 2))
     work["logs"] = lambda: (np.log(v, out=logs[:, 0]), np.log(y, out=logs[:, 1]))
     direct = np.stack([v, y, y - 1.0], axis=1)[: 500 if quick else 10_000]
     work["direct"] = lambda: solve_chunk("full", direct)
     progress(f"{rounds} rounds of {len(work)} contenders")
-    timed, cores = best_of(rounds, work, clock), best_of(rounds, parallel)
+    timed = best_of(rounds, work, clock)
     rows: list[Row] = []
     for i, (kind, c) in enumerate(entries):
         error = np.abs(c.evaluate(v_true, y_true) - truth)
-        rest = (*spread(error, truth), c.bytes, c.solves)
-        rows.append(Row(kind, c.name, c.size, timed.best[str(i)] / used[str(i)] * 1e9, *rest))
-        if str(i) in parallel:
-            rows.append(Row(OURS, c.name, f"{CORES} threads", cores.best[str(i)] / points * 1e9, *rest))
+        ns = timed.best[str(i)] / used[str(i)] * 1e9
+        rows.append(Row(kind, c.name, c.size, ns, *spread(error, truth), c.bytes, c.solves))
     ns = timed.best["logs"] / points * 1e9
     rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))
     ns = timed.best["direct"] / len(direct) * 1e9
@@ -136,31 +126,8 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     return rows, timed.note()
 
 
-def one_at_a_time(surrogate: Surrogate, number: int) -> str:
-    """Microseconds of calls with plain floats, and ns a point of the call with six dimensional columns."""
-    n = 64
-    axis = np.log(peers.grid_axis(n))
-    values = np.asarray(surrogate.mu_ratio(np.exp(axis)[:, None], np.exp(axis)[None, :]))
-    spline, regular = RectBivariateSpline(axis, axis, values), RegularGridInterpolator((axis, axis), values)
-    log = np.log
-    calls: dict[str, Callable[[], object]] = {
-        f"**{surrogate.id}** `s.mu_ratio(v, y)`": lambda: surrogate.mu_ratio(0.1, 0.5),
-        f"**{surrogate.id}** `s.evaluate(mu0, Fz, k, y0, omega, v0)`": partial(
-            surrogate.evaluate, mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, omega=1.3e5, v0=0.01
-        ),
-        "scipy RectBivariateSpline.ev k=3": lambda: spline.ev(log(0.1), log(0.5)),
-        "scipy RegularGridInterpolator linear": lambda: regular((log(0.1), log(0.5))),
-    }
-    rows = []
-    for name, call in calls.items():
-        call()
-        best = min(timeit.repeat(call, number=number, repeat=5)) / number
-        rows.append([name, quantity(best * 1e6)])
-    return markdown(("one case a call", "microseconds"), rows)
-
-
 def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
-    """Gradient, power, stick fraction and the inverse question: time, largest error, largest bound of every table."""
+    """Gradient, power and stick fraction: time, largest error, largest bound of every table."""
     v, y = draw(points, seed=4)
     few = 200 if quick else 5_000
     v_few, y_few = draw(few, seed=5)
@@ -189,34 +156,11 @@ def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
             for name, (kind, error, bound) in found.items():
                 ns = quantity(timed[name] / points * 1e9)
                 rows.append([f"**{s.id}** {name}", kind, ns, quantity(error.max()), quantity(float(bound.max()))])
-            targets = np.linspace(0.05, 0.95, 19 if quick else 1_000)
-            inverse = partial(solve_for, s, "v0", targets, {**case, "y0": 2.0})
-            seconds = best_of(rounds, {"": inverse}, clock).best[""]
-            roots = np.array([root[0].value for root in inverse().roots])
-            error = np.abs(sweep.solve("full", roots, np.full(roots.size, 2.0))["mu_ratio"] - targets)
-            ns = quantity(seconds / targets.size * 1e9)
-            rows.append(
-                [f"**{s.id}** v0 for a wanted mu_macro", "mu~ at the root, absolute", ns, quantity(error.max()), "-"]
-            )
     return markdown(("quantity", "error", "ns/point", "max error", "max bound"), rows, 2)
 
 
-def verdict(rows: list[Row]) -> str:
-    """The peers that beat a table, one thread against one thread: faster, at its largest error or less."""
-    theirs = [row for row in rows if row.kind == PEER]
-    ours = [row for row in rows if row.kind == OURS and "threads" not in row.size]
-    lines = []
-    for table in ours:
-        better = sorted((p for p in theirs if p.ns < table.ns and p.max_abs <= table.max_abs), key=lambda p: p.max_abs)
-        names = "; ".join(f"{p.name} {p.size} ({quantity(p.ns)} ns, {quantity(p.max_abs)})" for p in better)
-        lines.append(f"- Faster than {table.name} ({quantity(table.ns)} ns) at its largest error: {names or 'none'}.")
-    beaten = [p for p in theirs if any(t.ns <= p.ns and t.max_abs <= p.max_abs for t in ours)]
-    lines.append(f"- One of the tables is both faster and closer than {len(beaten)} of the {len(theirs)} peers.")
-    return "\n".join(lines)
-
-
 def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> str:
-    """All methods, where a peer wins, one case a call, the other quantities; and the picture."""
+    """All methods, the other quantities; and the picture."""
     points = 20_000 if quick else points
     numba.set_num_threads(1)
     rows, note = compare(points, quick, rounds, clock)
@@ -224,13 +168,10 @@ def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> st
         plot(rows, RESULTS / "speed_against_error.png")
     return "\n\n".join(
         [
-            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread unless the row states more; "
+            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread; "
             f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves. Bytes are "
             "those of the data in memory.",
             markdown(HEADER, [r.cells() for r in rows], 2),
-            "Where a peer wins, and by how much (ns a point and error in brackets):",
-            verdict(rows),
-            one_at_a_time(tables()[-1], 200 if quick else 20_000),
             other_quantities(points, rounds, clock, quick),
         ]
     )
@@ -241,17 +182,23 @@ def plot(rows: list[Row], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.5, 6.0), layout="constrained")
+    figure = Figure(figsize=(9.5, 5.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(xscale="log", yscale="log", ylabel="ns per point, one thread")
     axes.set_xlabel(r"largest error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000")
-    shown = [row for row in rows if row.max_abs == row.max_abs and "threads" not in row.size]
+    colors = iter(("#c1272d", "#1f5fa8", "#2a8c8c", "#8a8a8a", "#b07aa1", "#e08214", "#222222"))
+    shown = [row for row in rows if row.max_abs == row.max_abs]
     for name in dict.fromkeys("our tables" if row.kind == OURS else row.name for row in shown):
         line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.name)]
-        own = {"color": "#c1272d", "lw": 2.2} if line[0].kind == OURS else {"lw": 1.0}
-        axes.plot([row.max_abs for row in line], [row.ns for row in line], "o-", label=name, **own)
+        width = 2.2 if line[0].kind == OURS else 1.0
+        axes.plot(
+            [row.max_abs for row in line], [row.ns for row in line], "o-", label=name, color=next(colors), lw=width
+        )
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], minor=False)
+    axes.minorticks_off()
     axes.grid(color="#e4e4e4")
-    axes.legend(fontsize=8, ncols=2)
+    axes.legend(fontsize=9, loc="upper left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=100, metadata={"Software": None})
 

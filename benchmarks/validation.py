@@ -235,17 +235,6 @@ def master_curve() -> str:
     return markdown(header, rows)
 
 
-def collapse() -> str:
-    """Fig. 9: the spread of the exact curves, and their course beyond the border."""
-    x = np.linspace(0.0, 1.0, 2001)
-    curves = np.array([rise(float(y), x) for y in np.arange(1, 10) * 0.1])
-    rows = []
-    for count, top in ((3, 0.3), (5, 0.5), (7, 0.7), (9, 0.9)):
-        spread = np.ptp(curves[:count], axis=0)
-        rows.append([f"0.1 to {top}", quantity(float(spread.max())), f"{x[int(np.argmax(spread))]:.2f}"])
-    return markdown(["y~", "largest spread of the curves", "at v~/v~crit"], rows)
-
-
 def plateau() -> str:
     """The size of the slow change beyond the border."""
     rows = []
@@ -367,7 +356,6 @@ SECTIONS: dict[str, Callable[[], str]] = {
     "border_ranges": border_ranges,
     "constants": constants,
     "master_curve": master_curve,
-    "collapse": collapse,
     "plateau": plateau,
     "continuous": continuous,
     "slow_angle": slow_angle,

@@ -1,4 +1,4 @@
-"""Effects of neglected partial slip, inertia and rate; typical contacts on the map.
+"""Effects of neglected partial slip; typical contacts on the map.
 
 python benchmarks/validity.py [--write]
 """
@@ -31,21 +31,6 @@ def partial_slip() -> str:
         change = np.abs(s.ratio_with_bound(v, y, contact="ball")[0] - s.mu_ratio(v, y))
         rows.append([f"{low:g} to {high:g}", quantity(float(change.max()))])
     return markdown(("y~", "largest difference of mu~, ball and one spring"), rows)
-
-
-def inertia() -> str:
-    """Amplitude at the contact over the imposed one, by frequency over the natural frequency of a mass on a spring."""
-    rows = [[f"{ratio:g}", f"{1.0 / (1.0 - ratio * ratio):.4f}"] for ratio in (0.05, 0.1, 0.2, 0.3, 0.5)]
-    return markdown(("omega / omega_n", "amplitude at the contact over the imposed one"), rows, 0)
-
-
-def rate() -> str:
-    """Spread of the local coefficient over a period by the logarithmic law."""
-    rows = [
-        [f"{spread:g}", *(f"{100.0 * 0.01 * math.log(spread) / mu0:.0f}" for mu0 in (0.2, 0.4, 0.8))]
-        for spread in (10.0, 1e2, 1e3)
-    ]
-    return markdown(("fastest over slowest slip", *(f"change of mu0 = {m} [%]" for m in (0.2, 0.4, 0.8))), rows)
 
 
 def contacts() -> Iterator[tuple[str, Contact, dict[str, Any]]]:
@@ -81,8 +66,6 @@ def rigs() -> str:
 
 SECTIONS: dict[str, Callable[[], str]] = {
     "partial_slip": partial_slip,
-    "inertia": inertia,
-    "rate": rate,
     "rigs": rigs,
 }
 

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from typing import Any
 from urllib.parse import urlencode
 from urllib.request import Request, urlopen
 
@@ -9,12 +10,12 @@ BASE = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:8000"
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}  # SI units
 
 
-def get(path, **query):
+def get(path: str, **query: Any) -> Any:
     with urlopen(f"{BASE}{path}?{urlencode(query)}", timeout=30) as response:
         return json.load(response)
 
 
-def post(path, body):
+def post(path: str, body: dict[str, Any]) -> Any:
     request = Request(f"{BASE}{path}", json.dumps(body).encode(), {"Content-Type": "application/json"})
     with urlopen(request, timeout=30) as response:
         return json.load(response)

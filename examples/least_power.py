@@ -12,6 +12,7 @@ The component, with exact gradients from the table, is that of openmdao_componen
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import openmdao.api as om
@@ -26,7 +27,7 @@ INPUTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 3e-6, "omega": 3e4, "v0": 0.01
 MASS, QUALITY = 0.005, 1000.0  # [kg], [-]
 
 
-def optimise(surrogate, target=TARGET):
+def optimise(surrogate: Surrogate, target: float = TARGET) -> Any:
     """The finished problem: ``y0`` and ``omega`` at least total power under mu_macro <= target."""
     problem = om.Problem(reports=None)
     problem.model.add_subsystem("friction", Friction(surrogate=surrogate, power=True), promotes=["*"])
@@ -50,7 +51,7 @@ def optimise(surrogate, target=TARGET):
     return problem
 
 
-def main():
+def main() -> None:
     surrogate = Surrogate.open(sys.argv[1] if len(sys.argv) > 1 else TABLE)
     problem = optimise(surrogate)
     y0, omega = problem.get_val("y0")[0], problem.get_val("omega")[0]

@@ -26,7 +26,7 @@ MODEL = """
 BELT, FORCE, STIFFNESS, OMEGA, REST = 0.01, 10.0, 1e6, 1.3e5, 5e-4  # m/s, N, N/m, rad/s, m/s
 
 
-def swing(table, y0, until=3.0, watched=1.0):
+def swing(table: mumacro.Surrogate, y0: float, until: float = 3.0, watched: float = 1.0) -> float:
     """Peak to peak [m] of the mass during the last ``watched`` seconds; the shaker's amplitude is ``y0`` [m]."""
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
@@ -40,7 +40,7 @@ def swing(table, y0, until=3.0, watched=1.0):
         mujoco.mj_step(model, data)
         if data.time > until - watched:
             seen.append(data.qpos[0])
-    return max(seen) - min(seen)
+    return float(max(seen) - min(seen))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 A value out of bounds raises AnalysisError, so that a line search steps back.
 """
 
+from typing import Any
+
 import numpy as np
 import openmdao.api as om
 
@@ -12,12 +14,12 @@ from mumacro.inputs import FIELDS, UNITS
 class Friction(om.ExplicitComponent):
     """Six inputs in SI -> mu_macro [-], with the option ``power`` also oscillation_power [W], that of the shaker."""
 
-    def initialize(self):
+    def initialize(self) -> None:
         self.options.declare("surrogate", default=None, types=Surrogate, allow_none=True, recordable=False)
         self.options.declare("vec_size", default=1, types=int, lower=1)
         self.options.declare("power", default=False, types=bool)
 
-    def setup(self):
+    def setup(self) -> None:
         size, self.table = self.options["vec_size"], self.options["surrogate"] or Surrogate.open()
         for name in FIELDS:
             self.add_input(name, np.ones(size), units=None if UNITS[name] == "-" else UNITS[name])
@@ -26,7 +28,7 @@ class Friction(om.ExplicitComponent):
             self.add_output("oscillation_power", np.ones(size), units="W")
         self.declare_partials("*", "*", rows=np.arange(size), cols=np.arange(size))
 
-    def answer(self, inputs, gradient=False):
+    def answer(self, inputs: Any, gradient: bool = False) -> tuple[Any, Any, Any]:
         case = {name: np.asarray(inputs[name]) for name in FIELDS}
         if self.options["power"] and np.isinf(case["k"]).any():
             raise om.AnalysisError("the power of a rigid contact is not defined: give a finite k, or power=False")
@@ -36,14 +38,14 @@ class Friction(om.ExplicitComponent):
         except InputError as error:
             raise om.AnalysisError(str(error)) from error
 
-    def compute(self, inputs, outputs):
+    def compute(self, inputs: Any, outputs: Any) -> None:
         found, force, omega = self.answer(inputs)
         outputs["mu_macro"] = found.mu_macro
         if self.options["power"]:
             share = self.table.power(found.v_tilde, found.y_tilde)
             outputs["oscillation_power"] = force * found.length_scale * omega * share
 
-    def compute_partials(self, inputs, partials):
+    def compute_partials(self, inputs: Any, partials: Any) -> None:
         found, force, omega = self.answer(inputs, gradient=True)
         for name, slope in found.gradient.items():
             partials["mu_macro", name] = slope

@@ -19,22 +19,11 @@ from http.client import HTTPException
 from typing import Any
 
 from benchmarks.measuring import main, markdown
-from tests.serving import CASE, Server, serving
+from tests.serving import CASE, Server, connect, head, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
 BATCH = "/v1/mu-macro/batch"
 EVERYTHING = ["groups", "limits", "regime_certain", "gradient", "stick_fraction", "power", "settling"]
-
-
-def connect(server: Server) -> socket.socket:
-    """A connection."""
-    return socket.create_connection(("127.0.0.1", server.port), timeout=120)
-
-
-def head(path: str, kind: str, length: int | None) -> bytes:
-    """The head of a POST; without a length the body comes in chunks."""
-    size = "Transfer-Encoding: chunked" if length is None else f"Content-Length: {length}"
-    return f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\n{size}\r\n\r\n".encode()
 
 
 def held(server: Server, number: int, text: bytes, seconds: float = 3.0) -> None:
@@ -54,7 +43,7 @@ def posted(server: Server, number: int, kind: str, body: bytes) -> set[int]:
 
     def ask() -> None:
         with connect(server) as raw:
-            threading.Thread(target=sent, args=(raw, head(BATCH, kind, len(body)) + body)).start()
+            threading.Thread(target=sent, args=(raw, head(BATCH, len(body), kind) + body)).start()
             text = b""
             with suppress(OSError):
                 while piece := raw.recv(1 << 16):
@@ -96,7 +85,7 @@ def silent(server: Server, share: float) -> None:
 
 def waiting_bodies(server: Server, share: float) -> None:
     """Bodies of 64 KB that lack their last byte."""
-    text = head("/v1/mu-macro", "application/json", 65_000) + b" " * 64_999
+    text = head("/v1/mu-macro", 65_000) + b" " * 64_999
     held(server, round(CONNECTIONS * share), text)
 
 
@@ -134,7 +123,7 @@ def strange_words(server: Server, share: float) -> None:
 
 def idle_streams(server: Server, share: float) -> None:
     """Streams without a line; the question of a person is answered beside them."""
-    text = head(BATCH, "application/x-ndjson", None)
+    text = head(BATCH, None, "application/x-ndjson")
     with ExitStack() as stack:
         for _ in range(round(CONNECTIONS * share)):
             stack.enter_context(connect(server)).sendall(text)

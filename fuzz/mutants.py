@@ -95,7 +95,7 @@ FAULTS = [Fault(*row) for row in (
     ("service/quantities.py", "ENOUGH = 0.1 ", "ENOUGH = 0.2 ", f"{TIGHT} -k standard"),
     ("service/quantities.py", "SAMPLES = 256", "SAMPLES = 16", f"{TIGHT} -k standard"),
     ("service/quantities.py", "Part(\"std_bound\"", "Part(\"std_bund\"", f"{TIGHT} -k standard"),
-    ("service/static/page/inputs.js", "(value / 100) * valueOf", "value * valueOf", "tests/test_page_input.py -m ''"),
+    ("service/static/page/inputs.js", "Math.sqrt(low) * Math.sqrt(high)", "(low + high) / 2", "tests/test_page.py -m '' -k typed"),
 )]
 # fmt: on
 

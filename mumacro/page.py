@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
-from mumacro.inputs import POSITIVE, SI, UNITS_OF, Scale, refusal
+from mumacro.inputs import BOUNDS, POSITIVE, SI, UNITS_OF, Scale, refusal
 from mumacro.surrogate import Surrogate
 
 __all__ = ["POLICY", "map_of", "names"]
@@ -42,6 +43,7 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
         }
         for name, known in UNITS_OF.items()
     }  # fmt: skip
+    inputs[AMPLITUDE] = {**inputs["Fz"], "bound": BOUNDS["y0"], "positive": False}
     geometries = {
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]} for name, one in GEOMETRIES.items()
     }

@@ -11,32 +11,10 @@ PATIENCE_S = 120  # a browser on a busy machine can be slow
 #: the case that the page starts with
 START = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
 
-#: a service that knows contacts, directions, intervals of k, materials and fits, and answers as for one spring across
-KNOWING = """async (path, options = {}) => {
-  window.asked ??= [];
-  const say = (body) => new Response(JSON.stringify(body));
-  if (path.includes('names.json')) {
-    const told = await (await real(path)).json();
-    return say({ ...told, knows: [...told.knows, 'contact', 'direction', 'k_range', 'stiffness', 'fit'] });
-  }
-  if (options.method !== 'POST') return real(path, options);
-  const { contact, direction, k_range, Fz_amplitude, include = [], ...body } = JSON.parse(options.body);
-  window.asked.push([path, JSON.parse(options.body)]);
-  if (path === 'v1/stiffness') return say({ geometry: body.geometry, k: 1.307e7, contact: 'ball' });
-  if (path === 'v1/fit') return say({
-    values: { k: 1.3e6, mu0: 0.29 }, std: { k: 2e4, mu0: null }, interval: { k: [1.26e6, null], mu0: [0.28, 0.3] },
-    solutions: [{ k: 1.3e6, mu0: 0.29 }, { k: 'rigid', mu0: 0.3 }], warnings: ['mu0 is not determined'],
-    reduced_chi2: 1.25, curve: { v0: [0.001, 0.1], mu_macro: [0.1, 0.2], low: [0.05, 0.15], high: [0.15, 0.25] },
-  });
-  if (direction === 'normal' && body.along !== 'y0') body.y0 = 1e-6;
-  if (path === 'v1/mu-macro') body.include = include.filter((one) => one !== 'model');
-  const ask = async (k) => (await real(path, { ...options, body: JSON.stringify({ ...body, k }) })).json();
-  const model = [{ row: 'k is known', text: 'k known to 10 % leaves mu_macro uncertain by 6 %', effect: 1e-4 }];
-  if (!k_range) return say({ ...(await ask(body.k)), ...(include.includes('model') ? { model, digits: 6 } : {}) });
-  const [soft, stiff] = await Promise.all(k_range.map(ask));
-  const middle = (a, b) => (a.map ? a.map((one, i) => (one + b[i]) / 2) : (a + b) / 2);
-  const [mu_macro_high, mu_macro_low] = [soft.mu_macro, stiff.mu_macro];
-  return say({ ...soft, mu_macro: middle(mu_macro_low, mu_macro_high), mu_macro_low, mu_macro_high });
+#: the service as it is; what it is asked is kept, for Page.asked
+RECORDED = """(path, options = {}) => {
+  (window.asked ??= []).push([path, options.body && JSON.parse(options.body)]);
+  return real(path, options);
 }"""
 
 
@@ -120,9 +98,6 @@ class Page:
         """A number as the page shows it."""
         return float(f"{value:.{digits - 1}e}")
 
-    def number(self, selector="#mu"):
-        return float(self.text(selector))
-
     def run(self, script):
         return self.browser.execute_async_script(
             f"const done = arguments[arguments.length - 1]; (async () => {{ {script} }})().then(done);"
@@ -137,21 +112,44 @@ class Page:
         )
         return self
 
+    def until(self, found, told):
+        """What ``found()`` is as soon as it is true."""
+        deadline = time.monotonic() + PATIENCE_S
+        while not (value := found()):
+            assert time.monotonic() < deadline, told()
+            time.sleep(0.03)
+        return value
+
+    def find(self, selector):
+        return self.browser.find_element("css selector", selector)
+
+    def count(self, selector):
+        return len(self.browser.find_elements("css selector", selector))
+
     def text(self, selector):
         return self.run(f"return document.querySelector({selector!r}).textContent;")
+
+    def texts(self, selector):
+        return self.run(f"return [...document.querySelectorAll({selector!r})].map((one) => one.textContent);")
+
+    def number(self, selector="#mu"):
+        return float(self.text(selector))
+
+    def shown(self):
+        """Names and values beside the result."""
+        return dict(zip(self.texts("dt"), self.texts("dd"), strict=True))
 
     def value(self, selector):
         return self.find(selector).get_property("value")
 
     def wait_for(self, selector, pattern):
-        deadline = time.monotonic() + PATIENCE_S
-        while not (found := re.search(pattern, self.text(selector))):
-            assert time.monotonic() < deadline, f"{selector} is {self.text(selector)!r}, not {pattern}"
-            time.sleep(0.03)
-        return found
+        return self.until(
+            lambda: re.search(pattern, self.text(selector)),
+            lambda: f"{selector} is {self.text(selector)!r}, not {pattern}",
+        )
 
-    def find(self, selector):
-        return self.browser.find_element("css selector", selector)
+    def wait_until_shown(self, selector):
+        self.until(lambda: self.find(selector).is_displayed(), lambda: f"{selector} does not appear")
 
     def type(self, selector, text, commit=True):
         from selenium.webdriver import Keys
@@ -159,29 +157,18 @@ class Page:
         field = self.find(selector)
         field.send_keys(Keys.CONTROL + "a", Keys.NULL, text or Keys.DELETE)
         if commit:
-            field.send_keys(Keys.ENTER)
-            self.settle_unless_bad()
+            self.press(selector, "ENTER")
 
-    def settle_unless_bad(self):
-        # a request starts one frame after the value is read
-        self.run("await new Promise((next) => requestAnimationFrame(() => requestAnimationFrame(next)));")
-        if self.run("return document.querySelector('#main').dataset.asking;") == "true":
-            self.settle()
+    def press(self, selector, *keys):
+        from selenium.webdriver import Keys
 
-    def wait_until_shown(self, selector):
-        deadline = time.monotonic() + PATIENCE_S
-        while not self.find(selector).is_displayed():
-            assert time.monotonic() < deadline, f"{selector} does not appear"
-            time.sleep(0.03)
-
-    def enter_key(self, key):
-        self.type("#key", key, commit=False)
-        self.find("#key-form button").click()
+        self.find(selector).send_keys(*(getattr(Keys, key) for key in keys))
+        self.settle()
 
     def choose(self, selector, value, event="change"):
         self.run(
             f"const field = document.querySelector({selector!r}); field.value = {value!r};"
-            f"field.dispatchEvent(new Event('{event}'));"
+            f"field.dispatchEvent(new Event('{event}', {{ bubbles: true }}));"
         )
         self.settle()
 
@@ -189,36 +176,28 @@ class Page:
         self.run(f"document.querySelector({selector!r}).click();")
         self.settle()
 
+    def open_all(self):
+        self.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+
     def is_old(self, selector="#main"):
         return "old" in self.find(selector).get_attribute("class").split()
 
     def is_red(self, selector):
-        """Whether a text has the colour of errors."""
-        colour = self.run(f"return getComputedStyle(document.querySelector({selector!r})).color;")
-        return colour == "rgb(179, 38, 30)"  # --bad of the light scheme
+        """Whether a text has the colour of errors, in the light scheme."""
+        return self.run(f"return getComputedStyle(document.querySelector({selector!r})).color;") == "rgb(179, 38, 30)"
 
     def complaints(self):
-        return [
-            entry["message"] for entry in self.browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")
-        ]
+        log = self.browser.get_log("browser")
+        return [entry["message"] for entry in log if entry["level"] in ("SEVERE", "WARNING")]
 
     def asked(self, path):
-        """The last question to a path, where a function stands in the place of ``fetch`` (KNOWING)."""
+        """The last question to a path, of a page with :data:`RECORDED`."""
         return self.run(f"return window.asked.filter(([path]) => path === '{path}').at(-1)[1];")
 
     def address(self):
         """What the address line holds behind "#"; it follows the state with a delay."""
         self.run("await new Promise((next) => setTimeout(next, 250));")
         return self.browser.current_url.partition("#")[2]
-
-    def place(self, name):
-        """Where the user's point is drawn in a plot, as shares of it: left to right, top to bottom."""
-        return self.run(
-            f"const [plot, point] = ['#{name}', '#{name} .point'].map((one) =>"
-            " document.querySelector(one).getBoundingClientRect());"
-            "return [(point.x + point.width / 2 - plot.x) / plot.width,"
-            " (point.y + point.height / 2 - plot.y) / plot.height];"
-        )
 
     def touched(self, selector, x, y, click=False):
         """Move the pointer to a relative position in an element."""
@@ -230,25 +209,24 @@ class Page:
         offset = round((x - 0.5) * size["width"]), round((y - 0.5) * size["height"])
         actions = ActionChains(self.browser, duration=0).move_to_element_with_offset(element, *offset)
         (actions.click() if click else actions).perform()
+        self.settle()
 
     def download(self, selector, folder, name):
-        """The file that is downloaded when an element is clicked."""
+        """The text of the file that is downloaded when an element is clicked."""
         behaviour = {"behavior": "allow", "downloadPath": str(folder)}
         self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
-        self.run(f"document.querySelector({selector!r}).click();")
-        deadline = time.monotonic() + PATIENCE_S
-        while not (folder / name).exists():
-            assert time.monotonic() < deadline, [path.name for path in folder.iterdir()]
-            time.sleep(0.03)
-        return folder / name
+        self.click(selector)
+        self.until((folder / name).exists, lambda: [path.name for path in folder.iterdir()])
+        return (folder / name).read_text("utf-8")
 
     def scheme(self, name):
-        """Switch to the light or dark scheme, and wait until every colour has changed."""
+        """Switch to the light or dark scheme, and wait until the page has taken it and every colour has changed."""
         media = {"features": [{"name": "prefers-color-scheme", "value": name}]}
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
-        self.run(
-            f"while (!matchMedia('(prefers-color-scheme: {name})').matches) await new Promise(requestAnimationFrame);"
-            "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"  # listeners of the change ran
+        self.run(  # an empty document has no header, and no colours of its own
+            "const light = () => getComputedStyle(document.body).backgroundColor.match(/\\d+/g)[0] > 128;"
+            f"while (document.querySelector('header') && light() !== {json.dumps(name == 'light')})"
+            " await new Promise(requestAnimationFrame);"
             "const changes = document.getAnimations().filter((one) => one instanceof CSSTransition);"
             "await Promise.allSettled(changes.map((one) => one.finished));"
         )

@@ -1,6 +1,5 @@
 """Shared by the tests: the committed tables, a service with its client, reference values, solvers, the builder."""
 
-import csv
 import importlib
 import os
 import re
@@ -9,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -25,8 +23,6 @@ from tests.serving import Server
 
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from starlette.testclient import TestClient
-
-    from service.app import Application
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -44,21 +40,21 @@ def tables_dir(repository: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def app(tables_dir: Path) -> "Application":
-    """An application on the committed tables, with default settings."""
+def started(tables_dir: Path) -> "Callable[..., TestClient]":
+    """A client of an application on the committed tables with these settings; as a context it starts and ends it."""
+    from starlette.testclient import TestClient
+
     from service.app import create_app
     from service.settings import Settings
 
-    return create_app(Settings(tables=(tables_dir,)))
+    return lambda **settings: TestClient(create_app(Settings(**{"tables": (tables_dir,), **settings})))
 
 
 @pytest.fixture(scope="session")
-def client(app: "Application") -> "Iterator[TestClient]":
-    """A client of that application, after its start."""
-    from starlette.testclient import TestClient
-
-    with TestClient(app) as started:
-        yield started
+def client(started: "Callable[..., TestClient]") -> "Iterator[TestClient]":
+    """A client of one with default settings, after its start."""
+    with started() as made:
+        yield made
 
 
 @pytest.fixture(scope="session")
@@ -131,28 +127,11 @@ def open_page(live_server: Server, tmp_path_factory: pytest.TempPathFactory) -> 
 # --- shared by the numerical tests ---------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Reference:
-    """The 496 points of an independent quadruple-precision solver, tests/data/points.csv; columns as arrays (496,)."""
-
-    case: NDArray[np.str_]
-    v: NDArray[np.float64]
-    y: NDArray[np.float64]
-    mu_ratio: NDArray[np.float64]
-    regime: NDArray[np.str_]
-    stick_fraction: NDArray[np.float64]
-
-
 @pytest.fixture(scope="session")
-def reference(repository: Path) -> Reference:
-    """All reference points."""
-    with (repository / "tests" / "data" / "points.csv").open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    text = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return Reference(
-        text["case"], text["v"].astype(float), text["y"].astype(float), text["mu_ratio"].astype(float),
-        text["regime"], text["stick_fraction"].astype(float),
-    )  # fmt: skip
+def reference(repository: Path) -> Any:
+    """The 496 points of an independent quadruple-precision solver: columns of tests/data/points.csv, (496,) each."""
+    points = repository / "tests" / "data" / "points.csv"
+    return np.genfromtxt(points, delimiter=",", names=True, dtype=None, encoding="utf-8").view(np.recarray)
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -15,7 +16,7 @@ from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-__all__ = ["CASE", "Server", "serving"]
+__all__ = ["CASE", "Server", "chunk", "connect", "head", "running", "serving", "to_end"]
 
 ROOT = Path(__file__).resolve().parent.parent
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -74,8 +75,6 @@ class Server:
                     return time.monotonic() - self.started
             self.in_time()
 
-    wait_for_tables = wait_until_ready
-
     def memory(self, what: str = "VmRSS") -> float:
         """Megabytes."""
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
@@ -127,3 +126,36 @@ def running(command: Sequence[str], log: Path, **environment: str) -> Iterator[S
         yield server
     finally:
         server.kill()
+
+
+# --- HTTP as bytes --------------------------------------------------------------------------------------
+
+
+def connect(server: Server, receive_buffer: int | None = None) -> socket.socket:
+    """A connection."""
+    raw = socket.socket()
+    if receive_buffer is not None:
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+    raw.settimeout(60)
+    raw.connect(("127.0.0.1", server.port))
+    return raw
+
+
+def head(path: str, length: int | None, kind: str = "application/json", extra: str = "") -> bytes:
+    """The head of a POST; without a length the body comes in chunks."""
+    size = "Transfer-Encoding: chunked" if length is None else f"Content-Length: {length}"
+    return f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\n{size}\r\n{extra}\r\n".encode()
+
+
+def chunk(piece: bytes) -> bytes:
+    """A piece of a body without a length; the empty one is its end."""
+    return b"%x\r\n%b\r\n" % (len(piece), piece)
+
+
+def to_end(raw: socket.socket) -> bytes:
+    """All bytes until the server closes."""
+    received = b""
+    with suppress(ConnectionResetError):
+        while piece := raw.recv(65536):
+            received += piece
+    return received

@@ -8,7 +8,6 @@ line of a stream, or a bad case of a batch, is refused at its position in the re
 
 import json
 import re
-import urllib.request
 from pathlib import Path
 
 import pytest
@@ -24,37 +23,21 @@ from service.settings import Settings  # noqa: E402
 EXAMPLES = 25
 ARROW, NDJSON = "application/vnd.apache.arrow.stream", "application/x-ndjson"
 RELATIONS = (
-    r"has no effect unless include has std",
-    r"is required if include has std",
-    r"must be left out: it is the unknown or swept input",
-    r"must be >= 1e-12: no loaded table is tighter",
+    r"has no effect unless include has std", r"is required if include has std",
+    r"must be left out: it is the unknown or swept input", r"must be >= 1e-12: no loaded table is tighter",
     r"is given in the query and in the body",
     r"is given more than once",  # k=low..high beside k_range
-    r"must be two (ascending, finite )?numbers",
-    r"must be (finite and )?> start",
-    r"lists must have one length",
-    r"is required: omega",
-    r"is required: the tangential stiffness",
-    r"omega is given, too",
-    r"give the standard deviation of omega or of f, not of both",
-    r"must be > 0 on a logarithmic scale",
-    r"must be mu_macro where mu0 is the unknown",
-    r"must be left out: the family has its values",
-    r".* is the swept input",
-    r"all curves together may have",
-    r"(mu0|Fz|k) must be finite and > 0",
-    r"is not in the answer",
-    r"must be left out (for direction|beside)",
-    r"must be two stiffnesses",
-    r"must be across or along for a ball",
-    r"has (y0|Fz_amplitude), which direction",
-    r"has approximations, which are those of one spring",
-    r".* is (not computed|for one case)",
-    r"must be >= 0 and below Fz",
-    r"must be left out: (over an interval|unknown field)",
-    r"must be left out where k is the swept input",
-    r"must be given(:| \[)",
-)
+    r"must be two (ascending, finite )?numbers", r"must be (finite and )?> start", r"lists must have one length",
+    r"is required: (omega|the tangential stiffness)", r"omega is given, too",
+    r"give the standard deviation of omega or of f, not of both", r"must be > 0 on a logarithmic scale",
+    r"must be mu_macro where mu0 is the unknown", r"must be left out: the family has its values",
+    r".* is the swept input", r"all curves together may have", r"(mu0|Fz|k) must be finite and > 0",
+    r"is not in the answer", r"must be left out (for direction|beside)", r"must be two stiffnesses",
+    r"must be across or along for a ball", r"has (y0|Fz_amplitude), which direction",
+    r"has approximations, which are those of one spring", r".* is (not computed|for one case)",
+    r"must be >= 0 and below Fz", r"must be left out: (over an interval|unknown field)",
+    r"must be left out where k is the swept input", r"must be given(:| \[)",
+)  # fmt: skip
 FIVE = ("mu0", "Fz", "y0", "omega", "v0")  # one of these is the unknown, the others are required
 
 
@@ -129,7 +112,6 @@ def test_every_answer_is_as_described(case, live_server):
 
 def test_every_operation_is_tried(live_server):
     labels = {operation.ok().label for operation in SCHEMA.get_all_operations()}
-    with urllib.request.urlopen(f"{live_server.url}/openapi.json", timeout=60) as response:
-        served = json.load(response)["paths"]
+    served = json.loads(live_server.ask("GET", "/openapi.json")[2])["paths"]
     assert labels == {f"{method.upper()} {path}" for path, methods in served.items() for method in methods}
     assert "POST /v1/mu-macro/batch" in labels

@@ -1,114 +1,124 @@
-// What the plots share: an SVG that follows its size, axes and ticks, curves, the user's point, pictures for download.
+// Elements, and what the plots share: an SVG that follows its size, axes with ticks, curves, pictures for download.
 
-/** An SVG element with attributes and children; null children are left out. */
-export function draw(tag, attributes = {}, ...children) {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+export const $ = (id) => document.getElementById(id);
+const SVG = ["svg", "path", "rect", "circle", "text", "image"];
+
+/** An element of HTML or SVG with attributes and children; null children are left out. */
+export function make(tag, attributes = {}, ...children) {
+  const element = SVG.includes(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
+    : document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  element.append(...children.flat().filter((child) => child !== null));
+  element.append(...children.flat(3).filter(Boolean));
   return element;
 }
 
 export const label = (text, x, y, className = "", anchor = "middle") =>
-  draw("text", { x, y, class: className, "text-anchor": anchor }, text);
-export const line = (x1, y1, x2, y2, className) => draw("path", { d: `M${x1} ${y1}L${x2} ${y2}`, class: className });
+  make("text", { x, y, class: className, "text-anchor": anchor }, text);
 
-const SUPERSCRIPT = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-const power = (exponent) =>
-  `10${exponent < 0 ? "⁻" : ""}${[...String(Math.abs(exponent))].map((digit) => SUPERSCRIPT[digit]).join("")}`;
+const power = (exponent) => `10${String(exponent).replace(/./g, (sign) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(sign)])}`;
 
 /** A linear or logarithmic axis from `low` to `high`, drawn between the pixels `from` and `to`. */
-export class Axis {
-  constructor(low, high, log, from, to) {
-    Object.assign(this, { low, high, log, from, to });
+class Axis {
+  constructor({ low, high, log, title }, from, to) {
+    Object.assign(this, { low, high, log, title, from, to });
     [this.a, this.b] = log ? [Math.log10(low), Math.log10(high)] : [low, high];
   }
 
+  /** Where a value is: 0 at the axis's low end, 1 at its high end. */
   share(value) {
-    if (this.log && !(value > 0)) return 0;
-    return ((this.log ? Math.log10(value) : value) - this.a) / (this.b - this.a);
+    return ((this.log ? Math.log10(Math.max(value, 0)) : value) - this.a) / (this.b - this.a);
   }
 
   pixel(value) {
-    return this.from + this.share(value) * (this.to - this.from);
+    return this.from + Math.max(this.share(value), -1e3) * (this.to - this.from);
   }
 
   value(pixel) {
     const x = this.a + ((pixel - this.from) / (this.to - this.from)) * (this.b - this.a);
-    return this.clamp(this.log ? 10 ** x : x);
+    return Math.min(Math.max(this.log ? 10 ** x : x, this.low), this.high);
   }
 
   /** -1 below the axis, 1 above it, 0 on it. */
   side(value) {
-    const slack = 1e-9 * (this.b - this.a);
-    const place = this.log ? (value > 0 ? Math.log10(value) : -Infinity) : value;
-    return place < this.a - slack ? -1 : Number(place > this.b + slack);
-  }
-
-  clamp(value) {
-    return Math.min(Math.max(value, this.low), this.high);
+    return this.share(value) < -1e-9 ? -1 : Number(this.share(value) > 1 + 1e-9);
   }
 
   /** [value, label] of the ticks, with `room` pixels for each. */
   ticks(room) {
-    const most = Math.max(2, Math.floor(Math.abs(this.to - this.from) / room));
-    const raw = (this.b - this.a) / most;
+    const raw = (this.b - this.a) / Math.max(2, Math.floor(Math.abs(this.to - this.from) / room));
     const unit = this.log ? 1 : 10 ** Math.floor(Math.log10(raw));
     const nice = [1, 2, 5, 10].find((factor) => factor * unit >= 0.999 * raw);
     const step = this.log ? Math.max(1, Math.ceil(raw)) : unit * nice;
-    const found = [];
-    for (let i = Math.ceil(this.a / step - 1e-9); i * step <= this.b + 1e-9 * (this.b - this.a); i += 1) {
-      const at = i * step;
-      found.push(this.log ? [10 ** at, power(at)] : [at, String(Number(at.toPrecision(6)))]);
-    }
-    return found;
+    const [first, last] = [Math.ceil(this.a / step - 1e-9), Math.floor(this.b / step + 1e-9)];
+    return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step)
+      .map((at) => (this.log ? [10 ** at, power(at)] : [at, String(Number(at.toPrecision(6)))]));
   }
 }
 
-/** Both axes with ticks, titles, and with `grid` lines through the plot. */
-export function axes(x, y, xTitle, yTitle, grid = true) {
-  const [middle, centre] = [(x.from + x.to) / 2, (y.from + y.to) / 2];
-  const [left, bottom] = [x.from - 43, y.from + 38];
-  return [
-    ...x.ticks(56).flatMap(([value, text]) => {
-      const at = x.pixel(value);
-      return [line(at, y.from, at, grid ? y.to : y.from + 4, "grid"), label(text, at, y.from + 18, "tick")];
-    }),
-    ...y.ticks(36).flatMap(([value, text]) => {
-      const at = y.pixel(value);
-      return [line(x.from, at, grid ? x.to : x.from - 4, at, "grid"), label(text, x.from - 7, at + 4, "tick", "end")];
-    }),
-    label(xTitle, middle, bottom),
-    draw("text", { transform: `translate(${left} ${centre}) rotate(-90)`, "text-anchor": "middle" }, yTitle),
-  ];
+/** Two axes, { low, high, log, title } each, in a plot of this size; what is drawn in them is given by its values. */
+export class Frame {
+  constructor(width, height, x, y) {
+    this.x = new Axis(x, 58, width - 14);
+    this.y = new Axis(y, height - 46, 12);
+    this.box = { x: 58, y: 12, width: width - 72, height: height - 58 };
+  }
+
+  /** Ticks and titles, with lines through the plot or (`grid` false) short ones. */
+  axes(grid = true) {
+    const { x, y, box } = this;
+    const line = (d) => make("path", { d, class: "grid" });
+    return [
+      ...x.ticks(56).flatMap(([value, text]) => {
+        const at = x.pixel(value);
+        return [line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")];
+      }),
+      ...y.ticks(36).flatMap(([value, text]) => {
+        const at = y.pixel(value);
+        return [line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")];
+      }),
+      label(x.title, box.x + box.width / 2, y.from + 38),
+      make("text", { class: "upright", transform: `translate(15 ${box.y + box.height / 2}) rotate(-90)` }, y.title),
+    ];
+  }
+
+  /** Whether a place, in pixels, is between the ends of the axes. */
+  holds(x, y = this.y.from) {
+    return x >= this.x.from && x <= this.x.to && y >= this.y.to && y <= this.y.from;
+  }
+
+  /** What is drawn inside of both axes; nothing of it leaves them. */
+  inside(...children) {
+    const { x, y, width, height } = this.box;
+    return make("svg", { ...this.box, viewBox: `${x} ${y} ${width} ${height}`, overflow: "hidden" }, ...children);
+  }
+
+  curve(xs, ys, className) {
+    const places = xs.map((x, i) => `${this.x.pixel(x).toFixed(2)} ${this.y.pixel(ys[i]).toFixed(2)}`);
+    return make("path", { d: `M${places.join("L")}`, class: className });
+  }
+
+  band(xs, lows, highs) {
+    return this.curve([...xs, ...xs.toReversed()], [...highs, ...lows.toReversed()], "band");
+  }
+
+  dot(x, y, r, className) {
+    return make("circle", { cx: this.x.pixel(x), cy: this.y.pixel(y), r, class: className });
+  }
+
+  /** The user's point; where it is outside, an arrow on the frame that points to it. */
+  point(x, y) {
+    const out = [this.x.side(x), this.y.side(y)];
+    const shape = out[0] || out[1] ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
+    const turn = (Math.atan2(-out[1], out[0]) * 180) / Math.PI;
+    const place = [[this.x, x], [this.y, y]].map(([axis, value]) =>
+      axis.from + Math.min(Math.max(axis.share(value), 0), 1) * (axis.to - axis.from));
+    return make("path", { d: shape, class: "point", transform: `translate(${place}) rotate(${turn})` });
+  }
 }
 
-/** A curve through points in pixels. */
-export const curve = (xs, ys, attributes) =>
-  draw("path", { d: `M${xs.map((x, i) => `${x.toFixed(2)} ${ys[i].toFixed(2)}`).join("L")}`, ...attributes });
-
-/** The area between two curves through points in pixels. */
-export function band(xs, lows, highs) {
-  const points = [...xs.map((x, i) => [x, highs[i]]), ...xs.map((x, i) => [x, lows[i]]).reverse()];
-  const places = points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`);
-  return draw("path", { d: `M${places.join("L")}Z`, class: "band" });
-}
-
-/** What is drawn inside of both axes; nothing of it leaves them. */
-export const inside = (x, y, ...children) => {
-  const [width, height] = [x.to - x.from, y.from - y.to];
-  const box = { x: x.from, y: y.to, width, height, viewBox: `${x.from} ${y.to} ${width} ${height}` };
-  return draw("svg", { ...box, overflow: "hidden" }, ...children);
-};
-
-/** The user's point; where it is outside, an arrow on the frame that points to it (`out`: -1, 0 or 1 for x and y). */
-export function point(x, y, out = [0, 0]) {
-  const shape = out[0] || out[1] ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
-  const turn = (Math.atan2(-out[1], out[0]) * 180) / Math.PI;
-  return draw("path", { d: shape, class: "point", transform: `translate(${x} ${y}) rotate(${turn})` });
-}
-
-const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin",
-  "font", "paint-order"];
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "font",
+  "text-anchor", "paint-order"];
 
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
 export class Plot {
@@ -125,16 +135,17 @@ export class Plot {
       const { clientWidth: width, clientHeight: height } = this.svg;
       if (!width || !height) return;
       this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-      this.svg.replaceChildren(...this.paint(width, height).flat().filter((child) => child !== null));
+      this.svg.replaceChildren(...make("svg", {}, this.paint(width, height)).childNodes);
     });
   }
 
-  /** Calls back with the pointer's place: move(x, y), pick(x, y) for click and drag, leave(). */
-  follow({ move, pick, leave }) {
+  /** Calls back with the pointer's place: move(x, y), pick(x, y) for click and drag; move() when it leaves; and with
+   *  the arrow keys: step(right, up), larger with Shift, true if it is of use. */
+  follow({ move, pick, step }) {
     const { svg } = this;
-    const place = (event) => {
+    const place = ({ clientX, clientY }) => {
       const box = svg.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
+      return [clientX - box.left, clientY - box.top];
     };
     svg.addEventListener("pointermove", (event) => (event.buttons & 1 ? pick : move)(...place(event)));
     svg.addEventListener("pointerdown", (event) => {
@@ -142,27 +153,37 @@ export class Plot {
       if (event.pointerType === "mouse") svg.setPointerCapture(event.pointerId);
       pick(...place(event));
     });
-    svg.addEventListener("pointerleave", leave);
+    svg.addEventListener("pointerleave", () => move());
+    svg.addEventListener("keydown", (event) => {
+      const arrow = ARROWS[event.key]?.map((one) => (event.shiftKey ? 8 * one : one));
+      if (arrow && step(...arrow)) event.preventDefault();
+    });
   }
 
-  /** The plot as an SVG file on the card's colour, with a line of text below it. */
-  picture(text) {
+  /** Saves the plot as an SVG file on the card's colour, with a line of text below it. */
+  save(text, name) {
     const { clientWidth: width, clientHeight: height } = this.svg;
     const size = { width, height: height + 24 };
-    const looks = getComputedStyle(this.svg);
+    const { color: fill, backgroundColor } = getComputedStyle(this.svg.closest("section"));
     const narrow = 7 * text.length > width - 32 ? { textLength: width - 32, lengthAdjust: "spacingAndGlyphs" } : {};
-    const words = { x: 16, y: height + 12, fill: looks.color, "font-family": "sans-serif", "font-size": 13, ...narrow };
-    const back = draw("rect", { ...size, fill: looks.getPropertyValue("--card") });
-    const copy = draw("svg", size, back, [...this.svg.children].map(withLooks), draw("text", words, text));
-    return new Blob([new XMLSerializer().serializeToString(copy)], { type: "image/svg+xml" });
+    const words = { x: 16, y: height + 12, fill, "font-family": "sans-serif", "font-size": 13, ...narrow };
+    const back = make("rect", { ...size, fill: backgroundColor });
+    const copy = make("svg", size, back, [...this.svg.children].map(withLooks), make("text", words, text));
+    save(new XMLSerializer().serializeToString(copy), "image/svg+xml", name);
   }
 }
 
 /** A copy of a drawn element that looks the same without the style sheet. */
 function withLooks(element) {
-  const copy = element.cloneNode(false);
-  const looks = getComputedStyle(element);
-  for (const name of LOOKS) copy.style.setProperty(name, looks.getPropertyValue(name));
-  copy.append(...[...element.childNodes].map((child) => (child.nodeType === 1 ? withLooks(child) : child.cloneNode())));
+  const copy = element.cloneNode(!element.children.length); // with its text
+  for (const name of LOOKS) copy.style.setProperty(name, getComputedStyle(element).getPropertyValue(name));
+  copy.append(...[...element.children].map(withLooks));
   return copy;
+}
+
+/** Saves a text as a file of the user. */
+export function save(text, type, name) {
+  const href = URL.createObjectURL(new Blob([text], { type }));
+  Object.assign(document.createElement("a"), { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10_000);
 }

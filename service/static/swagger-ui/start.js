@@ -1,8 +1,7 @@
 // The description is fetched here and not by the interface, so that a service with an API key can be asked for it.
-import { KeyWanted, Channel, keyTaken, onKey, wantKey, withKey } from "../page/ask.js";
+import { Channel, withKey } from "../page/ask.js";
+import { $ } from "../page/plots.js";
 import { get } from "../page/service.js";
-
-const $ = (id) => document.getElementById(id);
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const follow = () => document.documentElement.classList.toggle("dark-mode", dark.matches);
@@ -31,8 +30,6 @@ function tidy() {
 new MutationObserver(tidy).observe($("swagger-ui"), { childList: true, subtree: true });
 
 function show(spec) {
-  $("status").textContent = "";
-  keyTaken();
   // validatorUrl: null keeps the page from sending the description to a public validator.
   window.SwaggerUIBundle({
     spec,
@@ -45,13 +42,5 @@ function show(spec) {
   });
 }
 
-const description = new Channel({
-  ask: () => get("openapi.json"),
-  answer: show,
-  fail: (error) => {
-    if (error instanceof KeyWanted) wantKey();
-    else $("status").textContent = `${error.message} Asking again by itself.`;
-  },
-});
-onKey(() => description.push(null));
-description.push(null);
+const tell = (text) => { $("status").textContent = text; };
+new Channel(() => get("openapi.json"), show, tell).push(null);

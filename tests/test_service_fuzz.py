@@ -1,0 +1,24 @@
+"""Strange requests and many clients at once: short forms of fuzz/strange.py and fuzz/attacks.py."""
+
+import pytest
+
+from fuzz import attacks, strange
+
+SHARE = 0.2
+MOST_MB, MOST_S = 512, 2.0  # the aim for the wait is 0.25 s, on a machine that does nothing else
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attack", attacks.ATTACKS, ids=lambda attack: attack.__name__)
+def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(attack):
+    memory, wait = attacks.tried(attack, SHARE)
+    assert memory < MOST_MB
+    assert wait < MOST_S
+
+
+def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server):
+    for found in (strange.part(1, 2000), strange.ask_live(live_server, 2, 500)):
+        assert found.bad == []
+        assert set(found.counts) == set(strange.KINDS)
+        assert {200, 400, 404, 422} <= set(found.statuses)
+    assert live_server.errors() == []
