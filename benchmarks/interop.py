@@ -1,24 +1,39 @@
-"""Time of mu~ inside JAX and PyTorch: one point, arrays, a loop of 1,000 steps; the library and ellipk beside it."""
+"""Time of mu~ inside other programs: one point, arrays, a loop of 1,000 steps; scipy's ellipk beside it.
+
+PyTorch is measured where it is installed.  Times in brackets are of the release that called Python back.
+"""
 
 from __future__ import annotations
 
 from benchmarks.measuring import main, markdown, quantity  # isort: split
 
+import importlib.util
+import subprocess
+import sys
+import tempfile
 import timeit
 from collections.abc import Callable
+from pathlib import Path
 from time import process_time
 from typing import Any
 
+import casadi
 import jax
 import numpy as np
-import torch
 from scipy.special import ellipk
 
 import mumacro
 from mumacro.jax import Friction as InJax
-from mumacro.torch import Friction as InTorch
 
 STEPS = 1000
+BEFORE = {("JAX", 0): "278", ("JAX", 3): "254", ("PyTorch", 0): "157"}
+GLUE = """#include "mumacro.h"
+int ratio(const double **in, double **out, long long *iw, double *w, int mem) {
+    return out[0][0] = mumacro_mu_ratio(in[0][0], in[1][0]), 0;
+}
+long long ratio_n_in(void) { return 2; }
+"""
+Way = tuple[Callable[..., Any], Callable[..., Any], Callable[[float], Any]]
 
 
 def best(call: Callable[[], Any], number: int) -> float:
@@ -34,47 +49,61 @@ def loop(step: Callable[[Any], Any], start: Any) -> Any:
     return start
 
 
+def in_jax(table: mumacro.Surrogate) -> Way:
+    """Jitted; the loop is a scan."""
+    jax.config.update("jax_enable_x64", True)
+    ratio = InJax(table).mu_ratio
+    jitted = jax.jit(ratio)
+    scan = jax.jit(lambda c: jax.lax.scan(lambda c, _: (0.9 * c + 0.1 * ratio(c, 0.5), None), c, None, STEPS)[0])
+    return lambda *x: jitted(*x).block_until_ready(), jax.numpy.asarray, lambda c: scan(c).block_until_ready()
+
+
+def in_torch(table: mumacro.Surrogate) -> Way:
+    """The operator, without derivatives."""
+    import torch
+
+    from mumacro.torch import Friction
+
+    ratio = Friction(table).mu_ratio
+    half = torch.tensor(0.5, dtype=torch.float64)
+    return ratio, torch.as_tensor, lambda c: loop(lambda x: ratio(x, half), torch.tensor(c, dtype=torch.float64))
+
+
+def in_casadi(table: mumacro.Surrogate) -> Way:
+    """The exported C as an external function; arrays are a map, the loop a fold."""
+    folder = Path(tempfile.mkdtemp())
+    words = [sys.executable, "-m", "mumacro", "export", "--format", "c", "--table", f"{table.tolerance:g}"]
+    subprocess.run([*words, "--out", folder / "mumacro.h"], check=True, capture_output=True)
+    (folder / "glue.c").write_text(GLUE)
+    words = ["cc", "-O2", "-shared", "-fPIC", str(folder / "glue.c"), "-lm", "-o", str(folder / "ratio.so")]
+    subprocess.run(words, check=True)
+    ratio, x = casadi.external("ratio", str(folder / "ratio.so")), casadi.MX.sym("c")
+    step = casadi.Function("step", [x], [0.9 * x + 0.1 * ratio(x, 0.5)])
+    folded, maps = step.fold(STEPS), {n: ratio.map(n) if n > 1 else ratio for n in (1, 1000, 10_000, 1_000_000)}
+    return lambda v, y: maps[v.size2()](v, y), lambda x: casadi.DM(np.reshape(x, (1, -1))), folded
+
+
 def interop(quick: bool) -> str:
     """mu~ in every library."""
     n = 10_000 if quick else 1_000_000
-    jax.config.update("jax_enable_x64", True)
-    table = mumacro.open(1e-10, threads=1)
-    in_jax, in_torch = InJax(table), InTorch(table)
+    table = mumacro.open(1e-7, threads=1)
     v, y = 10.0 ** np.random.default_rng(0).uniform(-3.0, 3.0, (2, n))
-    jitted = jax.jit(in_jax.mu_ratio)
-    slope = jax.jit(jax.vmap(jax.grad(in_jax.mu_ratio)))
-    scan = jax.jit(
-        lambda c: jax.lax.scan(lambda c, _: (0.9 * c + 0.1 * in_jax.mu_ratio(c, 0.5), None), c, None, length=STEPS)[0]
-    )
-
-    def torch_slope(v: Any, y: Any) -> Any:
-        v = v.clone().requires_grad_()
-        return torch.autograd.grad(in_torch.mu_ratio(v, y).sum(), v)[0]
-
-    def ready(function: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda *x: function(*x).block_until_ready()
-
-    def steps_in_torch(c: float) -> Any:
-        return loop(lambda x: in_torch.mu_ratio(x, 0.5), torch.tensor(c))
-
-    # the call, what makes its arguments, 1,000 steps
-    ways: dict[str, tuple[Callable[..., Any], Callable[..., Any], Callable[[float], Any] | None]] = {
-        "mumacro.Surrogate": (table.mu_ratio, lambda x: x, lambda c: loop(lambda x: table.mu_ratio(x, 0.5), c)),
-        "JAX, jitted": (ready(jitted), jax.numpy.asarray, ready(scan)),
-        "JAX, slope along v~": (ready(slope), jax.numpy.atleast_1d, None),
-        "PyTorch": (in_torch.mu_ratio, torch.as_tensor, steps_in_torch),
-        "PyTorch, slope along v~": (torch_slope, torch.as_tensor, None),
+    ways: dict[str, Way] = {
+        "Python": (table.mu_ratio, lambda x: x, lambda c: loop(lambda x: table.mu_ratio(x, 0.5), c)),
+        "JAX": in_jax(table),
+        **({"PyTorch": in_torch(table)} if importlib.util.find_spec("torch") else {}),
+        "CasADi": in_casadi(table),
         "scipy.special.ellipk": (lambda v, _: ellipk(v), lambda x: x, lambda c: loop(ellipk, c)),
     }
     rows = []
     for name, (call, made, steps) in ways.items():
         one, many, all_points = ([made(x[:size] if size else float(x[0])) for x in (v, y)] for size in (0, 1000, n))
         figures = [best(lambda: call(*one), 200) * 1e6, best(lambda: call(*many), 20) * 1e6]  # noqa: B023
-        figures.append(best(lambda: call(*all_points), 1) / n * 1e9)  # noqa: B023
-        figures += [best(lambda: steps(0.1), 1) * 1e3] if steps else []  # noqa: B023
-        rows.append([name, *map(quantity, figures), *([] if steps else ["-"])])
-    header = ["mu~", "one point [us]", "1,000 points [us]", f"{n:,} points [ns a point]", f"{STEPS:,} steps [ms]"]
-    return f"Table 1e-10, one thread.\n\n{markdown(header, rows)}"
+        figures += [best(lambda: call(*all_points), 1) / n * 1e9, best(lambda: steps(0.1), 1) * 1e3]  # noqa: B023
+        before = (BEFORE.get((name, i)) for i in range(4))
+        told = (quantity(x) + (f" ({old})" if old else "") for x, old in zip(figures, before, strict=True))
+        rows.append([name, *told])
+    return markdown(["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"], rows)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ IMAGES = ROOT / "docs" / "img"
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")
 FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 #: the documents that hold results, each between a begin and an end marker with the name of its section
-PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/service.md", "tables/README.md"))
+PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md"))
 
 
 def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str) -> None:

@@ -14,25 +14,18 @@ import casadi as ca
 
 GLUE = """
 #include "mumacro.h"
-static int answer(const double *x, mumacro_answer *a, mumacro_point *p, double *unit) {
-    if (mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], a)) return 1; /* a line search steps back */
-    *unit = x[0] * x[1] * (x[0] * x[1] / x[2]) * x[4];
-    return mumacro_evaluate_point(MUMACRO_POWER, a->v_tilde, a->y_tilde, p);
-}
-int friction(const double **in, double **out, long long *iw, double *w, int mem) { /* 6 -> mu_macro, power */
-    mumacro_answer a; mumacro_point p; double unit;
-    if (answer(in[0], &a, &p, &unit)) return 1;
-    if (out[0]) out[0][0] = a.mu_macro, out[0][1] = unit * p.value;
-    return 0;
-}
-int jac_friction(const double **in, double **out, long long *iw, double *w, int mem) { /* 2 x 6, column by column */
-    mumacro_answer a; mumacro_point p; double unit;
-    if (answer(in[0], &a, &p, &unit)) return 1;
-    const double all = p.value, v = p.slope_v, y = p.slope_y;
+static int both(const double *x, double *value, double *slopes) { /* mu_macro, power; 2 x 6, column by column */
+    mumacro_answer a; mumacro_point p;
+    if (mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], &a)) return 1; /* a line search steps back */
+    if (mumacro_evaluate_point(MUMACRO_POWER, a.v_tilde, a.y_tilde, &p)) return 1;
+    const double unit = x[0] * x[1] * (x[0] * x[1] / x[2]) * x[4], all = p.value, v = p.slope_v, y = p.slope_y;
     const double slope[6] = {2 * all - v - y, 2 * all - v - y, v + y - all, y, all - v, v};
-    for (int i = 0; i < 6; ++i) out[0][2 * i] = a.gradient[i], out[0][2 * i + 1] = unit * slope[i] / in[0][i];
+    if (value) value[0] = a.mu_macro, value[1] = unit * all;
+    for (int i = 0; slopes && i < 6; ++i) slopes[2 * i] = a.gradient[i], slopes[2 * i + 1] = unit * slope[i] / x[i];
     return 0;
 }
+int friction(const double **in, double **out, long long *iw, double *w, int mem) { return both(in[0], out[0], 0); }
+int jac_friction(const double **in, double **out, long long *iw, double *w, int mem) { return both(in[0], 0, out[0]); }
 static const long long six[] = {6, 1, 1}, two[] = {2, 1, 1}, matrix[] = {2, 6, 1};
 const long long *friction_sparsity_in(long long i) { return six; }
 const long long *friction_sparsity_out(long long i) { return two; }

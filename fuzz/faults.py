@@ -1,6 +1,6 @@
 """Faults of disks, permissions, processes and clocks: no data are lost, and the same command resumes.
 
-    python fuzz/faults.py [--only killed_builds] [--share 0.1] [--write]
+    python fuzz/faults.py [--write]
 
 Small disks are mounted as tmpfs and permissions are removed for another user; both need root.  A trial
 that cannot be made on this machine is reported as "not tried".
@@ -11,22 +11,24 @@ from __future__ import annotations
 import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.measuring import ROOT, main, markdown
+from mumacro import Surrogate, TableError
+from mumacro.table import read_table, write_table
+from mumacro.writing import alone_in
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
 TOLERANCE = "1e-2"
-NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a user that owns nothing
 
 
@@ -39,11 +41,10 @@ class NotTriedError(Exception):
 
 def run(*words: object, nobody: bool = False, code: int | None = 0, **environment: str) -> str:
     """Run a command of the project and return its last output: one line if it fails."""
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    command = (*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words))
     done = subprocess.run(
-        [*(AS_NOBODY if nobody else ()), sys.executable, *map(str, words)], cwd=ROOT, env=variables,
-        capture_output=True, text=True, timeout=1800, check=False,
-    )  # fmt: skip
+        command, cwd=ROOT, env={**ENVIRONMENT, **environment}, capture_output=True, text=True, timeout=1800, check=False
+    )
     assert "Traceback" not in done.stderr, done.stderr
     assert code is None or done.returncode == code, f"exit code {done.returncode}: {done.stderr or done.stdout}"
     lines = (done.stderr if done.returncode in (1, 2) else done.stdout).strip().splitlines()
@@ -57,16 +58,13 @@ def build(out: Path) -> list[str]:
 
 def checksum(path: Path) -> str:
     """The checksum of the numbers in a table."""
-    from mumacro import Surrogate
-
     return Surrogate.open(path).checksum
 
 
 def cases(path: Path, n: int) -> Path:
     """A CSV file of random cases."""
-    rng = np.random.default_rng(1)
-    rows = 10.0 ** rng.uniform([-2, -1, 4, -8, 2, -5], [0, 3, 8, -4, 6, 1], (n, 6))
-    path.write_text("\n".join([",".join(NAMES), *(",".join(map(repr, row)) for row in rows.tolist()), ""]))
+    rows = 10.0 ** np.random.default_rng(1).uniform([-2, -1, 4, -8, 2, -5], [0, 3, 8, -4, 6, 1], (n, 6))
+    np.savetxt(path, rows, "%.17g", ",", header="mu0,Fz,k,y0,omega,v0", comments="")
     return path
 
 
@@ -123,9 +121,6 @@ def full_disk_in_a_build(folder: Path) -> str:
 
 
 def full_disk_in_writing_a_table(folder: Path) -> str:
-    from mumacro import TableError
-    from mumacro.table import read_table, write_table
-
     with small_disk(folder, "64k") as disk:
         (disk / "before.txt").write_text("kept")
         try:
@@ -155,79 +150,64 @@ def full_disk_in_eval(folder: Path, n: int = 100_000) -> str:
     return "one line; with more space the same command resumes and gives the same bytes; CSV, NDJSON, Parquet"
 
 
-def lost_permission_in_a_build(folder: Path) -> str:
-    said = run(*build(closed(folder) / "rough.nc"), nobody=True, code=1)
-    assert "Permission denied" in said, said
+def lost_permission(folder: Path, *words: object, said: str = "Permission denied") -> str:
+    """A command that writes ``out.csv`` or ``new.nc`` into a folder that its user must not write to."""
+    found = run(*words, nobody=True, code=1)
+    assert said in found, found
     assert left(folder / "closed") == []
     return "one line; no file left"
 
 
+def lost_permission_in_a_build(folder: Path) -> str:
+    return lost_permission(folder, *build(closed(folder) / "rough.nc"))
+
+
 def lost_permission_in_writing_a_table(folder: Path) -> str:
-    out = closed(folder) / "new.nc"
     program = (
         "import sys, mumacro\nfrom mumacro.table import read_table, write_table\ntable = read_table(sys.argv[1])\n"
-        "try:\n    write_table(table, sys.argv[2])\nexcept mumacro.TableError as error:\n    print(error.reason)"
+        "try:\n    write_table(table, sys.argv[2])\nexcept mumacro.TableError as error:\n    sys.exit(error.reason)"
     )
-    said = run("-c", program, SMALLEST, out, nobody=True)
-    assert said == "cannot be written: Permission denied", said
-    assert left(folder / "closed") == []
-    return "TableError; no file left"
+    words = ("-c", program, SMALLEST, closed(folder) / "new.nc")
+    return lost_permission(folder, *words, said="cannot be written: Permission denied")
 
 
 def lost_permission_in_eval(folder: Path) -> str:
     source = cases(folder / "cases.csv", 100)
-    said = run("-m", "mumacro", "eval", source, "-o", closed(folder) / "out.csv", nobody=True, code=1)
-    assert "Permission denied" in said, said
-    assert left(folder / "closed") == []
-    return "one line; no file left"
+    return lost_permission(folder, "-m", "mumacro", "eval", source, "-o", closed(folder) / "out.csv")
 
 
-# --- processes ----------------------------------------------------------------------------------------
+# --- two at work, no home, clock ----------------------------------------------------------------------
 
 
 def two_builds_to_one_output(folder: Path) -> str:
-    out = folder / "rough.nc"
-    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
-    words = [sys.executable, *build(out)]
-    first = subprocess.Popen(words, cwd=ROOT, env=variables, stdout=-3, stderr=-3)
-    while not list(folder.glob("rough.nc.checkpoint/*")):
-        assert first.poll() is None
-        time.sleep(0.01)
-    said = run(*build(out), code=1)
-    assert "another process is at work here" in said, said
-    assert first.wait(timeout=1800) == 0
-    run(*build(folder / "whole.nc"))
-    assert checksum(out) == checksum(folder / "whole.nc")
-    assert left(folder) == ["rough.nc", "whole.nc"]
-    return "the second is refused with one line, the first completes"
+    with alone_in(folder / "rough.nc.checkpoint"):
+        said = run(*build(folder / "rough.nc"), code=1)
+    assert "rough.nc.checkpoint: another process is at work here; wait for it, or stop it" in said, said
+    assert left(folder) == []
+    return "the second is refused with one line"
 
-
-def killed_eval(folder: Path, n: int = 400_000, kills: int = 10) -> str:
-    source = cases(folder / "cases.csv", n)
-    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
-    chance = random.Random(1)  # noqa: S311
-    for kind in ("csv", "parquet"):
-        words = ["-m", "mumacro", "eval", str(source), "-o"]
-        run(*words, folder / f"whole.{kind}")
-        out, notes = folder / f"out.{kind}", folder / f"out.{kind}.parts" / "notes"
-        for _ in range(kills):
-            command = [sys.executable, *words, str(out)]
-            process = subprocess.Popen(command, cwd=ROOT, env=variables, stdout=-3, stderr=-3)
-            before = notes.stat().st_size if notes.exists() else 0
-            while process.poll() is None and (not notes.exists() or notes.stat().st_size <= before):
-                time.sleep(0.002)
-            time.sleep(chance.uniform(0.0, 0.03))
-            process.kill()
-            process.wait()
-        run(*words, out)  # also where a kill came after the end
-        assert out.read_bytes() == (folder / f"whole.{kind}").read_bytes()
-        assert not list(folder.glob("*.parts"))
-    return f"killed {kills} times each; then the same command gives the same bytes; CSV, Parquet"
-
-
-# --- home, clock --------------------------------------------------------------------------------------
 
 ASK = ("-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01", "--json", "--table", "1e-4")
+
+
+def killed_builds(folder: Path, kills: int = 20) -> str:
+    """At random moments, each followed by the same command."""
+    out, chance, resumed, done = folder / "rough.nc", random.Random(7), 0, 0  # noqa: S311
+    begun = time.perf_counter()
+    run(*build(folder / "whole.nc"))
+    most = (time.perf_counter() - begun) / 2.0
+    for _ in range(kills):
+        resumed += bool(list(folder.glob(f"{out.name}.checkpoint/*.npy")))
+        done += out.exists()
+        process = subprocess.Popen([sys.executable, *build(out)], cwd=ROOT, env=ENVIRONMENT, stdout=-3, stderr=-3)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=chance.uniform(0.0, most))
+        process.kill()
+        process.wait()
+    run(*build(out))
+    assert checksum(out) == checksum(folder / "whole.nc")
+    assert left(folder) == ["rough.nc", "whole.nc"], left(folder)
+    return f"{kills} kills, {resumed} starts from finished parts, {done} after an end: the same data, no file left"
 
 
 def no_home(folder: Path) -> str:
@@ -261,18 +241,19 @@ def clock_steps(folder: Path) -> str:
     return "eval: the same bytes"
 
 
-FAULTS: dict[str, Callable[..., str]] = {
+FAULTS: dict[str, Callable[[Path], str]] = {
     "disk full while a build runs": full_disk_in_a_build,
-    "disk full while a table is written": full_disk_in_writing_a_table,
     "disk full while eval runs": full_disk_in_eval,
     "no permission to write a build": lost_permission_in_a_build,
+    "no home, and an unwritable one": no_home,
+    "SIGKILL of builds": killed_builds,
+    "disk full while a table is written": full_disk_in_writing_a_table,
     "no permission to write a table": lost_permission_in_writing_a_table,
     "no permission to write eval's output": lost_permission_in_eval,
     "two builds to one output": two_builds_to_one_output,
-    "SIGKILL of eval": killed_eval,
-    "no home, and an unwritable one": no_home,
     "a clock that steps": clock_steps,
 }
+QUICK = [*FAULTS][5:]
 
 
 def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
@@ -286,49 +267,13 @@ def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
             return "FAILED", " ".join(str(error).split())[:300]
 
 
-def faults(share: float) -> str:  # noqa: ARG001 (every fault is tried once)
+def faults() -> str:
     """Every fault once."""
     rows = [[name, *tried(fault)] for name, fault in FAULTS.items()]
     return markdown(("fault", "result", "what was seen"), rows, 3)
 
 
-def killed_builds(share: float, total: int = 20) -> str:
-    """Builds that are killed at random moments and restarted until they are complete."""
-    total = max(1, round(total * share))
-    chance = random.Random(7)  # noqa: S311
-    killed = resumed = 0
-    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        begun = time.perf_counter()
-        run(*build(folder / "whole.nc"))
-        whole = time.perf_counter() - begun
-        outs = [folder / "0.nc"]
-        while killed < total:
-            if outs[-1].exists():
-                outs.append(folder / f"{len(outs)}.nc")
-            resumed += bool(list(folder.glob(f"{outs[-1].name}.checkpoint/*.npy")))
-            words = [sys.executable, *build(outs[-1])]
-            process = subprocess.Popen(words, cwd=ROOT, env=variables, stdout=-3, stderr=-3)
-            try:
-                process.wait(timeout=chance.uniform(0.0, whole / 2.0))
-            except subprocess.TimeoutExpired:
-                process.send_signal(signal.SIGKILL)
-                process.wait()
-                killed += 1
-        run(*build(outs[-1]))
-        same = sum(checksum(out) == checksum(folder / "whole.nc") for out in outs)
-        names = [out.name for out in (*outs, folder / "whole.nc")]
-        rest = [name for name in left(folder) if name not in names]
-    rows = [["builds killed, at random moments", f"{killed}"],
-            ["starts that resumed from finished parts", f"{resumed}"],
-            ["tables completed", f"{len(outs)}"],
-            ["of them with the data of an undisturbed build", f"{same}"],
-            ["other files left", f"{len(rest)}"]]  # fmt: skip
-    return markdown(("", "count"), rows)
-
-
-SECTIONS = {"faults": faults, "killed_builds": killed_builds}
+SECTIONS = {"faults": faults}
 
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0)
+    main(__doc__, SECTIONS)

@@ -23,8 +23,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.measuring import ROOT, main, markdown, progress
+import numpy as np
+
+from benchmarks.measuring import ROOT, main, markdown
 from fuzz.hostile_tables import HOSTILE, SMALLEST
+from mumacro import Surrogate, TableError
+from mumacro.table import parse_table
 
 STEP = 256  # bytes between truncations
 MORE = 256 * 2**20  # bytes of memory allowed for opening a file
@@ -33,7 +37,6 @@ PATIENCE = 3600.0  # seconds for one share of work
 HEAD = ("the smallest table", "files", "refused", "same answers", "same answers, other texts",
         "other answers, or a crash", "slowest [s]", "memory [MB]")  # fmt: skip
 CHANGES = {"cut": f"cut at every {STEP} bytes", "flip": "every byte in turn, some of its bits flipped"}
-
 REFUSED, SAME, TEXTS, DIFFERS, ESCAPED, DIED = "refused", "same", "texts", "differs", "escaped", "died"
 
 
@@ -61,19 +64,16 @@ def work(start: int, count: int, change: str, stride: int = 1) -> Iterator[tuple
         yield offset, bytes(changed)
 
 
-def in_other_process(*arguments: str, timeout: float = PATIENCE) -> tuple[list[Outcome], int]:
-    """Results of the other process, one a line, and its exit code."""
-    command = [sys.executable, "-m", "fuzz.tables", "open", *arguments]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False)
-    if done.returncode:
-        progress(done.stderr)
-    return [Outcome(*json.loads(line)) for line in done.stdout.splitlines()], done.returncode
+def in_other_process(*arguments: object) -> list[Outcome]:
+    """Results of the other process, one a line; the last is :data:`DIED` if it crashed."""
+    command = [sys.executable, "-m", "fuzz.tables", "open", *map(str, arguments)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    found = [Outcome(*json.loads(line)) for line in done.stdout.splitlines()]
+    return found if done.returncode == 0 else [*found, Outcome(DIED, done.stderr[-300:], 0.0, 0.0)]
 
 
-def ask(table: Any) -> None:
+def ask(table: Surrogate) -> None:
     """Evaluate all quantities of a table over the whole range: any answer is allowed, but no crash."""
-    import numpy as np
-
     v, y = np.meshgrid(*2 * [np.concatenate([[0.0, 5e-324, 1e300, np.inf], np.geomspace(1e-6, 1e6, 60)])])
     for quantity in ("mu_ratio", "power", "stick_fraction"):
         table.slopes(v, y, quantity, bounds=True)
@@ -82,10 +82,8 @@ def ask(table: Any) -> None:
 
 
 @functools.cache
-def sound() -> Any:
+def sound() -> Surrogate:
     """The smallest table, with all kernels loaded."""
-    from mumacro import Surrogate
-
     opened = Surrogate.open(SMALLEST)
     ask(opened)
     return opened
@@ -93,9 +91,6 @@ def sound() -> Any:
 
 def outcome(image: bytes, path: Path, before: float = 0.0) -> Outcome:
     """Open one file; ``before`` is the memory [kB] that was used before."""
-    from mumacro import Surrogate, TableError
-    from mumacro.table import parse_table
-
     expected = sound()
     started = time.process_time()
     try:
@@ -131,25 +126,19 @@ def open_all(arguments: Sequence[str]) -> None:
 
 def damaged(share: float, change: str) -> list[Outcome]:
     """Every copy of the smallest table with one change; if ``share`` is less than 1, bytes are skipped."""
-    total, size = SMALLEST.stat().st_size, 4096
-    starts = list(range(0, total, size))
     stride = 1 if change == "cut" else round(1.0 / share)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        parts = list(pool.map(lambda start: in_other_process(change, str(start), str(size), str(stride)), starts))
-    found = []
-    for outcomes, code in parts:
-        found += outcomes
-        if code:
-            found.append(Outcome(DIED, f"exit code {code}", 0.0, 0.0))
-    return found
+        starts = range(0, SMALLEST.stat().st_size, 4096)
+        parts = pool.map(lambda start: in_other_process(change, start, 4096, stride), starts)
+        return [one for outcomes in parts for one in outcomes]
 
 
 def row(name: str, found: Sequence[Outcome]) -> list[str]:
     """One row of the table."""
     count = Counter(outcome.what for outcome in found)
-    bad = count[DIFFERS] + count[ESCAPED] + count[DIED]
+    numbers = [len(found), *(count[what] for what in (REFUSED, SAME, TEXTS))]
+    numbers.append(sum(count[what] for what in (DIFFERS, ESCAPED, DIED)))
     worst = max(outcome.seconds for outcome in found), max(outcome.megabytes for outcome in found)
-    numbers = [len(found), count[REFUSED], count[SAME], count[TEXTS], bad]
     return [name, *(f"{n:,}" for n in numbers), f"{worst[0]:.2f}", f"{worst[1]:.0f}"]
 
 
@@ -160,25 +149,25 @@ def damaged_tables(share: float) -> str:
     return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time."
 
 
-def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
-    """Crafted files, opened by another process; after a crash, a new process continues with the next file."""
+def opened(folder: Path) -> list[Outcome]:
+    """Of all crafted files; after a crash, a new process continues with the next file."""
     found: list[Outcome] = []
+    paths = [folder / f"{i}.nc" for i in range(len(HOSTILE))]
+    for path, make in zip(paths, HOSTILE.values(), strict=True):
+        make(path)
+    while len(found) < len(paths):
+        found += in_other_process(*paths[len(found) :])
+    return found
+
+
+def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
+    """Crafted files, opened by another process."""
     with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{i}.nc" for i in range(len(HOSTILE))]
-        for path, make in zip(paths, HOSTILE.values(), strict=True):
-            make(path)
-        while len(found) < len(paths):
-            outcomes, code = in_other_process(*map(str, paths[len(found) :]))
-            found += outcomes
-            if code:
-                found.append(Outcome(DIED, f"exit code {code}", 0.0, 0.0))
-        sizes = [f"{path.stat().st_size / 1e3:,.0f}" for path in paths]
-    rows = [
-        [name, one.what, one.said.replace("|", "/")[:90], size, f"{one.seconds:.2f}", f"{one.megabytes:.0f}"]
-        for name, one, size in zip(HOSTILE, found, sizes, strict=True)
-    ]
-    head = ("content of the file", "result", "reason", "size [kB]", "seconds", "memory so far [MB]")
-    return markdown(head, rows, 3)
+        rows = [
+            [name, one.what, one.said.replace("|", "/")[:90], f"{one.seconds:.2f}", f"{one.megabytes:.0f}"]
+            for name, one in zip(HOSTILE, opened(Path(folder)), strict=True)
+        ]
+    return markdown(("content of the file", "result", "reason", "seconds", "memory so far [MB]"), rows, 3)
 
 
 SECTIONS = {"damaged_tables": damaged_tables, "hostile_tables": hostile_tables}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -22,30 +21,19 @@ except ModuleNotFoundError as error:
 
 __all__ = ["Friction"]
 
-_OPENED: dict[int, Data] = {}  # compiled programs may outlive every Friction
-_OPENING = Lock()
+_OPENED: dict[int, Data] = {}
 
 
 class Friction(DifferentiableFriction):
     """The table's quantities as JAX functions: ``jit``, ``vmap``, ``grad``, ``jvp``, ``hessian``, ``scan`` work.
 
-    Parameters
-    ----------
-    surrogate : Surrogate, optional
-        The table; left out, the tightest one that comes with the library.
+    See :class:`mumacro.interop.derivatives.DifferentiableFriction` for arguments and accuracy.  Programs run on the
+    CPU.  Where a slope is infinite (v0 = 0 at y~ = 1, and for rigid contact), ``jacfwd`` gives NaN along every input.
 
     Raises
     ------
     MumacroError
         When a function is called while JAX has no double precision.
-
-    Notes
-    -----
-    Arguments broadcast together; results are float64 of the broadcast shape, NaN where a case is illegal.  Programs run
-    on the CPU.  First derivatives are those of the table.  Second ones are differences of them: right to 1e-5 of the
-    largest one with the tables 1e-12 and 1e-10, to 1e-2 with 1e-7; NaN at v~ = 0, and for mu_macro where v~ or y~ is
-    zero or infinite.  Third ones raise NotImplementedError.  Where a slope is infinite (v0 = 0 at y~ = 1, and for rigid
-    contact), ``jacfwd`` gives NaN along every input.
 
     Examples
     --------
@@ -58,8 +46,11 @@ class Friction(DifferentiableFriction):
     1.325086
     """
 
-    def __init__(self, surrogate: Surrogate | None = None) -> None:
-        table = _opened(Surrogate.open() if surrogate is None else surrogate)
+    def _open(self, table: int, surrogate: Surrogate) -> None:
+        if not _OPENED:
+            jax.ffi.register_ffi_target("mumacro", jax.ffi.pycapsule(xla_handler()), platform="cpu")
+        if table not in _OPENED:
+            _OPENED[table] = open_for_xla(table, surrogate.prepared())
         slopes = [_slopes_of_plane(table, code) for code in range(len(QUANTITY_NAMES))]
         self._known = {name: _value(table, code, slopes[code]) for code, name in enumerate(QUANTITY_NAMES)}
         self._known["mu_macro"] = _value(table, 0, _slopes_of_six(table, self._known["mu_ratio"], slopes[0]))
@@ -68,18 +59,6 @@ class Friction(DifferentiableFriction):
         if not jax.config.jax_enable_x64:
             raise MumacroError('mumacro.jax needs double precision: jax.config.update("jax_enable_x64", True)')
         return self._known[quantity](*jnp.broadcast_arrays(*(jnp.asarray(x, jnp.float64) for x in arguments)))
-
-
-def _opened(surrogate: Surrogate) -> int:
-    """The number by which compiled programs find the table: it comes from the table's checksum."""
-    table = int(surrogate.checksum[:15], 16)
-    with _OPENING:
-        if table not in _OPENED:
-            if not _OPENED:
-                handler = jax.ffi.pycapsule(xla_handler())
-                jax.ffi.register_ffi_target("mumacro", handler, platform="cpu")
-            _OPENED[table] = open_for_xla(table, surrogate.prepared())
-    return table
 
 
 def _ask(table: int, code: int, order: int, results: int, arguments: tuple[Any, ...]) -> Any:

@@ -8,38 +8,28 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import measuring
-from builder.steady import border, solve
-from comparing import close
+from benchmarks import measuring, tables_readme
 
 ROOT = Path(__file__).resolve().parent.parent
 Row = dict[str, str]
 
 
-def run(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """One script of benchmarks/, in a separate process, from the root."""
+def run(script: str, *arguments: str) -> list[list[Row]]:
+    """The tables that a script of benchmarks/ prints, in a separate process, from the root."""
     command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    return tables(done.stdout)
 
 
 def tables(text: str) -> list[list[Row]]:
     """Every Markdown table in ``text``, rows as mappings from the header; unequal lengths are an error."""
     found: list[list[Row]] = []
-    block: list[list[str]] = []
-    for line in [*text.splitlines(), ""]:
-        if line.startswith("|"):
-            block.append([cell.strip() for cell in line.strip("|").split("|")])
-        elif block:
-            header, rule, *rows = block
-            assert all(re.fullmatch(r"-+:?", cell) for cell in rule)
-            found.append([dict(zip(header, row, strict=True)) for row in rows])
-            block = []
+    for block in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
+        header, rule, *rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines())
+        assert all(re.fullmatch(r"-+:?", cell) for cell in rule)
+        found.append([dict(zip(header, row, strict=True)) for row in rows])
     return found
-
-
-def number(cell: str) -> float:
-    """A printed number."""
-    return float(cell.replace(",", ""))
 
 
 # --- results ------------------------------------------------------------------------------------------
@@ -58,131 +48,64 @@ def test_a_result_is_stored_and_put_between_its_markers(tmp_path: Path, monkeypa
     assert page.read_text("utf-8") == f"before\n<!-- begin times -->\n\n{stored}\n<!-- end times -->\nafter\n"
     assert (tmp_path / "results" / "trial-other.md").exists()
     assert "## other\n\nelsewhere" in capsys.readouterr().out
+    for short in ("--quick", "--share=0.5"):  # short runs are never stored
+        monkeypatch.setattr(sys, "argv", ["trial.py", "--write", short])
+        with pytest.raises(SystemExit):
+            measuring.main(None, {}, quick=False, share=1.0)
+        assert "--write stores full runs only" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("short", ["--quick", "--share=0.5"])
-def test_short_runs_are_never_stored(short: str, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(sys, "argv", ["trial.py", "--write", short])
-    with pytest.raises(SystemExit):
-        measuring.main(None, {}, quick=False, share=1.0)
-    assert "--write stores full runs only" in capsys.readouterr().err
+def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
+    page = (ROOT / "tables" / "README.md").read_text("utf-8")
+    section = page.split("<!-- begin tables -->")[1].split("<!-- end tables -->")[0]
+    assert tables_readme.tables(build=False, workers=2).strip() in section
 
 
-# --- the model ----------------------------------------------------------------------------------------
+# --- what the scripts print -----------------------------------------------------------------------------
 
 SLOW = {"model", "angles", "slow_angle", "stiffness", "blocks", "layer", "settle", "cusp", "creep"}
 SECTIONS = [
-    pytest.param(script, name, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
+    pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
     for script in ("validation", "validity", "model_facts", "hard_cases")
-    for name in importlib.import_module(f"benchmarks.{script}").SECTIONS
+    for name, section in importlib.import_module(f"benchmarks.{script}").SECTIONS.items()
 ]
 
 
-@pytest.mark.parametrize(("script", "section"), SECTIONS)
-def test_a_section_is_a_table_of_finite_numbers(script: str, section: str) -> None:
-    found = tables(importlib.import_module(f"benchmarks.{script}").SECTIONS[section]())
+def check(found: list[list[Row]]) -> None:
     assert found
     assert all(found)
     assert not {"nan", "inf", "-inf"} & {cell for table in found for row in table for cell in row.values()}
 
 
-def test_the_solver_beats_every_naive_number() -> None:
-    hard = importlib.import_module("benchmarks.hard_cases")
-    (roots,) = tables(hard.double_root())
-    assert number(roots[-1]["its rel error"]) > 0.1  # 1 - 1 shortly after the onset
-    assert max(number(row["rel error, root divided out"]) for row in roots) < 1e-13
-    (ends,) = tables(hard.surplus())
-    assert number(ends[1]["max rel error"]) < 1e-14 < number(ends[0]["max rel error"])
-    (rounded,) = tables(hard.exact_eta())
-    assert number(rounded[-1]["rel change of mu~ by rounding y~"]) > 1e-8
-
-
-def test_the_loss_halves_at_the_second_step() -> None:
-    # mu~ approaches 1 around v~ = 1
-    assert solve(1.0, 0.1).deficit / (1.0 - border(0.1)[1]) == close(0.5, abs=0.002)
-
-
-# --- speed --------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def speed() -> list[list[Row]]:
-    """The tables that a quick comparison prints."""
-    done = run("speed_against_error", "--quick", "--rounds", "1")
-    assert done.returncode == 0, done.stderr
-    return tables(done.stdout)
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_section_is_a_table_of_finite_numbers(section) -> None:
+    check(tables(section()))
 
 
 @pytest.mark.slow
-def test_tables_keep_their_tolerance_where_plain_grids_do_not(speed: list[list[Row]]) -> None:
-    comparison, single, quantities = speed
-    assert len(single) == 4
+@pytest.mark.parametrize(
+    "script",
+    ["calls --quick", "c_header --quick", "cold_start --quick", "solver --quick --rounds 1"],
+)
+def test_a_script_prints_tables_of_finite_numbers(script: str) -> None:
+    check(run(*script.split()))
+
+
+@pytest.mark.slow
+def test_tables_keep_their_tolerance_where_plain_grids_do_not() -> None:
+    comparison, quantities = run("speed_against_error", "--quick", "--rounds", "1")
+    check([comparison, quantities])
+    seen = []
     for row in comparison:
-        name = row["method"].strip("*")
-        assert number(row["ns/point"]) > 0.0
+        name, error = row["method"].strip("*"), float(row["max abs error"])
         if name.startswith("mumacro-"):
-            tolerance = float(name.removeprefix("mumacro-"))
-            assert 0.0 < number(row["max abs error"]) <= tolerance
-            assert number(row["max rel error"]) <= 10.0 * tolerance
-        elif " x " in row["data"]:
-            assert number(row["max abs error"]) > 1e-3, "24 and 48 nodes a side cannot follow the border"
-    for path in (ROOT / "tables").glob("*.nc"):
-        names = [row["method"] for row in comparison]
-        assert names.count(f"**{path.stem}**") == 2, "one thread and all cores"
-    for row in quantities:
-        assert row["max bound"] == "-" or number(row["max error"]) <= number(row["max bound"])
-
-
-@pytest.mark.slow
-def test_linear_peers_agree_with_each_other(speed: list[list[Row]]) -> None:
-    linear = ("RegularGridInterpolator linear", "map_coordinates order 1", "interpn linear", "xarray interp linear")
-    for size in ("24 x 24", "48 x 48"):
-        errors = {
-            (row["max abs error"], row["max rel error"])
-            for row in speed[0]
-            if row["data"] == size and row["method"].endswith(linear)
-        }
-        assert len(errors) == 1, "the same grid, the same interpolant"
-
-
-@pytest.mark.slow
-def test_solver_script_prints_its_tables() -> None:
-    done = run("solver", "--quick", "--rounds", "1")
-    assert done.returncode == 0, done.stderr
-    regimes, accuracy, marching, slowing = tables(done.stdout)
-    assert [row["regime"] for row in regimes] == ["all", "continuous", "stick-slip"]
-    assert sum(number(row["points"]) for row in regimes) == 2 * 500
-    total = accuracy[-1]
-    assert number(total["points"]) == 496
-    assert number(total["max abs error"]) < 1e-15
-    assert number(total["failed"]) == 0
-    assert 0.0 < number(marching[0]["max abs error"]) < 1e-6
-    assert number(slowing[1]["cycles"]) > number(slowing[0]["cycles"])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "cold_start --quick", "files --rows 20000"])
-def test_a_script_prints_positive_times(script: str) -> None:
-    done = run(*script.split())
-    assert done.returncode == 0, done.stderr
-    for table in tables(done.stdout):
-        for row in table:
-            assert number(list(row.values())[-1 if "files" in script else 1]) > 0.0
+            assert 0.0 < error <= float(name.removeprefix("mumacro-"))
+            seen.append(name)
+        assert " x " not in row["data"] or error > 1e-3, "24 and 48 nodes a side cannot follow the border"
+    assert sorted(seen) == sorted(path.stem for path in (ROOT / "tables").glob("*.nc"))
 
 
 @pytest.mark.slow
 def test_picture_of_the_surface_is_drawn(tmp_path: Path) -> None:
-    done = run("surface", str(tmp_path / "surface.png"))
-    assert done.returncode == 0, done.stderr
+    assert run("surface", str(tmp_path / "surface.png")) == []
     assert (tmp_path / "surface.png").read_bytes().startswith(b"\x89PNG")
-
-
-# --- tables/README.md ---------------------------------------------------------------------------------
-
-
-def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
-    from benchmarks.tables_readme import tables as printed
-
-    page = (ROOT / "tables" / "README.md").read_text("utf-8")
-    section = page.split("<!-- begin tables -->")[1].split("<!-- end tables -->")[0]
-    assert printed(build=False, workers=2).strip() in section

@@ -4,6 +4,8 @@ import importlib
 import math
 import sys
 import warnings
+from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 from comparing import close
-from mumacro import InputError, MumacroError, Surrogate
+from mumacro import SOURCES, InputError, MumacroError, Surrogate
 from mumacro.inputs import FIELDS
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -198,23 +200,7 @@ def test_jax_transformations_compose(jax: ModuleType, in_jax: Any, table: Surrog
         np.testing.assert_array_equal(slopes, partials(table, "power", v[:2], y)[0])
 
 
-def test_jax_gets_nan_for_illegal_cases_and_rigid_contact_for_none(jax: ModuleType, in_jax: Any) -> None:
-    v0 = jax.numpy.array([0.01, -1.0, math.nan])
-    case = {**CASE, "k": None}
-    found = jax.vmap(jax.value_and_grad(lambda v: in_jax.mu_macro(**{**case, "v0": v})))(v0)
-    expected = Surrogate.open(1e-10).evaluate({**CASE, "k": math.inf}, gradient=True)
-    assert expected.gradient is not None
-    assert float(found[0][0]) == expected.mu_macro
-    assert float(found[1][0]) == expected.gradient["v0"]
-    assert np.isnan(np.asarray(found)[:, 1:]).all()
-    # an infinite slope along the speed does not spoil that along the amplitude
-    assert jax.grad(in_jax.mu_ratio, argnums=1)(0.0, 1.0) == 0.0
-    assert jax.grad(in_jax.mu_ratio, argnums=0)(0.0, 1.0) == math.inf
-
-
-def test_jax_raises_for_third_derivatives_and_float32(jax: ModuleType, in_jax: Any) -> None:
-    with pytest.raises(NotImplementedError, match="third derivatives are not tabulated"):
-        jax.grad(jax.grad(jax.grad(lambda v: in_jax.mu_ratio(v, 0.5))))(0.1)
+def test_jax_in_single_precision_is_refused(jax: ModuleType, in_jax: Any) -> None:
     jax.config.update("jax_enable_x64", False)
     try:
         with pytest.raises(MumacroError, match="jax_enable_x64"):
@@ -290,19 +276,35 @@ def test_torch_checks_the_gradient_by_the_six_inputs(torch: ModuleType, in_torch
 
 @pytest.mark.filterwarnings("ignore")
 def test_torch_transformations_compose(torch: ModuleType, in_torch: Any, table: Surrogate) -> None:
-    from torch.func import vmap
+    from torch.func import grad, hessian, jacrev, jvp, vmap
 
     v, y = torch.tensor([0.1, 0.2, 3.0], dtype=torch.float64), torch.tensor([0.5, 2.0], dtype=torch.float64)
     plane = vmap(vmap(in_torch.mu_ratio, in_dims=(None, 0)), in_dims=(0, None))(v, y)
     np.testing.assert_array_equal(plane.numpy(), table.mu_ratio(v.numpy()[:, None], y.numpy()))
     np.testing.assert_array_equal(in_torch.mu_ratio(v[:, None], y).numpy(), plane.numpy())
     speeds = v[:2].clone().requires_grad_()
-    (slopes,) = torch.autograd.grad(in_torch.power(speeds, y).sum(), speeds)
-    np.testing.assert_array_equal(slopes.numpy(), partials(table, "power", v[:2], y)[0])
+    expected = partials(table, "power", v[:2], y)[0]
+    ways = {
+        "autograd": torch.autograd.grad(in_torch.power(speeds, y).sum(), speeds)[0],
+        "grad": grad(lambda a: in_torch.power(a, y).sum())(v[:2]),
+        "vmap of grad": vmap(grad(in_torch.power))(v[:2], y),
+        "grad of vmap": grad(lambda a: vmap(in_torch.power)(a, y).sum())(v[:2]),
+        "jacrev": jacrev(in_torch.power)(v[:2], y).diagonal(),
+        "compiled": torch.compile(grad(lambda a: in_torch.power(a, y).sum()), backend="aot_eager")(v[:2]),
+    }
+    for way, slopes in ways.items():
+        np.testing.assert_array_equal(slopes.numpy(), expected, err_msg=way)
     batch = torch.autograd.grad(
         in_torch.power(speeds, y), speeds, torch.eye(2, dtype=torch.float64), is_grads_batched=True
     )
-    np.testing.assert_array_equal(batch[0].numpy(), np.diag(slopes.numpy()))
+    np.testing.assert_array_equal(batch[0].numpy(), np.diag(expected))
+    bend = grad(grad(in_torch.power))(v[0], y[0])
+    assert bend.item() == bends(table, "power", v[:1], y[:1])[0, 0]
+    given = (v[0], torch.ones_like(v[0]))
+    for forwards in (lambda: jvp(lambda a: in_torch.power(a, y[0]), *((x,) for x in given)),
+                     lambda: hessian(lambda a: in_torch.power(a, y[0]))(v[0])):  # fmt: skip
+        with pytest.raises(NotImplementedError, match="jvp"):  # no zero slope
+            forwards()
     single = torch.tensor([0.1, 0.5], requires_grad=True)  # single precision
     ratio = in_torch.mu_ratio(single, 2.0)
     assert ratio.dtype == torch.float64
@@ -311,27 +313,12 @@ def test_torch_transformations_compose(torch: ModuleType, in_torch: Any, table: 
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_torch_gets_nan_for_illegal_cases_and_rigid_contact_for_none(torch: ModuleType, in_torch: Any) -> None:
-    (v0,) = leaves(torch, [0.01, -1.0, math.nan])
-    found = in_torch.mu_macro(**{**CASE, "k": None, "v0": v0})
-    found.sum().backward()
-    expected = Surrogate.open(1e-10).evaluate({**CASE, "k": math.inf}, gradient=True)
-    assert expected.gradient is not None
-    assert found[0].item() == expected.mu_macro
-    assert v0.grad[0].item() == expected.gradient["v0"]
-    assert torch.isnan(found[1:]).all()
-    assert torch.isnan(v0.grad[1:]).all()
-    speed, amplitude = leaves(torch, 0.0, 1.0)
-    in_torch.mu_ratio(speed, amplitude).backward()
-    assert (speed.grad.item(), amplitude.grad.item()) == (math.inf, 0.0)
-
-
-@pytest.mark.filterwarnings("ignore")
 def test_torch_compiles_the_whole_program_with_its_derivatives(torch: ModuleType, in_torch: Any) -> None:
     six = [torch.tensor(CASE[name], dtype=torch.float64) for name in FIELDS]
     expected = Surrogate.open(1e-10).evaluate(CASE, gradient=True)
     assert expected.gradient is not None
     compiled = torch.compile(lambda *x: in_torch.mu_macro(*x).square(), fullgraph=True, backend="aot_eager")
+    assert compiled(*six).item() == expected.mu_macro**2
     given = [x.clone().requires_grad_() for x in six]
     found = compiled(*given)
     found.backward()
@@ -340,10 +327,53 @@ def test_torch_compiles_the_whole_program_with_its_derivatives(torch: ModuleType
     np.testing.assert_allclose([x.grad.item() for x in given], slopes, rtol=1e-14)
 
 
+# --- both -----------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Inside:
+    """Friction in a library, and what this calls arrays, derivatives and compiling."""
+
+    friction: Any
+    array: Any
+    grad: Any
+    compiled: Any
+
+
+@pytest.fixture(params=["jax", "torch"])
+def inside(request: pytest.FixtureRequest) -> Inside:
+    library = request.getfixturevalue(request.param)
+    friction = request.getfixturevalue(f"in_{request.param}")
+    if request.param == "jax":
+        return Inside(friction, library.numpy.asarray, library.grad, library.jit)
+    array, compiled = partial(library.tensor, dtype=library.float64), partial(library.compile, backend="aot_eager")
+    return Inside(friction, array, library.func.grad, compiled)
+
+
 @pytest.mark.filterwarnings("ignore")
-def test_torch_raises_for_third_derivatives(torch: ModuleType, in_torch: Any) -> None:
-    (v,) = leaves(torch, 0.1)
-    (slope,) = torch.autograd.grad(in_torch.mu_ratio(v, 0.5), v, create_graph=True)
-    (bend,) = torch.autograd.grad(slope, v, create_graph=True)
+@pytest.mark.parametrize("v0", [0.01, -1.0, math.nan])
+def test_illegal_cases_are_nan_also_when_compiled_and_rigid_contact_is_none(inside: Inside, v0: float) -> None:
+    def mu_macro(v: Any) -> Any:
+        return inside.friction.mu_macro(**{**CASE, "k": None, "v0": v})
+
+    expected = Surrogate.open(1e-10).evaluate({**CASE, "k": math.inf, "v0": np.array([v0])}, gradient=True)
+    assert expected.gradient is not None
+    at = inside.array(v0)
+    for way in (lambda function: function, inside.compiled):
+        found = [float(way(mu_macro)(at)), float(way(inside.grad(mu_macro))(at))]
+        np.testing.assert_array_equal(found, [expected.mu_macro[0], expected.gradient["v0"][0]])
+    assert expected.source_code.tolist() == [SOURCES.index("rigid") if v0 == 0.01 else -1]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_edges_of_derivatives_and_arguments(inside: Inside) -> None:
+    ratio, array, grad = inside.friction.mu_ratio, inside.array, inside.grad
+    # an infinite slope along the speed does not spoil that along the amplitude
+    assert [float(grad(ratio, argnums=i)(array(0.0), array(1.0))) for i in (0, 1)] == [math.inf, 0.0]
     with pytest.raises(NotImplementedError, match="third derivatives are not tabulated"):
-        torch.autograd.grad(bend, v)
+        grad(grad(grad(lambda v: ratio(v, 0.5))))(array(0.1))
+    with pytest.raises((ValueError, RuntimeError), match=r"shapes|size"):
+        ratio(array([1.0, 2.0]), array([1.0, 2.0, 3.0]))
+    for wrong in ("fast", None, [array(1.0), "x"]):
+        with pytest.raises((TypeError, ValueError)):
+            ratio(wrong, array(0.5))

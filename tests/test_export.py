@@ -2,147 +2,136 @@
 
 import csv
 import json
-import math
-import os
 import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 from scipy.io import loadmat
 
+from builder.__main__ import main
 from builder.c import wasm
-from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table, long_columns
+from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table
 from comparing import close
 from mumacro.errors import TableError
 from mumacro.table import read_table
 
 pytestmark = pytest.mark.slow
 
-
-@pytest.fixture(scope="module")
-def path(tables_dir):
-    return tables_dir / "mumacro-1e-10.nc"
+PATH = Path(__file__).resolve().parent.parent / "tables" / "mumacro-1e-10.nc"
+AXES, PLANES = ("v_tilde", "y_tilde", "v_tilde_crit"), ("mu_ratio", "stick_fraction", "error_estimate")
 
 
 @pytest.fixture(scope="module")
-def table(path):
-    return read_table(path)
+def table():
+    return read_table(PATH)
 
 
 @pytest.fixture(scope="module")
-def written(path, tmp_path_factory):
+def written(tmp_path_factory):
     """Every format, once."""
     folder = tmp_path_factory.mktemp("export")
     for kind, (name, _) in FORMATS.items():
-        if kind == "parquet":
-            pytest.importorskip("pyarrow")
-        if kind == "wasm" and wasm.compiler() is None:
-            continue
-        export_table(path, kind, folder / name.format("grid"))
+        if kind != "wasm" or wasm.compiler() is not None:
+            export_table(PATH, kind, folder / name.format("grid"))
     return folder
 
 
-def matrices(text):
+# --- the numbers, by the program of each format; and the attributes that it carries ---------------------
+
+
+def from_columns(columns, table):
+    """Columns of a row a node as matrices and axes."""
+    full = {name: np.asarray(column, dtype=float).reshape(table.mu_ratio.shape) for name, column in columns.items()}
+    assert list(full) == ["v_tilde", "y_tilde", *PLANES, "v_tilde_crit"]
+    for name in AXES:
+        full[name] = full[name][:, 0] if name == "v_tilde" else full[name][7]
+    return full
+
+
+def from_csv(path, table):
+    with path.open(newline="", encoding="ascii") as stream:
+        header, *rows = csv.reader(stream)
+    return from_columns(dict(zip(header, zip(*rows, strict=True), strict=True)), table), {}
+
+
+def from_mat(path, _table):
+    found = loadmat(path)
+    assert all(found[name].shape[1] == 1 for name in AXES)
+    info = {name: found["info"][0, 0][name].ravel()[0] for name in ("tolerance", "content_sha256")}
+    return {name: found[name].ravel() if name in AXES else found[name] for name in (*AXES, *PLANES)}, info
+
+
+def from_parquet(path, table):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    found = parquet.read_table(path)
+    attributes = {key.decode(): value.decode() for key, value in found.schema.metadata.items()}
+    return from_columns({name: found[name].to_numpy() for name in found.column_names}, table), attributes
+
+
+def matrices(path):
     """The matrices of a Modelica text table, by the rules of ModelicaStandardTables: #1, headers, numbers, comments."""
-    first, *lines = text.splitlines()
-    assert first == "#1"
-    found, name, shape, numbers = {}, None, None, []
-    for line in [*lines, "double end(0,0)"]:
-        body = line.split("#", 1)[0].strip()
-        header = re.fullmatch(r"(?:double|float)\s+(\w+)\s*\(\s*(\d+)\s*,\s*(\d+)\s*\)", body)
-        if header:
-            if name is not None:
-                assert len(numbers) == shape[0] * shape[1], name
-                found[name] = np.array(numbers).reshape(shape)
-            name, shape, numbers = header[1], (int(header[2]), int(header[3])), []
-        else:
-            numbers += [float(word) for word in re.split(r"[\s,;]+", body) if word]
+    first, *parts = re.split(r"^double (\w+)\((\d+),(\d+)\)$", path.read_text("ascii"), flags=re.MULTILINE)
+    assert first.startswith("#1\n")
+    assert all(line.startswith("#") for line in first.splitlines())
+    found = {}
+    for name, rows, columns, numbers in zip(*(parts[i::4] for i in range(4)), strict=True):
+        found[name] = np.array(numbers.split(), dtype=float).reshape(int(rows), int(columns))
     return found
 
 
-def test_a_row_of_the_csv_is_a_node(table, written):
-    with (written / "grid.csv").open(newline="", encoding="ascii") as stream:
-        header, *rows = csv.reader(stream)
-    assert header == ["v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit"]
-    assert len(rows) == table.mu_ratio.size
-    columns = dict(zip(header, np.array(rows, dtype=np.float64).T, strict=True))
-    shape = table.mu_ratio.shape
-    assert np.array_equal(columns["mu_ratio"].reshape(shape), table.mu_ratio)
-    assert np.array_equal(columns["v_tilde"].reshape(shape)[:, 0], table.v_tilde)
-    assert np.array_equal(columns["y_tilde"].reshape(shape)[3], table.y_tilde)
-    assert np.array_equal(columns["v_tilde_crit"].reshape(shape)[5], table.v_tilde_crit)
-    assert np.array_equal(columns["stick_fraction"].reshape(shape), table.stick_fraction)
+def from_modelica(path, _table):
+    read = matrices(path)
+    assert tuple(read) == MODELICA_TABLES
+    for name in PLANES:
+        v, y = read[name][1:, 0], read[name][0, 1:]
+        if name != "error_estimate":
+            logarithmic = read[f"{name}_log10"]
+            assert logarithmic[1:, 0] == close(np.log10(v), abs=1e-15)
+            assert logarithmic[0, 1:] == close(np.log10(y), abs=1e-15)
+            assert np.all(np.diff(logarithmic[1:, 0]) > 0.0)  # axes of a CombiTable2Ds ascend strictly
+            assert np.array_equal(logarithmic[1:, 1:], read[name][1:, 1:])
+        assert read[name][0, 0] == 0.0
+    assert np.array_equal(read["v_tilde_crit"][:, 0], y)
+    held = {name: read[name][1:, 1:] for name in PLANES}
+    return held | {"v_tilde": v, "y_tilde": y, "v_tilde_crit": read["v_tilde_crit"][:, 1]}, {}
 
 
-def test_the_mat_file_holds_the_matrices(table, written):
-    found = loadmat(written / "grid.mat")
-    for name in ("mu_ratio", "stick_fraction", "error_estimate"):
-        assert np.array_equal(found[name], getattr(table, name))
-    for name in ("v_tilde", "y_tilde", "v_tilde_crit"):
-        assert found[name].shape == (getattr(table, name).size, 1)
-        assert np.array_equal(found[name].ravel(), getattr(table, name))
-    info = found["info"][0, 0]
-    assert info["tolerance"][0, 0] == 1e-10
-    assert info["content_sha256"][0] == table.attributes["content_sha256"]
-
-
-def test_the_modelica_file_is_one_by_its_rules(table, written):
-    text = (written / "grid.txt").read_text("ascii")
-    found = matrices(text)
-    assert tuple(found) == MODELICA_TABLES
-    assert len(re.findall(r"^double \w+\(\d+,\d+\)$", text, re.MULTILINE)) == len(found)
-    for name in ("mu_ratio", "stick_fraction", "error_estimate"):
-        matrix = found[name]
-        assert matrix[0, 0] == 0.0
-        assert np.array_equal(matrix[1:, 0], table.v_tilde)
-        assert np.array_equal(matrix[0, 1:], table.y_tilde)
-        assert np.array_equal(matrix[1:, 1:], getattr(table, name))
-    for name in ("mu_ratio_log10", "stick_fraction_log10"):
-        matrix = found[name]
-        assert matrix[1:, 0] == close(np.log10(table.v_tilde), abs=1e-15)
-        assert matrix[0, 1:] == close(np.log10(table.y_tilde), abs=1e-15)
-        assert np.array_equal(matrix[1:, 1:], getattr(table, name.removesuffix("_log10")))
-        # axes of a CombiTable2Ds ascend strictly
-        assert np.all(np.diff(matrix[1:, 0]) > 0.0)
-        assert np.all(np.diff(matrix[0, 1:]) > 0.0)
-    assert np.array_equal(found["v_tilde_crit"], np.column_stack((table.y_tilde, table.v_tilde_crit)))
-
-
-def test_parquet_has_the_rows_and_the_tables_attributes(table, written):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    found = parquet.read_table(written / "grid.parquet")
-    for name, column in long_columns(table).items():
-        assert np.array_equal(found[name].to_numpy(), column)
-    metadata = {key.decode(): value.decode() for key, value in found.schema.metadata.items()}
-    assert metadata["content_sha256"] == table.attributes["content_sha256"]
-    assert float(metadata["tolerance"]) == 1e-10
+@pytest.mark.parametrize("read", [from_csv, from_mat, from_parquet, from_modelica])
+def test_a_format_holds_the_grid_and_what_it_can_of_the_attributes(table, written, read):
+    kind = read.__name__.removeprefix("from_")
+    found, attributes = read(written / FORMATS[kind][0].format("grid"), table)
+    for name in (*AXES, *PLANES):
+        assert np.array_equal(found[name], getattr(table, name)), name
+    assert float(attributes.get("tolerance", 1e-10)) == 1e-10
+    assert attributes.get("content_sha256", table.attributes["content_sha256"]) == table.attributes["content_sha256"]
+    assert bool(attributes) == (kind in ("mat", "parquet"))
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_the_same_table_gives_the_same_bytes(path, written, tmp_path, kind):
+def test_the_same_table_gives_the_same_bytes(written, tmp_path, kind):
     if kind == "wasm" and wasm.compiler() is None:
         with pytest.raises(wasm.WasmError, match="zig"):
-            export_table(path, kind, tmp_path / "again")
+            export_table(PATH, kind, tmp_path / "again")
         pytest.skip("neither zig nor clang with lld is installed")
-    export_table(path, kind, tmp_path / "again.h")
+    export_table(PATH, kind, tmp_path / "again.h")
     assert (tmp_path / "again.h").read_bytes() == (written / FORMATS[kind][0].format("grid")).read_bytes()
     assert [entry.name for entry in tmp_path.iterdir()] == ["again.h"]
 
 
-def test_c_in_three_files_is_written_twice_alike(path, tmp_path):
+def test_c_in_three_files_is_written_twice_alike(tmp_path):
     for folder in ("one", "two", "two"):
-        export_table(path, "c", tmp_path / folder)
-    one, two = (
-        {entry.name: entry.read_bytes() for entry in (tmp_path / folder).iterdir()} for folder in ("one", "two")
-    )
+        export_table(PATH, "c", tmp_path / folder)
+    one, two = ({file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "two"))
     assert set(one) == {"mumacro.h", "mumacro.c", "mumacro_table.c"}
     assert one == two
 
 
-def test_octave_reads_the_mat_file(table, written, repository, surrogate):
+def test_octave_reads_the_mat_file(table, written, repository, surrogate, case):
     if shutil.which("octave-cli") is None:
         pytest.skip("octave-cli is not installed")
     command = ["octave-cli", "--norc", "examples/octave_mat.m", str(written / "grid.mat")]
@@ -150,85 +139,61 @@ def test_octave_reads_the_mat_file(table, written, repository, surrogate):
     assert done.returncode == 0, done.stderr
     nodes, across = table.mu_ratio.shape
     assert f"{nodes} x {across} nodes, table of tolerance 1e-10" in done.stdout
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
     shown = float(re.search(r"mu_macro = ([\d.]+)", done.stdout)[1])
     assert shown == close(surrogate.evaluate(**case).mu_macro, abs=1e-4)  # a spline across the border
     shown = float(re.search(r"from v0 = ([\d.]+) m/s", done.stdout)[1])
     assert shown == close(surrogate.v_tilde_crit(2.0 / 3.0) * 3e-6 * 1.3e5, rel=1e-4)
 
 
-def test_the_modelica_example_names_what_is_there(repository):
-    text = (repository / "examples" / "modelica.md").read_text("utf-8")
-    named = set(re.findall(r"`(\w+)`", text)) & set(MODELICA_TABLES)
-    assert named == set(MODELICA_TABLES)
-    assert re.search(r'tableName = "(\w+)"', text)[1] in MODELICA_TABLES
-
-
 def test_the_logarithmic_matrix_is_the_one_to_interpolate(written, surrogate):
-    from scipy.interpolate import RegularGridInterpolator
-
-    rng = np.random.default_rng(8)
-    v, y = 10.0 ** rng.uniform(-2.9, 2.9, (2, 2000))
-    exact = surrogate.mu_ratio(v, y)
+    v, y = 10.0 ** np.random.default_rng(8).uniform(-2.9, 2.9, (2, 2000))
     error = {}
     for name, place in (("mu_ratio", (v, y)), ("mu_ratio_log10", (np.log10(v), np.log10(y)))):
-        matrix = matrices((written / "grid.txt").read_text("ascii"))[name]
+        matrix = matrices(written / "grid.txt")[name]
         linear = RegularGridInterpolator((matrix[1:, 0], matrix[0, 1:]), matrix[1:, 1:])
-        error[name] = np.sqrt(np.mean((linear(np.column_stack(place)) - exact) ** 2))
+        error[name] = np.sqrt(np.mean((linear(np.column_stack(place)) - surrogate.mu_ratio(v, y)) ** 2))
     assert error["mu_ratio_log10"] < error["mu_ratio"] < 0.01
 
 
-def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
-    run_builder, path, table, tmp_path, repository
-):
-    command = [sys.executable, "-m", "builder", "export", str(path), "--format", "mat"]
-    environment = {**os.environ, "PYTHONPATH": str(repository)}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {
-        "table": str(path), "format": "mat", "out": "mumacro-1e-10.mat", "shape": list(table.mu_ratio.shape)
+# --- the command, what is refused -----------------------------------------------------------------------
+
+
+def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(table, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", str(PATH), "--format", "mat"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "table": str(PATH), "format": "mat", "out": "mumacro-1e-10.mat", "shape": list(table.mu_ratio.shape)
     }  # fmt: skip
-    assert math.isclose(loadmat(tmp_path / "mumacro-1e-10.mat")["v_tilde"][0, 0], 1e-3)
-    done = run_builder("export", path, "--format", "csv", "--out", tmp_path / "grid.csv")
-    assert done.returncode == 0, done.stderr
-    assert len((tmp_path / "grid.csv").read_text("ascii").splitlines()) == 1 + table.mu_ratio.size
+    assert np.array_equal(loadmat(tmp_path / "mumacro-1e-10.mat")["mu_ratio"], table.mu_ratio)
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
-    [(("no-such.nc", "--format", "csv"), 1, "no-such.nc"), (("README.md", "--format", "csv"), 1, "README.md"),
-     (("x.nc", "--format", "xls"), 2, "--format"), (("x.nc",), 2, "--format"),
-     (("tables/mumacro-1e-4.nc", "--format", "csv", "--out", "docs"), 2, "--out"),
-     (("tables/mumacro-1e-4.nc", "--format", "csv", "--out", "no/such/folder.csv"), 1, "no/such"),
-     (("tables/mumacro-1e-4.nc", "--format", "csv", "--out", "tables/mumacro-1e-4.nc"), 1, "is the table itself")],
+    [(["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"), (["x.nc", "--format", "xls"], 2, "--format"),
+     (["x.nc"], 2, "--format"), ([str(PATH), "--format", "csv", "--out", "."], 2, "--out")],
 )  # fmt: skip
-def test_what_cannot_be_exported_is_reported_in_one_line(run_builder, arguments, code, said):
-    done = run_builder("export", *arguments)
-    assert done.returncode == code
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
+def test_what_the_command_cannot_export_is_reported_in_one_line(monkeypatch, tmp_path, capsys, arguments, code, said):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)
+    with pytest.raises(SystemExit) as end:
+        sys.exit(main(["export", *arguments]))
+    assert end.value.code == code
+    told = capsys.readouterr().err
+    assert said in told
+    assert len(told.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
 
-def test_a_failure_leaves_the_old_file(path, tmp_path, monkeypatch):
-    out = tmp_path / "grid.csv"
-    out.write_text("before")
-
-    def full(_handle):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space"):
-        export_table(path, "csv", out)
-    assert out.read_text() == "before"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["grid.csv"]
-
-
-def test_parquet_without_pyarrow_names_the_extra(path, tmp_path, monkeypatch):
+def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path, monkeypatch):
+    copy = Path(shutil.copy(PATH, tmp_path / "table.nc"))
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ExportError, match="arrow"):
-        export_table(path, "parquet", tmp_path / "x.parquet")
-    assert list(tmp_path.iterdir()) == []
-    with pytest.raises(ExportError, match="xls"):
-        export_table(path, "xls", tmp_path / "x.xls")
-    with pytest.raises(TableError):
-        export_table(tmp_path / "none.nc", "csv", tmp_path / "x.csv")
+    for path, kind, out, error, said in (
+        (PATH, "parquet", "x.parquet", ExportError, "arrow"),
+        (PATH, "xls", "x.xls", ExportError, "xls"),
+        (tmp_path / "none.nc", "csv", "x.csv", TableError, "no such file"),
+        (copy, "csv", "table.nc", ExportError, "is the table itself"),
+        (PATH, "csv", "no/such/x.csv", FileNotFoundError, "no/such"),
+    ):
+        with pytest.raises(error, match=said):
+            export_table(path, kind, tmp_path / out)
+    assert [(entry.name, entry.read_bytes()) for entry in tmp_path.iterdir()] == [("table.nc", PATH.read_bytes())]

@@ -1,5 +1,6 @@
 """``--format fmu`` and ``fmu3``: FMPy validates and simulates them, with Python's values and derivatives."""
 
+import math
 import os
 import shutil
 import subprocess
@@ -87,40 +88,64 @@ def test_a_simulation_follows_its_inputs(unit, fmpy, table, kind):
     assert set(found["regime"]) == {0, 1}
 
 
-def instance(fmpy, unit, folder, choices=None):
-    """The unit, loaded and initialised with parameters, and its variables by name."""
-    description = fmpy.read_model_description(str(unit))
-    folder = fmpy.extract(str(unit), str(folder))
-    made = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
-    if description.fmiVersion == "2.0":
-        made.setupExperiment(startTime=0.0)
-    at = {v.name: v.valueReference for v in description.modelVariables}
-    for name, value in (choices or {}).items():
-        (made.setInteger if description.fmiVersion == "2.0" else made.setInt64)([at[name]], [value])
-    made.enterInitializationMode()
-    made.exitInitializationMode()
-    return made, at
+class Loaded:
+    """A unit of either standard, loaded and initialised with parameters; variables by name."""
+
+    def __init__(self, fmpy, unit, folder, **parameters):
+        description = fmpy.read_model_description(str(unit))
+        folder = fmpy.extract(str(unit), str(folder))
+        self.unit = unit = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
+        self.at = {variable.name: variable.valueReference for variable in description.modelVariables}
+        self.outputs = [self.at[output.variable.name] for output in description.outputs]
+        if description.fmiVersion == "2.0":
+            unit.setupExperiment(startTime=0.0)
+            self._set, self._get = (unit.setReal, unit.setInteger), (unit.getReal, unit.getInteger)
+            self.save, self.restore, self.drop = unit.getFMUstate, unit.setFMUstate, unit.freeFMUstate
+        else:
+            self._set, self._get = (unit.setFloat64, unit.setInt64), (unit.getFloat64, unit.getInt64)
+            self.save, self.restore, self.drop = unit.getFMUState, unit.setFMUState, unit.freeFMUState
+        for name, value in parameters.items():
+            self.put(**{name: value})
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+
+    def put(self, **values):
+        """Set numbers, or with whole ones enumerations."""
+        for name, value in values.items():
+            self._set[isinstance(value, int)]([self.at[name]], [value])
+
+    def get(self, *names, whole=False):
+        """Numbers, or the values of enumerations."""
+        return self._get[whole]([self.at[name] for name in names])
+
+    def slope(self, output, **seeds):
+        """The derivative of an output along a direction of the inputs."""
+        known = [self.at[name] for name in seeds]
+        return self.unit.getDirectionalDerivative([self.at[output]], known, list(seeds.values()))[0]
 
 
 def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
-    made, at = instance(fmpy, unit, tmp_path)
-    put = made.setReal if hasattr(made, "setReal") else made.setFloat64
-    for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}):
-        put([at[name] for name in FIELDS], list(case.values()))
-        answer = table.evaluate(case, gradient=True)
+    made = Loaded(fmpy, unit, tmp_path)
+    assert made.outputs == [made.at[name] for name in ("mu_macro", "mu_ratio", "force")]
+    for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}, {**CASE, "v0": -0.01}):
+        made.put(**case)
+        answer = table.evaluate({**case, "v0": abs(case["v0"])}, gradient=True)
+        sign = math.copysign(1.0, case["v0"])
+        assert made.get("force") == [close(sign * answer.mu_macro * case["Fz"], rel=1e-13)]
+        signs = {name: sign if name == "v0" else 1.0 for name in FIELDS}
+        gradient = {name: answer.gradient[name] * signs[name] for name in FIELDS}
         for name in FIELDS:
-            slopes = made.getDirectionalDerivative([at["mu_macro"], at["mu_ratio"]], [at[name]], [1.0])
-            of_ratio = (answer.gradient[name] - answer.mu_ratio * (name == "mu0")) / case["mu0"]
-            assert slopes == close([answer.gradient[name], of_ratio], rel=1e-9)
-        seeds = [1e-3 * value for value in case.values()]
-        expected = sum(answer.gradient[name] * seed for name, seed in zip(FIELDS, seeds, strict=True))
-        (along,) = made.getDirectionalDerivative([at["mu_macro"]], [at[name] for name in FIELDS], seeds)
-        assert along == close(expected, rel=1e-9)
-    if hasattr(made, "getAdjointDerivative"):
-        adjoint = made.getAdjointDerivative([at["mu_macro"]], [at[name] for name in FIELDS], [2.0], len(FIELDS))
-        assert adjoint == close([2.0 * answer.gradient[name] for name in FIELDS], rel=1e-9)
-    made.terminate()
-    made.freeInstance()
+            of_ratio = (gradient[name] - answer.mu_ratio * (name == "mu0")) / case["mu0"]
+            of_force = sign * (gradient[name] * case["Fz"] + answer.mu_macro * (name == "Fz"))
+            found = [made.slope(output, **{name: 1.0}) for output in ("mu_macro", "mu_ratio", "force")]
+            assert found == close([gradient[name], of_ratio, of_force], rel=1e-9)
+        seeds = {name: 1e-3 * value for name, value in case.items()}
+        expected = sum(gradient[name] * seed for name, seed in seeds.items())
+        assert made.slope("mu_macro", **seeds) == close(expected, rel=1e-9)
+        if hasattr(made.unit, "getAdjointDerivative"):
+            known = [made.at[name] for name in FIELDS]
+            adjoint = made.unit.getAdjointDerivative([made.at["mu_macro"]], known, [2.0], len(FIELDS))
+            assert adjoint == close([2.0 * slope for slope in gradient.values()], rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -128,63 +153,72 @@ def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
 )
 def test_contacts_and_directions(unit, fmpy, table, tmp_path, contact, direction):
     kind = {"contact": CONTACTS.index(contact), "direction": DIRECTIONS.index(direction)}
-    time = np.linspace(0.0, 1.0, 21)
-    given = np.array(list(zip(time, 10.0 ** (-4.0 + 5.0 * time), strict=True)), dtype=[("time", float), ("v0", float)])
-    found = fmpy.simulate_fmu(
-        str(unit), fmi_type="CoSimulation", stop_time=1.0, output_interval=0.05, input=given,
-        output=["v0", "mu_macro", "y_tilde", "source"], start_values={**kind, "Fz_amplitude": 4.0},
-    )  # fmt: skip
     case = {name: value for name, value in CASE.items() if direction != "normal" or name != "y0"}
     case |= {"Fz_amplitude": 4.0} if direction == "normal" else {}
-    answer = table.evaluate({**case, "v0": found["v0"]}, contact=contact, direction=direction, groups=True)
-    assert np.allclose(found["mu_macro"], answer.mu_macro, rtol=1e-13, atol=0.0)
-    assert np.allclose(found["y_tilde"], answer.y_tilde, rtol=1e-15, atol=0.0)
-    assert np.array_equal(found["source"], answer.source_code)
-    made, at = instance(fmpy, unit, tmp_path, kind)
-    second = hasattr(made, "setReal")
-    put, choose, chosen = (
-        (made.setReal, made.setInteger, made.getInteger) if second else (made.setFloat64, made.setInt64, made.getInt64)
-    )
-    assert chosen([at[name] for name in kind]) == list(kind.values())
-    put([at["Fz_amplitude"]], [4.0])
+    made = Loaded(fmpy, unit, tmp_path, **kind)
+    made.put(Fz_amplitude=4.0)
+    assert made.get(*kind, whole=True) == list(kind.values())
+    for v0 in 10.0 ** np.linspace(-4.0, 1.0, 21):
+        made.put(v0=v0)
+        answer = table.evaluate({**case, "v0": v0}, contact=contact, direction=direction, groups=True)
+        expected = [answer.mu_macro, answer.y_tilde, answer.mu_macro * CASE["Fz"]]
+        assert made.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
+    made.put(v0=CASE["v0"])
     exact = table.evaluate(case, contact=contact, direction=direction, gradient=True).gradient
     for name in (*FIELDS, "Fz_amplitude"):
-        assert made.getDirectionalDerivative([at["mu_macro"]], [at[name]], [1.0]) == close(
-            [exact.get(name, 0.0)], rel=1e-9
-        )
+        assert made.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
     for name, wrong in (("contact", -1), ("contact", 2), ("direction", -1), ("direction", 3), ("source", 0)):
         with pytest.raises(Exception, match="status 3"):
-            choose([at[name]], [wrong])
-    choose([at["contact"], at["direction"]], [1, 2])
+            made.put(**{name: wrong})
+    made.put(contact=1, direction=2)
     with pytest.raises(Exception, match="status 2"):  # a ball whose normal force oscillates
-        (made.getReal if second else made.getFloat64)([at["mu_macro"]])
-    made.freeInstance()
+        made.get("mu_macro")
+
+
+@pytest.mark.parametrize("kind", [{}, {"contact": 1}, {"direction": 1}, {"direction": 2}])
+def test_the_force_passes_through_zero_with_its_derivatives(unit, fmpy, tmp_path, kind):
+    made = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
+    made.put(Fz_amplitude=4.0)
+
+    def force(**moved):
+        made.put(**moved)
+        return made.get("force")[0]
+
+    assert (force(v0=0.0), force(v0=-4e-4)) == (0.0, -force(v0=4e-4))
+    assert 0.0 < force(v0=4e-4) < force(v0=9e-4) < force(v0=1e-3) == CASE["Fz"] * made.get("mu_macro")[0]
+    for case in ({**CASE, "v0": 4e-4}, {**CASE, "v0": -9e-4}, {**CASE, "v0": 0.0}):
+        made.put(**case)
+        slopes = {name: made.slope("force", **{name: 1.0}) for name in FIELDS}
+        for name, value in case.items():
+            step = 1e-5 * (value or 1e-3)
+            difference = (force(**{name: value + step}) - force(**{name: value - step})) / (2.0 * step)
+            made.put(**{name: value})
+            assert slopes[name] == close(difference, rel=2e-4, abs=1e-5 * abs(force()) / (abs(value) + 1e-3)), name
+    for wrong in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(Exception, match="status 3"):
+            made.put(v_rest=wrong)
+    assert made.get("v_rest") == [1e-3]
 
 
 def test_states_are_kept_and_illegal_inputs_are_discarded(unit, fmpy, table, tmp_path):
-    made, at = instance(fmpy, unit, tmp_path)
-    second = hasattr(made, "setReal")
-    put, get = (made.setReal, made.getReal) if second else (made.setFloat64, made.getFloat64)
-    save, restore, drop = (
-        (made.getFMUstate, made.setFMUstate, made.freeFMUstate) if second
-        else (made.getFMUState, made.setFMUState, made.freeFMUState)
-    )  # fmt: skip
+    made = Loaded(fmpy, unit, tmp_path)
     expected = table.evaluate(CASE).mu_macro
-    assert get([at["mu_macro"]]) == [close(expected, rel=1e-13)]
-    kept = save()
-    put([at["v0"]], [-1.0])
-    with pytest.raises(Exception, match="status 2"):  # discard
-        get([at["mu_macro"]])
-    put([at["v0"]], [1.0])
-    assert get([at["mu_macro"]]) != [close(expected, rel=1e-3)]
-    restore(kept)
-    drop(kept)
-    assert get([at["mu_macro"], at["v0"]]) == [close(expected, rel=1e-13), 0.01]
-    with pytest.raises(Exception, match="status 3"):  # no such variable
-        get([99])
-    made.reset()
-    assert get([at["k"]]) == [1e6]
-    made.freeInstance()
+    assert made.get("mu_macro") == [close(expected, rel=1e-13)]
+    kept = made.save()
+    made.put(y0=-1.0)
+    for output in ("mu_macro", "force"):
+        with pytest.raises(Exception, match="status 2"):  # discard
+            made.get(output)
+    made.put(y0=CASE["y0"], v0=1.0)
+    assert made.get("mu_macro") != [close(expected, rel=1e-3)]
+    made.restore(kept)
+    made.drop(kept)
+    assert made.get("mu_macro", "v0") == [close(expected, rel=1e-13), 0.01]
+    made.at["nothing"] = 99
+    with pytest.raises(Exception, match="status 3"):
+        made.get("nothing")
+    made.unit.reset()
+    assert made.get("k", "v_rest") == [1e6, 1e-4]
 
 
 def test_another_units_token_is_refused(unit, fmpy, tmp_path):

@@ -9,12 +9,14 @@ import pytest
 from builder.c.source import write_c
 from comparing import close
 from mumacro import Element, Surrogate
+from mumacro.contact import CONTACTS, DIRECTIONS
 
 REST = 1e-4
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
 #: below and above y~ = 1 and on it; without oscillation; rigid; creeping and fast at v_rest
 CASES = [CASE, {**CASE, "y0": 3e-6}, {**CASE, "y0": 9e-6}, {**CASE, "y0": 0.0}, {**CASE, "omega": 0.0},
          {**CASE, "k": math.inf}, {**CASE, "omega": 1e9}, {**CASE, "omega": 1.0}]  # fmt: skip
+NUMBER, WHOLE, ARRAY = ctypes.c_double, ctypes.c_int, ctypes.POINTER(ctypes.c_double)
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +40,9 @@ def library(sources, compilers):
     made = sources / "force.so"
     compilers.run(*compilers.compiler("gcc"), *options, *sorted(sources.glob("*.c")), "-o", made, "-lm")
     found = ctypes.CDLL(str(made))
-    found.mumacro_force.restype = ctypes.c_double
-    found.mumacro_force.argtypes = [ctypes.c_double] * 7
-    pointer = ctypes.POINTER(ctypes.c_double)
-    found.mumacro_element_step.argtypes = [ctypes.c_int, *[ctypes.c_double] * 5, pointer, pointer]
+    found.mumacro_force.restype, found.mumacro_force.argtypes = NUMBER, [NUMBER] * 7
+    found.mumacro_evaluate_force.argtypes = [WHOLE, WHOLE, *[NUMBER] * 7, ARRAY, ARRAY]
+    found.mumacro_element_step.argtypes = [WHOLE, *[NUMBER] * 5, ARRAY, ARRAY]
     found.mumacro_error_text.restype = ctypes.c_char_p
     return found
 
@@ -52,6 +53,14 @@ def force(library, v, rest=REST, **case):
     return np.array([library.mumacro_force(float(x), rest, *given.values()) for x in np.atleast_1d(v)])
 
 
+def with_slopes(library, pair, v, rest, case):
+    """What mumacro_evaluate_force returns, the force, and its derivatives by mu0, Fz, k, y0, omega, v0."""
+    value, slopes = NUMBER(7.0), (NUMBER * 6)(*[7.0] * 6)
+    codes = CONTACTS.index(pair[0]), DIRECTIONS.index(pair[1])
+    error = library.mumacro_evaluate_force(*codes, v, rest, *case.values(), value, slopes)
+    return error, value.value, np.array(slopes)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_the_force_is_odd_smooth_and_rises(library, table, case) -> None:
     v = np.concatenate([[0.0, 5e-324, 1e-300], np.linspace(0.0, 2.0 * REST, 401)[1:], np.geomspace(1e-3, 10.0, 50)])
@@ -59,8 +68,7 @@ def test_the_force_is_odd_smooth_and_rises(library, table, case) -> None:
     assert np.array_equal(force(library, -v, **case), -found)
     assert found[0] == 0.0
     assert np.all(np.diff(found[3:]) >= -1e-4 * CASE["Fz"] * CASE["mu0"])  # as far as the table's tolerance reaches
-    inside = np.diff(found[3:203])
-    assert np.all(inside >= 0.0)
+    assert np.all(np.diff(found[3:203]) >= 0.0)
     # beyond v_rest it is the table's law, and meets it with the same slope
     law = table.evaluate(**case, v0=v[v >= REST]).mu_macro * case["Fz"]
     assert np.abs(found[v >= REST] / law - 1.0).max() < 1e-13
@@ -72,55 +80,94 @@ def test_the_force_is_odd_smooth_and_rises(library, table, case) -> None:
     assert (at - before) / step == close(slope, rel=1e-3, abs=1e-3 * at / REST)
 
 
-def test_bad_input_gives_nan_and_nothing_else_does(library) -> None:
-    for bad in ({"mu0": 0.0}, {"Fz": -1.0}, {"k": math.nan}, {"y0": math.inf}, {"omega": -1.0}):
-        assert np.isnan(force(library, [0.0, 0.5 * REST, -1.0], **bad)).all()
-    assert np.isnan(force(library, [math.nan, math.inf, -math.inf])).all()
-    for rest in (0.0, -1.0, math.nan, math.inf):
-        assert np.isnan(force(library, [0.0, 1.0], rest)).all()
+@pytest.mark.parametrize(
+    "pair",
+    [("spring", "across"), ("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")],
+    ids="-".join,
+)
+@pytest.mark.parametrize("share", [0.0, 0.3, -0.7, 20.0, -500.0])
+def test_the_force_of_every_contact_has_its_derivatives(library, table, pair, share) -> None:
+    amplitude = {"Fz_amplitude": 4.0} if pair[1] == "normal" else {"y0": CASE["y0"]}  # [N], [m]
+    case = {name: x for name, x in CASE.items() if name != "y0"} | amplitude
+    speed = abs(share) if abs(share) > 1.0 else 0.5 + 0.5 * share * share
+    law = table.evaluate({**case, "v0": speed * REST}, contact=pair[0], direction=pair[1], gradient=True)
+    six = {name: case.get(name, 4.0) for name in CASE} | {"v0": share * REST}
+
+    def at(**moved):
+        *five, v0 = {**six, **moved}.values()
+        return with_slopes(library, pair, v0, REST, dict(zip(CASE, five, strict=True)))
+
+    error, value, slopes = at()
+    assert error == 0
+    assert value == close(
+        math.copysign(min(1.0, abs(share) / speed), share) * law.mu_macro * 10.0, rel=1e-13, abs=1e-300
+    )
+    if pair == ("spring", "across"):
+        assert value == close(force(library, share * REST)[0], rel=1e-13, abs=1e-300)
+    for (name, x), slope, bound in zip(six.items(), slopes, law.gradient_bound.values(), strict=True):
+        step = 1e-5 * (x or REST)
+        difference = (at(**{name: x + step})[1] - at(**{name: x - step})[1]) / (2.0 * step)
+        assert slope == close(difference, rel=2e-6, abs=10.0 * bound), name
+
+
+@pytest.mark.parametrize(
+    ("bad", "error", "says"),
+    [({"mu0": 0.0}, 1, "mu0"), ({"Fz": -1.0}, 2, "Fz"), ({"k": math.nan}, 3, "k"), ({"y0": math.inf}, 4, "y0"),
+     ({"omega": -1.0}, 5, "omega"), ({"v0": math.nan}, -6, "for a force v0"), ({"v0": -math.inf}, -6, "for a force v0"),
+     *[({"rest": x}, -6, "for a force v0 must be finite, and v_rest") for x in (0.0, -1.0, math.nan, math.inf)]],
+)  # fmt: skip
+def test_bad_input_gives_nan_and_the_reason(library, bad, error, says) -> None:
+    case = {**CASE, **{name: x for name, x in bad.items() if name in CASE}}
+    for v0 in (0.0, 0.5 * REST, -1.0):
+        v0, rest = bad.get("v0", v0), bad.get("rest", REST)
+        assert np.isnan(force(library, v0, rest, **case)).all()
+        found, value, slopes = with_slopes(library, ("spring", "across"), v0, rest, case)
+        assert (found, math.isnan(value), np.isnan(slopes).all()) == (error, True, True)
+    assert library.mumacro_error_text(error).decode().startswith(says)
+
+
+def test_the_ends_of_v_rest_are_legal(library) -> None:
     for rest in (5e-324, 1e-300, 1e300):
         found = force(library, [0.0, 5e-324, rest, -rest, 0.5 * rest], rest)
         assert np.isfinite(found).all()
         assert np.abs(found).max() <= 3.0
+    assert with_slopes(library, ("ball", "normal"), 1.0, REST, CASE)[0] == -4
+    assert library.mumacro_evaluate_force(0, 0, 1.0, REST, *CASE.values(), None, (NUMBER * 6)()) == -1
+    assert library.mumacro_evaluate_force(0, 0, 1.0, REST, *CASE.values(), NUMBER(), None) == -1
 
 
 def test_steps_in_c_are_those_of_python(library) -> None:
-    pointer = ctypes.POINTER(ctypes.c_double)
     rng = np.random.default_rng(5)
     for springs, contact in ((1, "spring"), (7, "ball")):
         mine, state, sums = Element(0.3, 10.0, 1e6, contact, springs), np.zeros((springs, 2)), np.zeros(2)
+        held = [array.ctypes.data_as(ARRAY) for array in (state, sums)]
         for dx, dy in rng.normal(scale=2e-6, size=(50, 2)):
-            error = library.mumacro_element_step(
-                springs, 0.3, 10.0, 1e6, dx, dy, state.ctypes.data_as(pointer), sums.ctypes.data_as(pointer)
-            )
-            assert error == 0
+            assert library.mumacro_element_step(springs, 0.3, 10.0, 1e6, dx, dy, *held) == 0
             assert tuple(sums) == close(mine.step(dx, dy), rel=1e-14, abs=1e-15)
         assert state == close(mine.state, rel=1e-14, abs=1e-15)
 
 
 @pytest.mark.parametrize(
-    ("bad", "error"),
-    [({"springs": 0}, -5), ({"dx": math.nan}, -5), ({"dy": math.inf}, -5), ({"mu0": -1.0}, 1), ({"Fz": -1.0}, 2),
-     ({"Fz": math.inf}, 2), ({"k": math.inf}, 3), ({"k": math.nan}, 3)],
+    ("bad", "error", "says"),
+    [({"springs": 0}, -5, "dx and dy"), ({"dx": math.nan}, -5, "dx and dy"), ({"dy": math.inf}, -5, "dx and dy"),
+     ({"mu0": -1.0}, 1, "mu0"), ({"Fz": -1.0}, 2, "Fz"), ({"Fz": math.inf}, 2, "Fz"), ({"k": math.inf}, 3, "k"),
+     ({"k": math.nan}, 3, "k")],
 )  # fmt: skip
-def test_a_bad_step_moves_nothing_and_says_why(library, bad, error) -> None:
+def test_a_bad_step_moves_nothing_and_says_why(library, bad, error, says) -> None:
     given = {"springs": 2, "mu0": 0.3, "Fz": 10.0, "k": 1e6, "dx": 1e-6, "dy": 0.0, **bad}
-    held = (ctypes.c_double * 4)(*[1.0] * 4)
-    sums = (ctypes.c_double * 2)(5.0, 6.0)
+    held, sums = (NUMBER * 4)(*[1.0] * 4), (NUMBER * 2)(5.0, 6.0)
     assert library.mumacro_element_step(*given.values(), held, sums) == error
     assert (list(held), list(sums)) == ([1.0] * 4, [5.0, 6.0])
+    assert library.mumacro_error_text(error).decode().startswith(says)
     assert library.mumacro_element_step(1, 0.3, 10.0, 1e6, 0.0, 0.0, None, sums) == -1
-    said = library.mumacro_error_text(error).decode()
-    assert said.startswith({-5: "dx and dy must be finite", 1: "mu0", 2: "Fz", 3: "k"}[error])
-    assert library.mumacro_error_text(-6) == b"there is no such error"
+    assert library.mumacro_error_text(-7) == b"there is no such error"
     assert library.mumacro_error_text(-1) == b"there is no place for the answer"
 
 
 def test_the_shaker_ends_stick_slip(sources, compilers, repository) -> None:
     """A mass on a belt swings without, and rests with transverse oscillation."""
-    source = repository / "examples" / "c" / "mass_on_belt.c"
+    source, made = repository / "examples" / "c" / "mass_on_belt.c", sources / "mass_on_belt"
     assert len(source.read_text().splitlines()) <= 60
-    made = sources / "mass_on_belt"
     words = [*compilers.compiler("gcc"), "-O2", "-std=c99", *compilers.STRICT, f"-I{sources}", source]
     compilers.run(*words, *sources.glob("*.c"), "-o", made, "-lm")
     swings = [float(line.split()[6]) for line in compilers.run(made).splitlines()]

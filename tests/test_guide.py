@@ -48,7 +48,7 @@ def having(language: str) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(tmp_path_factory.mktemp("wheel"), "")
+    return build(tmp_path_factory.mktemp("wheel"))
 
 
 @pytest.fixture(scope="module")
@@ -87,15 +87,19 @@ def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
     return request.getfixturevalue("bare" if page.stem in BARE else "full")
 
 
+def run(programs: Path, folder: Path, *words: str | Path) -> str:
+    """The output of a command with these programs, which must succeed."""
+    env = environment(programs)
+    done = subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
 @pytest.mark.parametrize("page", having("pycon"), ids=lambda page: page.stem)
 def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     programs = programs_for(page, request)
     (tmp_path / "session.txt").write_text("\n".join(blocks(page, "pycon")), "utf-8")
-    done = subprocess.run(
-        [programs / "python", "-c", SESSION, "session.txt"], cwd=tmp_path, env=environment(programs),
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
+    run(programs, tmp_path, programs / "python", "-c", SESSION, "session.txt")
 
 
 def parts(text: str) -> tuple[list[str], list[float]]:
@@ -113,12 +117,8 @@ def test_commands(page: Path, tmp_path: Path, request: pytest.FixtureRequest) ->
                 if shutil.which("curl") is None:
                     pytest.skip("needs curl")
                 command = command.replace(SERVICE, request.getfixturevalue("service"))
-            done = subprocess.run(
-                ["sh", "-c", command], cwd=tmp_path, env=environment(programs), capture_output=True, text=True,
-                check=False,
-            )  # fmt: skip
-            assert done.returncode == 0, done.stdout + done.stderr
-            (words, numbers), (shown_words, shown_numbers) = parts(done.stdout), parts(shown)
-            assert words == shown_words, f"{command}\n{done.stdout}"
+            found = run(programs, tmp_path, "sh", "-c", command)
+            (words, numbers), (shown_words, shown_numbers) = parts(found), parts(shown)
+            assert words == shown_words, f"{command}\n{found}"
             # the last digits depend on the processor; error bounds are of rounding size
-            assert numbers == close(shown_numbers, rel=1e-9, abs=2e-13), f"{command}\n{done.stdout}"
+            assert numbers == close(shown_numbers, rel=1e-9, abs=2e-13), f"{command}\n{found}"

@@ -142,15 +142,12 @@ def test_tables_are_read_by_many_threads_at_once() -> None:
     expected = {path: read_table(path).attributes["content_sha256"] for path in TABLES}
     start = threading.Barrier(8)
 
-    def work(i: int) -> list[tuple[Path, str]]:
+    def work(i: int) -> dict[Path, str]:
         start.wait()
-        return [
-            (path, str(read_table(path).attributes["content_sha256"])) for path in TABLES[i % 4 :] + TABLES[: i % 4]
-        ]
+        return {path: str(read_table(path).attributes["content_sha256"]) for path in TABLES[i % 4 :] + TABLES[: i % 4]}
 
     with ThreadPoolExecutor(8) as pool:
-        for found in pool.map(work, range(8)):
-            assert dict(found) == expected
+        assert all(found == expected for found in pool.map(work, range(8)))
 
 
 def test_tables_are_opened_while_others_evaluate(table: Surrogate, tmp_path: Path) -> None:
@@ -178,8 +175,7 @@ def test_tables_are_opened_while_others_evaluate(table: Surrogate, tmp_path: Pat
 
 
 def test_a_small_call_does_not_wait_for_a_large_one(table: Surrogate) -> None:
-    v, y = points(2_000_000)
-    v, y = np.tile(v, 10), np.tile(y, 10)
+    v, y = (np.tile(x, 10) for x in points(2_000_000))
     begun, ended = threading.Event(), threading.Event()
 
     def large() -> None:
@@ -255,18 +251,15 @@ def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
 
 @forks
 @pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_a_forked_pool_gives_the_same_bits(inherited: Surrogate) -> None:
-    expected = [everything(inherited, N, seed) for seed in range(4)]
-    with multiprocessing.get_context("fork").Pool(2) as pool:
-        assert pool.map_async(_ask, range(4)).get(timeout=120) == expected
-
-
-@forks
-@pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_a_forked_executor_gives_the_same_bits(inherited: Surrogate) -> None:
-    expected = [everything(inherited, N, seed) for seed in range(4)]
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
-        assert list(pool.map(_ask, range(4), timeout=120)) == expected
+@pytest.mark.parametrize("kind", ["pool", "executor"])
+def test_forked_workers_give_the_same_bits(inherited: Surrogate, kind: str) -> None:
+    expected, context = [everything(inherited, N, seed) for seed in range(4)], multiprocessing.get_context("fork")
+    if kind == "pool":
+        with context.Pool(2) as pool:
+            assert pool.map_async(_ask, range(4)).get(timeout=120) == expected
+    else:
+        with ProcessPoolExecutor(2, mp_context=context) as executor:
+            assert list(executor.map(_ask, range(4), timeout=120)) == expected
 
 
 def _fail(what: str) -> None:

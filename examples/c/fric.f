@@ -12,7 +12,7 @@ c     v_rest well below the speeds that matter.  fric_coef.f gives the coefficie
      &     kstep, kinc, time, dtime, noel, ciname, slname, msname, npt,
      &     node, npatch, coords, rcoord, drot, temp, predef, nfdir,
      &     mcrd, npred, nstatv, chrlngth, props, nprops)
-      use mumacro, only: mumacro_force
+      use mumacro, only: mumacro_evaluate_force
       include 'aba_param.inc'
       character*80 ciname, slname, msname
       dimension tau(nfdir), ddtddg(nfdir, nfdir), ddtddp(nfdir),
@@ -20,8 +20,7 @@ c     v_rest well below the speeds that matter.  fric_coef.f gives the coefficie
      &     taulm(nfdir), slip(nfdir), time(2), coords(mcrd),
      &     rcoord(mcrd), drot(2, 2), temp(2), predef(2, *),
      &     props(nprops)
-      parameter (step = 1d-5)
-      dimension rate(nfdir), way(nfdir)
+      dimension rate(nfdir), way(nfdir), by(6)
 
       lm = 0
       tau = 0
@@ -29,29 +28,26 @@ c     v_rest well below the speeds that matter.  fric_coef.f gives the coefficie
       ddtddp = 0
       if (press <= 0 .or. dtime <= 0) return
       rate = dgam/dtime
-c     at rest the stress is linear in the rate: a thousandth of v_rest stands for it
-      v = max(sqrt(sum(rate**2)), 1d-3*props(5))
-      way = rate/v
-      stress = at(v, press)
-      slope = (at(v*(1 + step), press) - at(v*(1 - step), press))/
-     &     (2*step*v)
+      v = sqrt(sum(rate**2))
+      ierror = mumacro_evaluate_force(0, 0, v, 1d0*props(5),
+     &     1d0*props(1), 1d0*press, 1d0*props(2), 1d0*props(3),
+     &     1d0*props(4), stress, by)
+c     at rest the stress is linear in the rate
+      way = 0
+      across = by(6)
+      if (v > 0) then
+         way = rate/v
+         across = stress/v
+      end if
       tau = stress*way
       do i = 1, nfdir
-         ddtddg(i, i) = stress/v/dtime
+         ddtddg(i, i) = across/dtime
          do j = 1, nfdir
             ddtddg(i, j) = ddtddg(i, j) +
-     &           (slope - stress/v)*way(i)*way(j)/dtime
+     &           (by(6) - across)*way(i)*way(j)/dtime
          end do
       end do
-      ddtddp = (at(v, press*(1 + step)) - at(v, press*(1 - step)))/
-     &     (2*step*press)*way
+      ddtddp = by(2)*way
       dslip = dgam
       sfd = sum(tau*dgam)
-
-      contains
-
-      function at(speed, pressure)
-      at = mumacro_force(speed, props(5), props(1), pressure, props(2),
-     &     props(3), props(4))
-      end function at
       end subroutine fric

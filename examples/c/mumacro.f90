@@ -6,6 +6,7 @@ module mumacro
   private
   public :: mumacro_answer, mumacro_cycle, mumacro_evaluate, mumacro_evaluate_cycle, mumacro_mu_macro
   public :: mumacro_mu_ratio, mumacro_v_tilde_crit, mumacro_power, mumacro_stick_fraction, mumacro_force
+  public :: mumacro_evaluate_force
 
   !> Answer to a case; the gradient is in the order mu0, Fz, k, y0, omega, v0.
   type, bind(c) :: mumacro_answer
@@ -65,6 +66,16 @@ module mumacro
       real(c_double), value :: v0, v_rest, mu0, Fz, k, y0, omega
       real(c_double) :: force
     end function mumacro_force
+
+    !> The same for a contact and a direction, 0 and 0 for one spring across, with its gradient; 0, or an error.
+    function mumacro_evaluate_force(contact, direction, v0, v_rest, mu0, Fz, k, y0, omega, force, gradient) &
+        result(error) bind(c)
+      import :: c_double, c_int
+      integer(c_int), value :: contact, direction
+      real(c_double), value :: v0, v_rest, mu0, Fz, k, y0, omega
+      real(c_double), intent(out) :: force, gradient(6)
+      integer(c_int) :: error
+    end function mumacro_evaluate_force
 
     pure function mumacro_v_tilde_crit(y_tilde) result(crit) bind(c)
       import :: c_double

@@ -1,18 +1,46 @@
-"""What the classes for JAX and PyTorch share: the quantities by name, and mu_macro as a function of the groups."""
+"""What the classes for JAX and PyTorch share: the quantities by name, open tables, mu_macro as a function of groups."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from threading import Lock
 from typing import Any
+
+from mumacro.surrogate import Surrogate
 
 __all__ = ["NO_THIRD", "DifferentiableFriction", "slopes_by_groups"]
 
 NO_THIRD = "third derivatives are not tabulated: take differences of the second ones"
+_OPENING = Lock()
 
 
 class DifferentiableFriction:
-    """The quantities of a table as functions of tensors.  Arguments broadcast together; illegal cases are NaN."""
+    """The quantities of a table as functions of tensors.
+
+    Parameters
+    ----------
+    surrogate : Surrogate, optional
+        The table; left out, the tightest one that comes with the library.
+
+    Notes
+    -----
+    Arguments, tensors or numbers, broadcast together; results are float64 of the broadcast shape, NaN where a case is
+    illegal.  The table is evaluated on the host.  First derivatives are those of the table, second ones differences of
+    them: right to 1e-5 of the largest one with the tables 1e-12 and 1e-10, to 1e-2 with 1e-7; NaN at v~ = 0, and for
+    mu_macro where v~ or y~ is zero or infinite.  Third ones raise NotImplementedError.
+    """
+
+    def __init__(self, surrogate: Surrogate | None = None) -> None:
+        opened = Surrogate.open() if surrogate is None else surrogate
+        #: the number by which compiled programs, which may outlive this object, find the table: from its checksum
+        self._table = int(opened.checksum[:15], 16)
+        with _OPENING:
+            self._open(self._table, opened)
+
+    def _open(self, table: int, surrogate: Surrogate) -> None:
+        """Keep a table for programs, if it is not kept yet."""
+        raise NotImplementedError
 
     def _call(self, quantity: str, *arguments: Any) -> Any:
         raise NotImplementedError
@@ -34,7 +62,7 @@ class DifferentiableFriction:
         return self._call("stick_fraction", v_tilde, y_tilde)
 
 
-def slopes_by_groups(value: Any, slopes: Any, six: Sequence[Any]) -> tuple[Any, ...]:
+def slopes_by_groups(value: Callable[..., Any], slopes: Callable[..., Any], six: Sequence[Any]) -> tuple[Any, ...]:
     """d mu_macro / d input by the chain rule, from mu~ and its slopes as functions of v~ and y~, eqs. (6) and (8).
 
     Differentiated once more it gives the second derivatives of mu_macro.

@@ -1,14 +1,8 @@
 /* The one function of the shared object: the kernel of an instruction level, where this processor can run it. */
 #include <stddef.h>
 
+#include "export.h"
 #include "library.h"
-
-#if defined _WIN32
-#pragma clang diagnostic ignored "-Wdll-attribute-on-redeclaration" /* declared in library.h without it */
-#define MU_EXPORT __declspec(dllexport)
-#else
-#define MU_EXPORT __attribute__((visibility("default")))
-#endif
 
 extern const mumacro_kernel mumacro_kernel_base;
 #if defined MUMACRO_HAS_AVX2

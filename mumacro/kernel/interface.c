@@ -148,16 +148,37 @@ MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde) {
 
 MUMACRO_API double mumacro_v_tilde_crit(double y_tilde) { return mu_border_at(MU_TABLE, y_tilde); }
 
+/* How a force is made of the law: mu_macro(speed) Fz share, with d speed / d v0 and d share / d v0. */
+typedef struct {
+    double speed, share, of_speed, of_share;
+} mu_motion;
+
+static mu_motion mu_motion_of(double v0, double v_rest) {
+    const double a = v0 / v_rest, square = 1.0 + a * a, sign = v0 < 0.0 ? -1.0 : 1.0;
+    const mu_motion sliding = {fabs(v0), sign, sign, 0.0}, illegal = {NAN, NAN, NAN, NAN};
+    const mu_motion resting = {0.5 * v_rest * square, 2.0 * a / square, a,
+                               2.0 * (1.0 - a * a) / (square * square) / v_rest};
+    if (!(fabs(v0) < HUGE_VAL && v_rest > 0.0 && v_rest < HUGE_VAL)) return illegal;
+    return fabs(v0) < v_rest ? resting : sliding;
+}
+
 MUMACRO_API double mumacro_force(double v0, double v_rest, double mu0, double Fz, double k, double y0, double omega) {
-    const double speed = fabs(v0), share = v0 / v_rest;
-    double slope;
-    mumacro_answer at;
-    if (!(speed < HUGE_VAL && v_rest > 0.0 && v_rest < HUGE_VAL)) return NAN;
-    if (speed >= v_rest) return (v0 < 0.0 ? -Fz : Fz) * mumacro_mu_macro(mu0, Fz, k, y0, omega, speed);
-    if (mumacro_evaluate(mu0, Fz, k, y0, omega, v_rest, &at)) return NAN;
-    /* d ln mu / d ln v0 lies between 0 and 1; nothing else where double range ends */
-    slope = mu_min(mu_max(0.0, v_rest * at.gradient[5] / at.mu_macro), 1.0);
-    return Fz * at.mu_macro * share * (1.0 + 0.5 * (1.0 - slope) * (1.0 - share * share));
+    const mu_motion at = mu_motion_of(v0, v_rest);
+    return at.share * Fz * mumacro_mu_macro(mu0, Fz, k, y0, omega, at.speed);
+}
+
+MUMACRO_API int mumacro_evaluate_force(int contact, int direction, double v0, double v_rest, double mu0, double Fz,
+                                       double k, double y0, double omega, double *force, double gradient[6]) {
+    const mu_motion at = mu_motion_of(v0, v_rest);
+    mumacro_answer law;
+    int error;
+    if (force == NULL || gradient == NULL) return MUMACRO_NO_OUTPUT;
+    error = mumacro_evaluate_as(contact, direction, mu0, Fz, k, y0, omega, at.speed, &law);
+    *force = at.share * Fz * law.mu_macro;
+    for (int i = 0; i < 6; ++i) gradient[i] = at.share * Fz * law.gradient[i];
+    gradient[1] += at.share * law.mu_macro;
+    gradient[5] = Fz * (at.of_speed * at.share * law.gradient[5] + at.of_share * law.mu_macro);
+    return error == 6 ? MUMACRO_NO_VELOCITY : error;
 }
 
 MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double k, double dx, double dy, double *state,
@@ -182,7 +203,8 @@ MUMACRO_API const char *mumacro_regime_name(int regime) {
 }
 
 MUMACRO_API const char *mumacro_error_text(int error) {
-    static const char *const texts[13] = {
+    static const char *const texts[14] = {
+        "for a force v0 must be finite, and v_rest finite and > 0",
         "dx and dy must be finite, and there must be a spring",
         "the normal force of a ball cannot oscillate: its contact radius would change, which is not modelled",
         "there is no such contact or direction",
@@ -191,7 +213,8 @@ MUMACRO_API const char *mumacro_error_text(int error) {
         "y0 must be finite and >= 0",    "omega must be finite and >= 0",    "v0 must be finite and >= 0",
         "the amplitude of the normal force must be >= 0 and below Fz: at Fz the contact lifts off",
     };
-    return error < MUMACRO_NO_STEP || error > MUMACRO_LIFT_OFF ? "there is no such error" : texts[error - MUMACRO_NO_STEP];
+    return error < MUMACRO_NO_VELOCITY || error > MUMACRO_LIFT_OFF ? "there is no such error"
+                                                                 : texts[error - MUMACRO_NO_VELOCITY];
 }
 
 MUMACRO_API double mumacro_tolerance(void) { return mumacro_table.tolerance; }

@@ -71,11 +71,11 @@ enum { MUMACRO_SPRING, MUMACRO_BALL };
 enum { MUMACRO_ACROSS, MUMACRO_ALONG, MUMACRO_NORMAL };
 
 /* Returned where there is nothing to write to, no such quantity, no such contact or direction, a ball whose normal
- * force oscillates (its contact radius changes: not modelled), no such step; 0 is success, 1 to 6 are bad inputs, 7 is an
- * amplitude
- * of the normal force that is not below it. */
+ * force oscillates (its contact radius changes: not modelled), no such step, no such velocity of a force; 0 is success,
+ * 1 to 6 are bad inputs, 7 is an amplitude of the normal force that is not below it. */
 enum {
-    MUMACRO_NO_STEP = -5,
+    MUMACRO_NO_VELOCITY = -6,
+    MUMACRO_NO_STEP,
     MUMACRO_NO_NORMAL_BALL,
     MUMACRO_NO_CONTACT,
     MUMACRO_NO_QUANTITY,
@@ -147,18 +147,24 @@ MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde);
 /* Smallest v~ without stick [-]; 0 at y~ = 0, infinite for infinite y~, NaN for what is no amplitude. */
 MUMACRO_API double mumacro_v_tilde_crit(double y_tilde);
 
-/* The friction force [N] for time integration, at a velocity v0 [m/s] of either sign: mu_macro(|v0|) Fz along v0, so that
- * it is odd in v0.  Below v_rest [m/s] > 0 it is regularised: a cubic in v0 through 0 that meets the law at v_rest with
- * the same slope, and rises all the way.  So there is no jump, no NaN where v0 crosses zero, and a contact at rest creeps
- * at less than v_rest; take v_rest well below the speeds that matter, and a step that resolves mu_macro Fz / v_rest, a
- * damper.  NaN where v0 or v_rest is not finite or another input is illegal. */
+/* The friction force [N] for time integration, at a velocity v0 [m/s] of either sign: mu_macro(|v0|) Fz along v0, so
+ * that it is odd in v0.  Below v_rest [m/s] > 0 it is regularised: with a = |v0| / v_rest it is
+ * mu_macro(v_rest (1 + a^2) / 2) Fz 2 a / (1 + a^2), which meets the law at v_rest with the same slope, and rises all
+ * the way.  So there is no jump, no NaN where v0 crosses zero, and a contact at rest creeps at less than v_rest; take
+ * v_rest well below the speeds that matter, and a step that resolves 2 mu_macro Fz / v_rest, a damper.  NaN where v0 or
+ * v_rest is not finite or another input is illegal. */
 MUMACRO_API double mumacro_force(double v0, double v_rest, double mu0, double Fz, double k, double y0, double omega);
+
+/* The same for a contact and a direction as in mumacro_evaluate_as, with d force / d (mu0, Fz, k, y0, omega, v0).
+ * Returns as that does, or MUMACRO_NO_VELOCITY for v0 or v_rest; then all numbers are NaN. */
+MUMACRO_API int mumacro_evaluate_force(int contact, int direction, double v0, double v_rest, double mu0, double Fz,
+                                       double k, double y0, double omega, double *force, double gradient[6]);
 
 /* The contact in the time domain, for any motion: moves its upper point by (dx, dy) [m] and writes the force that must
  * be applied there after the step [N], x > 0 for motion along x.  1 spring is the model's contact; more are a ball,
- * whose k is that of full stick and whose Fz must stay the same; 32 give its mean to 1.1e-3 mu0.  Of one spring Fz >= 0 may
- * change between steps, k must be finite.  state: 2 * springs numbers, the springs' forces [N], zeros at first.  The
- * error is proportional to the step: a period takes 1000 steps for 1e-3.
+ * whose k is that of full stick and whose Fz must stay the same; 32 give its mean to 1.1e-3 mu0.  Of one spring Fz >= 0
+ * may change between steps, k must be finite.  state: 2 * springs numbers, the springs' forces [N], zeros at first.
+ * The error is proportional to the step: a period takes 1000 steps for 1e-3.
  * Returns 0, 1 to 3 for a bad mu0, Fz or k, MUMACRO_NO_STEP, or MUMACRO_NO_OUTPUT; then nothing is moved. */
 MUMACRO_API int mumacro_element_step(int springs, double mu0, double Fz, double k, double dx, double dy, double *state,
                                      double force[2]);

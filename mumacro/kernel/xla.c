@@ -5,15 +5,9 @@
  * argument; of v~ and y~ also d2/dv~2, d2/dv~ dy~, d2/dy~2. */
 #include <string.h>
 
+#include "export.h"
 #include "library.h"
 #include "xla/ffi/api/c_api.h"
-
-#if defined _WIN32
-#pragma clang diagnostic ignored "-Wdll-attribute-on-redeclaration"
-#define MU_EXPORT __declspec(dllexport)
-#else
-#define MU_EXPORT __attribute__((visibility("default")))
-#endif
 
 enum { MU_TABLES = 64, MU_MANY = 256 };
 static const mumacro_data *mu_tables[MU_TABLES];

@@ -12,7 +12,7 @@ typedef int (*Set)(void *, const uint32_t *, size_t, const double *, size_t);
 
 int main(int count, char **words) {
     HMODULE unit = LoadLibraryA(words[1]);
-    const uint32_t v0 = 6, mu_macro = 7;
+    const uint32_t v0 = 6, mu_macro = 8;
     const double fast = 1.0;
     double first, second;
     void *m;

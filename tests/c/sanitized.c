@@ -1,5 +1,6 @@
-/* Every entry of the kernel and of mumacro.h under sanitizers: random, nasty and illegal inputs, with a real table and with tables of
- * nonsense.  Arrays are allocated to the last number, so that one too many is seen.  Prints how much was asked. */
+/* Every entry of the kernel and of mumacro.h under sanitizers: random, nasty and illegal inputs, with a real table and
+ * with tables of nonsense.  Arrays are allocated to the last number, so that one too many is seen.  Prints how much was
+ * asked. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -123,14 +124,61 @@ static void ask_elements(const mumacro_kernel *kernel, int64_t n, double *const 
     free(held), free(sums);
 }
 
-/* One case through the functions of mumacro.h, of the real table: the bits of arrays, and what they promise. */
+/* One case through the plain functions of mumacro.h: one verdict, and an answer only where it is right. */
+static void check_case(const double *x) {
+    mumacro_answer a;
+    mumacro_cycle c;
+    const int error = mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], &a);
+    if (mumacro_evaluate_cycle(x[0], x[1], x[2], x[3], x[4], x[5], &c) != error) wrong("two verdicts");
+    if (differ(mumacro_mu_macro(x[0], x[1], x[2], x[3], x[4], x[5]), a.mu_macro)) wrong("two values");
+    if (error) {
+        if (a.source != -1 || a.regime != -1 || a.mu_macro == a.mu_macro) wrong("an answer to an illegal case");
+        if (c.power == c.power) wrong("a power of an illegal case");
+    } else {
+        if (!(a.mu_ratio >= 0.0 && a.mu_ratio <= 1.0 && a.error_bound >= 0.0)) wrong("value or bound");
+        if (a.source < 0 || a.source >= MUMACRO_SOURCES || a.regime < 0) wrong("source or regime");
+        if (!(c.stick_fraction >= 0.0 && c.stick_fraction <= 1.0)) wrong("stick fraction");
+    }
+}
+
+static int is_legal(int quantity, double v, double y) {
+    if (!(v >= 0.0 && y >= 0.0)) return 0;
+    return y < HUGE_VAL || quantity == MUMACRO_STICK_FRACTION || (quantity == MUMACRO_POWER && v < HUGE_VAL);
+}
+
+static void check_point(double v, double y) {
+    mumacro_point p;
+    for (int quantity = -1; quantity <= 3; ++quantity) {
+        const int error = mumacro_evaluate_point(quantity, v, y, &p);
+        if (quantity < 0 || quantity > 2) {
+            if (error != MUMACRO_NO_QUANTITY) wrong("an unknown quantity");
+        } else {
+            if ((error == 0) != is_legal(quantity, v, y)) wrong("legal or not");
+            if ((error == 0) != (p.value == p.value) || (p.source >= 0) != (error == 0)) wrong("value without right");
+        }
+    }
+    (void)mumacro_mu_ratio(v, y);
+    (void)mumacro_power(v, y);
+    (void)mumacro_stick_fraction(v, y);
+    (void)mumacro_v_tilde_crit(y);
+}
+
+/* Without a place for the answer, and with codes that there are not. */
+static void check_misuse(void) {
+    if (mumacro_evaluate(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT) wrong("no place");
+    if (mumacro_evaluate_cycle(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT) wrong("no place");
+    if (mumacro_evaluate_point(0, 1.0, 1.0, NULL) != MUMACRO_NO_OUTPUT) wrong("no place for the point");
+    for (int code = -1000; code < 1000; ++code)
+        if (!mumacro_source_name(code)[0] || (code && !mumacro_error_text(code)[0])) wrong("no text");
+}
+
+/* One case in every contact and direction: the bits of arrays; its force, and the elements of a few springs. */
 static void ask_calls(const mumacro_kernel *kernel, const double *x, double v_rest) {
     static const int64_t strides[6] = {0, 0, 0, 0, 0, 0};
     const double *const columns[6] = {x, x + 1, x + 2, x + 3, x + 4, x + 5};
     const double size = mumacro_force(x[5], v_rest, x[0], x[1], x[2], x[3], x[4]);
-    double held[8] = {0.0}, *sum = numbers(2);
+    double held[8], *sum = numbers(2);
     mumacro_answer *answer = (mumacro_answer *)malloc(sizeof *answer);
-    mumacro_cycle cycle;
     int8_t source;
     if (answer == NULL) exit(2);
     for (int contact = -1; contact <= MU_CONTACTS; ++contact)
@@ -149,7 +197,6 @@ static void ask_calls(const mumacro_kernel *kernel, const double *x, double v_re
         }
     if (differ(size, -mumacro_force(-x[5], v_rest, x[0], x[1], x[2], x[3], x[4]))) wrong("a force that is not odd");
     if (fabs(size) > x[0] * x[1]) wrong("a force beyond mu0 Fz");
-    mumacro_evaluate_cycle(x[0], x[1], x[2], x[3], x[4], x[5], &cycle);
     for (int springs = 0; springs <= 4; ++springs) {
         memset(held, 0, sizeof held);
         for (int step = 0; step < 3; ++step)
@@ -181,10 +228,12 @@ static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int6
     ask_cases(kernel, data, n, columns, single);
     if (single < 0) ask_elements(kernel, n, columns);
     if (single < 0 && data == &mumacro_table.data)
-        for (int64_t j = 0; j < n && j < FEW; ++j) {
+        for (int64_t j = 0; j < n; ++j) {
             double x[6];
             for (int i = 0; i < 6; ++i) x[i] = columns[i][j];
-            ask_calls(kernel, x, drawn() < 0.2 ? anything() : x[5] * scaled(-2.0, 2.0));
+            check_case(x);
+            check_point(x[5], x[3]);
+            if (j < FEW) ask_calls(kernel, x, drawn() < 0.2 ? anything() : x[5] * scaled(-2.0, 2.0));
         }
     if (single < 0) ask_points(kernel, data, n, columns[5], columns[3]);
     if (single < 0) ask_builder(kernel, n, columns[5], columns[3]);
@@ -200,7 +249,7 @@ static double ordinary(int input) {
 /* Every combination of nasty numbers, one after the other. */
 static double combined(int input) {
     static uint64_t code, rest;
-    if (input == 0) rest = (code += 7); /* 7 and 12 share no divisor */
+    if (input == 0) rest = (code += 17); /* shares no divisor with 12; 172,800 steps cover 12^6 */
     else rest /= NASTY;
     return nasty[rest % NASTY];
 }
@@ -240,6 +289,7 @@ int main(int count, char **words) {
     const long random = count > 1 ? atol(words[1]) : 300000, hostile = count > 2 ? atol(words[2]) : 172800;
     const long tables = count > 3 ? atol(words[3]) : 1000;
     long asked = 0, combinations = 0;
+    check_misuse();
     for (int i = 0; asked < random; ++i) {
         const int64_t n = lengths[i % 8];
         ask_all(kernel, &mumacro_table.data, n, ordinary, i % 7 - 1);

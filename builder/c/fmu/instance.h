@@ -1,8 +1,9 @@
 /* What FMI 2.0 and 3.0 share; MUMACRO_FMI is 2 or 3.  The model has no states, events or clocks, so most functions of
  * the standards have nothing to do.
  * Value references, as in modelDescription.xml: 0 is the time (3.0 only), 1 to 7 are the inputs, the last of them
- * Fz_amplitude; then come mu_macro and mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source, and the
- * parameters contact and direction. */
+ * Fz_amplitude; then come mu_macro and mu_ratio (outputs), error_bound, v_tilde, y_tilde, regime, source, the
+ * parameters contact and direction, the output force and its parameter v_rest.  v0 may be negative: all but the force
+ * are those of its absolute value. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -21,7 +22,8 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* what a standard passes and this model has no use for */
 #endif
 
-enum { TIME, Y0 = 4, INPUTS = 7, MU_MACRO, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE, CONTACT, DIRECTION };
+enum { TIME, Y0 = 4, V0 = 6, INPUTS, MU_MACRO, MU_RATIO, ERROR_BOUND, V_TILDE, Y_TILDE, REGIME, SOURCE };
+enum { CONTACT = SOURCE + 1, DIRECTION, FORCE, V_REST };
 enum { CONTACTS = 2, DIRECTIONS = 3 };
 typedef enum { OK, WARNING, DISCARD, ERROR } Status;
 typedef const char *String;
@@ -55,10 +57,11 @@ typedef void (*Logger)(void *environment, Status status, String category, String
 #endif
 
 typedef struct {
-    double time, x[INPUTS];
+    double time, x[INPUTS], v_rest;
     int contact, direction;
-    int known; /* whether answer belongs to x */
+    int known; /* whether the answer and the force belong to x */
     mumacro_answer answer;
+    double force, force_slopes[6];
 } State;
 
 typedef struct {
@@ -92,28 +95,32 @@ static Reference amplitude(const Instance *m) { return m->state.direction == MUM
 
 /* OK when the inputs are legal; else DISCARD, and the log says which is not. */
 static Status answered(ME) {
-    const double *x = m->state.x;
-    if (!m->state.known) {
-        const int error = mumacro_evaluate_as(m->state.contact, m->state.direction, x[0], x[1], x[2],
-                                              x[amplitude(m) - 1], x[4], x[5], &m->state.answer);
-        m->state.known = error == 0;
+    State *s = &m->state;
+    if (!s->known) {
+        const double *x = s->x, moved = x[amplitude(m) - 1];
+        const int error =
+            mumacro_evaluate_as(s->contact, s->direction, x[0], x[1], x[2], moved, x[4], fabs(x[V0 - 1]), &s->answer);
         if (error) say(m->logger, m->environment, m->name, DISCARD, mumacro_error_text(error));
+        else mumacro_evaluate_force(s->contact, s->direction, x[V0 - 1], s->v_rest, x[0], x[1], x[2], moved, x[4],
+                                    &s->force, s->force_slopes);
+        s->known = error == 0;
     }
-    return m->state.known ? OK : DISCARD;
+    return s->known ? OK : DISCARD;
 }
 
 static Status get_number(ME, Reference variable, double *value) {
     const mumacro_answer *a = &m->state.answer;
-    if ((MUMACRO_FMI == 2 && variable == TIME) || variable > Y_TILDE) return ERROR;
-    if (variable == TIME) {
-        *value = m->state.time;
+    if ((MUMACRO_FMI == 2 && variable == TIME) || (variable > Y_TILDE && variable < FORCE) || variable > V_REST)
+        return ERROR;
+    if (variable == TIME || variable == V_REST) {
+        *value = variable == TIME ? m->state.time : m->state.v_rest;
     } else if (variable <= INPUTS) {
         *value = m->state.x[variable - 1];
     } else {
         const Status status = answered(m);
         const double found[] = {a->mu_macro, a->mu_ratio, a->error_bound, a->v_tilde, a->y_tilde};
         if (status != OK) return status;
-        *value = found[variable - MU_MACRO];
+        *value = variable == FORCE ? m->state.force : found[variable - MU_MACRO];
     }
     return OK;
 }
@@ -145,17 +152,28 @@ static Status set_choice(ME, Reference variable, Choice value) {
 }
 
 static Status set_number(ME, Reference variable, double value) {
-    if (variable <= TIME || variable > INPUTS) return ERROR;
-    return m->state.x[variable - 1] = value, m->state.known = 0, OK;
+    if (variable == V_REST && value > 0.0 && value < HUGE_VAL) {
+        m->state.v_rest = value;
+    } else if (variable == V_REST) {
+        say(m->logger, m->environment, m->name, ERROR, mumacro_error_text(MUMACRO_NO_VELOCITY));
+        return ERROR;
+    } else if (variable <= TIME || variable > INPUTS) {
+        return ERROR;
+    } else {
+        m->state.x[variable - 1] = value;
+    }
+    return m->state.known = 0, OK;
 }
 
 /* Adds seed times d output / d input. */
 static Status add_slope(ME, Reference output, Reference input, double seed, double *sum) {
     const mumacro_answer *a = &m->state.answer;
+    const double *slopes = output == FORCE ? m->state.force_slopes : a->gradient;
     double slope;
-    if ((output != MU_MACRO && output != MU_RATIO) || input <= TIME || input > INPUTS) return ERROR;
+    if ((output != MU_MACRO && output != MU_RATIO && output != FORCE) || input <= TIME || input > INPUTS) return ERROR;
     if (answered(m) != OK) return DISCARD;
-    slope = input == amplitude(m) ? a->gradient[Y0 - 1] : input == Y0 || input == INPUTS ? 0.0 : a->gradient[input - 1];
+    slope = input == amplitude(m) ? slopes[Y0 - 1] : input == Y0 || input == INPUTS ? 0.0 : slopes[input - 1];
+    if (output != FORCE && input == V0 && m->state.x[V0 - 1] < 0.0) slope = -slope;
     if (output == MU_RATIO) slope = (slope - (input == 1 ? a->mu_ratio : 0.0)) / m->state.x[0];
     if (seed != 0.0) *sum += seed * slope;
     return OK;
@@ -164,7 +182,7 @@ static Status add_slope(ME, Reference output, Reference input, double seed, doub
 /* --- an instance ---------------------------------------------------------------------------------------------- */
 
 EXPORT Status FMI(Reset)(ME) {
-    static const State start = {.x = MUMACRO_FMU_STARTS}; /* a spring, across */
+    static const State start = {.x = MUMACRO_FMU_STARTS, .v_rest = MUMACRO_FMU_REST}; /* a spring, across */
     return m->state = start, OK;
 }
 

@@ -1,10 +1,11 @@
 """``--format fmu``: a table as a Functional Mock-up Unit, FMI 2.0 or 3.0, made of the C header; no Python inside.
 
-Inputs are mu0, Fz, k, y0, omega, v0 and Fz_amplitude; outputs mu_macro and mu_ratio with directional derivatives by
-all inputs; beside them error_bound, v_tilde, y_tilde, regime and source.  The parameters contact and direction are
-enumerations, in the order of :data:`mumacro.contact.CONTACTS` and ``DIRECTIONS``; Fz_amplitude counts for direction
-normal alone, y0 for the others.  Model Exchange and Co-Simulation.  An illegal input makes a simulator's call return
-"discard", with the reason in its log.
+Inputs are mu0, Fz, k, y0, omega, v0 and Fz_amplitude; outputs mu_macro, mu_ratio and force, the friction force along v0
+that is regularised below the parameter v_rest, with directional derivatives by all inputs; beside them error_bound,
+v_tilde, y_tilde, regime and source.  v0 may be negative: all but the force are those of its absolute value.  The
+parameters contact and direction are enumerations, in the order of :data:`mumacro.contact.CONTACTS` and ``DIRECTIONS``;
+Fz_amplitude counts for direction normal alone, y0 for the others.  Model Exchange and Co-Simulation.  An illegal input
+makes a simulator's call return "discard", with the reason in its log.
 
 The unit holds its sources, the binary of the machine it is made on, and where zig is installed those of Linux and
 Windows for 64-bit Intel and AMD; without any compiler the sources alone.
@@ -33,11 +34,13 @@ __all__ = ["fmu2", "fmu3"]
 
 _HERE = Path(__file__).parent
 STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01, AMPLITUDE: 0.0}
+REST = 1e-4  # v_rest at the start [m/s]
 OPTIONS = ("-O2", "-std=c99", "-fPIC", "-shared", "-fvisibility=hidden")
 _TEXTS = {
     "mu0": "Coulomb friction coefficient", "Fz": "normal force", "k": "tangential stiffness; infinite: rigid contact",
     "y0": "amplitude of the oscillation, across or along",
-    "omega": "angular frequency of the oscillation", "v0": "sliding speed",
+    "omega": "angular frequency of the oscillation",
+    "v0": "sliding velocity; all but force are those of its absolute value",
     AMPLITUDE: "amplitude of the normal force, for direction normal",
     "mu_macro": "macroscopic friction coefficient", "mu_ratio": "mu_macro / mu0",
     "error_bound": "bound of the absolute error of mu_macro", "v_tilde": "v0 k / (mu0 Fz omega)",
@@ -46,8 +49,9 @@ _TEXTS = {
     "source": ", ".join(f"{i}: {name}" for i, name in enumerate(charts.SOURCES)),
     "contact": "one spring, or a ball on a flat: k is that before slip",
     "direction": "of the oscillation: across the sliding direction, along it, or of the normal force (not of a ball)",
+    "force": "friction force along v0, mu_macro Fz from v_rest on", "v_rest": "speed below which force is regularised",
 }  # fmt: skip
-_OUTPUTS, _WHOLE = ("mu_macro", "mu_ratio"), ("regime", "source")
+_OUTPUTS, _WHOLE = ("mu_macro", "mu_ratio", "force"), ("regime", "source")
 _CHOICES: dict[str, tuple[str, ...]] = {"contact": CONTACTS, "direction": DIRECTIONS}
 _UNITS = """<UnitDefinitions>
 <Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit><Unit name="N/m"><BaseUnit kg="1" s="-2"/></Unit>
@@ -74,7 +78,8 @@ def fmu3(table: Table) -> bytes:
 def _unit(table: Table, version: int) -> bytes:
     starts = ", ".join(map(repr, STARTS.values()))
     sources = {name: (_HERE / name).read_text("ascii") for name in ("instance.h", f"fmu{version}.c")}
-    sources["instance.h"] = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n" + sources["instance.h"]
+    defined = f"#define MUMACRO_FMU_STARTS {{{starts}}}\n#define MUMACRO_FMU_REST {REST!r}\n"
+    sources["instance.h"] = defined + sources["instance.h"]
     sources["mumacro.h"] = header_text(table)
     described = _description(version, str(table.attributes["content_sha256"]))
     files: dict[str, str | bytes] = {"modelDescription.xml": described}
@@ -118,7 +123,7 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
 
 def _description(version: int, token: str) -> str:
     """modelDescription.xml."""
-    second, first = version == 2, len(STARTS) + 1
+    second, numbers = version == 2, {name: number for number, name in enumerate(_TEXTS, 1)}
     token_name, state, able = (
         ("guid", "canGetAndSetFMUstate", "providesDirectionalDerivative") if second
         else ("instantiationToken", "canGetAndSetFMUState", "providesDirectionalDerivatives")
@@ -137,12 +142,12 @@ def _description(version: int, token: str) -> str:
     lines += ['<DefaultExperiment startTime="0" stopTime="1"/>', "<ModelVariables>"]
     if not second:
         lines.append('<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>')
-    lines += [_variable(second, name, reference) for reference, name in enumerate(_TEXTS, 1)]
+    lines += [_variable(second, *item) for item in numbers.items()]
     lines += ["</ModelVariables>", "<ModelStructure>"]
-    known = " ".join(map(str, range(1, first)))
+    known = " ".join(str(numbers[name]) for name in STARTS)
     for group in ("Output", "InitialUnknown"):
         name, index = ("Unknown", "index") if second else (group, "valueReference")
-        rows = [f'<{name} {index}="{first + i}" dependencies="{known}"/>' for i in range(len(_OUTPUTS))]
+        rows = [f'<{name} {index}="{numbers[output]}" dependencies="{known}"/>' for output in _OUTPUTS]
         lines += [f"<{group}s>", *rows, f"</{group}s>"] if second else rows
     return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>", ""])
 
@@ -156,8 +161,9 @@ def _type(second: bool, name: str) -> str:
 
 
 def _variable(second: bool, name: str, reference: int) -> str:
-    kind = "input" if name in STARTS else "output" if name in _OUTPUTS else "parameter" if name in _CHOICES else "local"
-    varies = "discrete" if name in _WHOLE else "fixed" if name in _CHOICES else "continuous"
+    parameter = name in _CHOICES or name == "v_rest"
+    kind = "input" if name in STARTS else "output" if name in _OUTPUTS else "parameter" if parameter else "local"
+    varies = "discrete" if name in _WHOLE else "fixed" if parameter else "continuous"
     held = "Enumeration" if name in _CHOICES else "Real" if second else "Float64"
     if name in _WHOLE:
         held = "Integer" if second else "Int32"
@@ -165,10 +171,12 @@ def _variable(second: bool, name: str, reference: int) -> str:
         f'name="{name}" valueReference="{reference}" description={quoteattr(_TEXTS[name])} causality="{kind}"'
         f' variability="{varies}"'
     )
-    unit = "N" if name == AMPLITUDE else UNITS.get(name, "-")
+    unit = {**UNITS, AMPLITUDE: "N", "force": "N", "v_rest": "m/s"}.get(name, "-")
     value = "" if unit == "-" else f' unit="{unit}"'
     if name in STARTS:
-        value += f' start="{STARTS[name]!r}" min="0"'
+        value += f' start="{STARTS[name]!r}"' + (' min="0"' if name != "v0" else "")
+    elif name == "v_rest":
+        value += f' start="{REST!r}" min="0"'
     elif name in _CHOICES:
         value = f' declaredType="{name}" start="0"'
     else:
