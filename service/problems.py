@@ -10,10 +10,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, NoReturn
+from typing import Any, NoReturn, get_args
 
 import orjson
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import Scope
@@ -104,10 +105,19 @@ def faults_of(
         elif kind == "float_type":
             reason = number_hint(str(path[0]), value)
         else:
-            extra: Any = model.model_fields[str(path[0])].json_schema_extra
+            extra: Any = _field(model, path).json_schema_extra
             reason = f"must be {extra['bound']}"
         found.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(found.values())
+
+
+def _field(model: type[BaseModel], path: tuple[str | int, ...]) -> FieldInfo:
+    """The field at ``path``, or the last one on the way that is a field."""
+    field = model.model_fields[str(path[0])]
+    for inner in get_args(field.annotation):
+        if len(path) > 1 and isinstance(inner, type) and issubclass(inner, BaseModel) and path[1] in inner.model_fields:
+            return inner.model_fields[str(path[1])]
+    return field
 
 
 class Kind(Enum):
