@@ -86,6 +86,14 @@ def test_the_slope_along_speed_is_not_lost_where_the_group_underflows(fine: Surr
         assert abs(found.gradient["v0"] - expected) <= slack + 1e-9 * expected
 
 
+def test_the_slope_from_rest_on_lies_within_its_bound(fine: Surrogate) -> None:
+    """Above y~ = 1 it is read off the table; the finest one stands for the truth."""
+    case = {**CASE, "y0": 3e-6 * np.geomspace(1.001, 1000.0, 20_000), "v0": 0.0}
+    rough, exact = (s.evaluate(case, gradient=True) for s in (Surrogate.open(1e-4), fine))
+    share = np.abs(rough.gradient["v0"] - exact.gradient["v0"]) / rough.gradient_bound["v0"]
+    assert 0.4 < share.max() <= 1.0
+
+
 def test_bounds_are_never_nan_negative_or_missing_at_the_ends_of_double_precision(table: Surrogate) -> None:
     values = np.concatenate([[0.0, 5e-324], 10.0 ** np.arange(-320.0, 305.0, 12.5), [1.7e308, math.inf]])
     v, y = (x.ravel() for x in np.meshgrid(values, values[:-1]))
