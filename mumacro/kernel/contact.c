@@ -54,7 +54,7 @@ MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s
 
 /* The springs of one piece, between two values of 1 - xi. */
 static void mu_take_piece(const mumacro_rule *rule, double from, double to, double v, double y, mu_springs *out) {
-    const double length = from - to, least = mu_max(v, y) / 1e300;
+    const double length = from - to, least = mu_max(mu_max(v, y), 1.0) / 1e300;
     for (int64_t i = 0; length > 0.0 && i < rule->nodes && out->n < MU_CHUNK; ++i) {
         const double rest = to + length * rule->points[2 * i], s = mu_max(rest * (2.0 - rest), least);
         const int n = out->n++;
@@ -105,11 +105,11 @@ static double mu_least_share(double sum, double load) {
 }
 
 /* The slope along y~ is not a share of the load: beside y~ = 1 it grows like the load per length of the piece, squared,
- * and like a root where that is the middle, down to the root of y~'s last digit. */
+ * and over its xi, down to the root of y~'s last digit. */
 static double mu_slope_scale(const mu_springs *c, int piece, double load) {
     const double from = c->edge[piece], to = c->edge[piece + 1], density = load / (from - to);
     if (!(from > to) || (piece != MU_BELOW && piece != MU_CLOSE)) return load;
-    return density * density / sqrt(mu_max(1.0 - 0.5 * (from + to), 1e-8));
+    return density * density / mu_max(1.0 - 0.5 * (from + to), 1e-8);
 }
 
 /* The static limit, y~ < 1.5: sqrt(1 + e) (E - e K) with e = y~/1.5 and elliptic integrals of the parameter
