@@ -45,7 +45,7 @@ def fastapi() -> Any:
 
     @app.post("/v1/mu-macro", response_model=CaseAnswer)
     async def one(case: Case) -> Any:
-        found = surrogate.evaluate(**case.model_dump())
+        found = surrogate.evaluate(**case.model_dump(exclude_none=True))
         names = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
         return {**{name: getattr(found, name) for name in names}, "table": label, "api_version": "1"}
 

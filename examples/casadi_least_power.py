@@ -9,6 +9,7 @@ mu_macro and the contact's power with exact derivatives.  Needs a C compiler.
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 
@@ -35,7 +36,7 @@ const long long *jac_friction_sparsity_out(long long i) { return matrix; }
 """
 
 
-def optimise(target=0.15, mass=0.005, quality=1000.0):
+def optimise(target: float = 0.15, mass: float = 0.005, quality: float = 1000.0) -> tuple[float, ...]:
     """y0 [m], omega [rad/s], mu_macro and total power [W] at least power under mu_macro <= target."""
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run(["mumacro", "export", "--format", "c", "--out", folder], check=True, capture_output=True)
@@ -46,9 +47,11 @@ def optimise(target=0.15, mass=0.005, quality=1000.0):
         x = ca.MX.sym("ln y0, ln omega", 2)
         y0, omega = ca.exp(x[0]), ca.exp(x[1])
         found = friction(ca.vertcat(0.3, 10.0, 1e6, y0, omega, 0.01))
-        problem = {"x": x, "f": 1e3 * (found[1] + mass * omega**3 * y0**2 / (2.0 * quality)), "g": found[0]}
-        options = {"print_time": False, "ipopt": {"print_level": 0, "hessian_approximation": "limited-memory"}}
-        solved = ca.nlpsol("least", "ipopt", problem, options)(x0=ca.log([3e-6, 3e4]), ubg=target)
+        power = found[1] + mass * omega**3 * y0**2 / (2.0 * quality)
+        quiet = {"print_level": 0, "hessian_approximation": "limited-memory"}
+        options: dict[str, Any] = {"print_time": False, "ipopt": quiet}
+        solver: Any = ca.nlpsol("least", "ipopt", {"x": x, "f": 1e3 * power, "g": found[0]}, options)
+        solved = solver(x0=ca.log([3e-6, 3e4]), ubg=target)
     return *map(float, ca.exp(solved["x"]).full().ravel()), float(solved["g"]), 1e-3 * float(solved["f"])
 
 

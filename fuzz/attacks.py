@@ -21,7 +21,7 @@ from benchmarks.measuring import main, markdown
 from tests.serving import CASE, Server, connect, head, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
-EVERYTHING = ["groups", "limits", "regime_certain", "gradient", "stick_fraction", "power", "settling"]
+EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
 
 
 def held(server: Server, share: float, text: bytes, then: Callable[[], object] = lambda: time.sleep(3.0)) -> None:

@@ -56,7 +56,7 @@ def case(chance: random.Random) -> dict[str, float]:
     return {name: 10.0 ** chance.uniform(*span) for name, span in spans.items()}
 
 
-INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", "regime_certain", "border")
+INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", "border")
 
 
 def document(chance: random.Random) -> tuple[str, Any]:
@@ -71,14 +71,12 @@ def document(chance: random.Random) -> tuple[str, Any]:
     one |= {} if chance.random() < 0.9 else {"k": chance.choice([None, "rigid"])}
     one |= {} if chance.random() < 0.9 else {"tolerance": 1e-3}
     rest = {name: value for name, value in one.items() if name != "v0"}
-    family = {**rest, "y0": None, "family": {"y0": [1e-7, 1e-6]}} if chance.random() < 0.3 else rest
     return chance.choice((
         ("/v1/mu-macro", one),
         (BATCH, {**one, "v0": [10.0 ** chance.uniform(-5, 1) for _ in range(chance.choice([0, 1, 2, 5, 300]))]}),
         (BATCH, [case(chance) for _ in range(chance.choice([0, 1, 2, 5, 60]))]),
         ("/v1/solve-for", {**rest, "unknown": "v0", "target": chance.choice([0.1, 0.5, [0.01, 0.2]])}),
-        ("/v1/law", {**{name: value for name, value in family.items() if name != "y0" or value is not None},
-                     "start": 1e-4, "stop": 1.0, "points": chance.choice([2, 5, 50])}),
+        ("/v1/law", {**rest, "start": 1e-4, "stop": 1.0, "points": chance.choice([2, 5, 50])}),
     ))  # fmt: skip
 
 
@@ -109,7 +107,7 @@ VALUES = (
     '"' + "x" * 3000 + '"', "[" + "1," * 2000 + "1]", "/*1*/", "'1'", "undefined", "", ",", "\ufeff1", "\u2028",
 )  # fmt: skip
 NAMES = (
-    *CASE, "f", "include", "std", "tolerance", "target", "unknown", "points", "family", "name", "input", "", "\u00e9",
+    *CASE, "f", "include", "std", "tolerance", "target", "unknown", "points", "name", "input", "", "\u00e9",
     "__proto__", "mu0 ", "MU0", "constructor", "x" * 2000,
 )  # fmt: skip
 

@@ -255,10 +255,6 @@ def format_for(chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[s
     """How numbers are printed: with ``--digits``, or as many as the stiffness of a case supports."""
     if chosen.digits is not None:
         return f".{chosen.digits}g"
-    if "k_range" in case:
-        found = surrogate.evaluate(**{**case, **kind.names})
-        width = 0.5 * (found.mu_macro_high - found.mu_macro_low)
-        return f".{digits(width / found.mu_macro if found.mu_macro else math.inf)}g"
     contact, direction = kind.names.values()
     return f".{digits(k_effect(surrogate, case, contact, direction))}g"
 

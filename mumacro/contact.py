@@ -10,6 +10,7 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -95,6 +96,10 @@ class Kind(NamedTuple):
 
 
 SPRING = Kind(0, 0)
+_KINDS: dict[tuple[str, str], Kind] = {
+    (word, way): Kind(i, j) for i, word in enumerate(CONTACTS) for j, way in enumerate(DIRECTIONS)
+}
+del _KINDS["ball", "normal"]
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
@@ -110,13 +115,13 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
     """
+    with suppress(KeyError, TypeError):
+        return _KINDS[contact, direction]
     for name, value, known in (("contact", contact, CONTACTS), ("direction", direction, DIRECTIONS)):
         if not isinstance(value, str) or value not in known:
             raise InputError(name, value, f"one of {', '.join(known)}")
-    if contact == "ball" and direction == "normal":
-        told = "across or along for a ball: a normal force that oscillates changes its contact radius, not modelled"
-        raise InputError("direction", direction, told)
-    return Kind(CONTACTS.index(contact), DIRECTIONS.index(direction))
+    told = "across or along for a ball: a normal force that oscillates changes its contact radius, not modelled"
+    raise InputError("direction", direction, told)
 
 
 # --- quadrature -----------------------------------------------------------------------------------------

@@ -23,7 +23,8 @@ from mumacro.errors import InputError
 
 __all__ = [
     "BOUNDS", "FIELDS", "GAP", "LIKE", "MOST_HZ", "NAMES", "PER_UNIT", "PLAIN", "POSITIVE", "RAD_PER_CYCLE", "RIGID",
-    "SI", "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "is_rigid", "length_scale", "number_hint",
+    "SI", "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "field_of", "is_rigid", "length_scale",
+    "number_hint",
     "read_number", "read_quantity", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion",
     "unit_of", "unknown_name",
 ]  # fmt: skip
@@ -168,6 +169,15 @@ def unit_of(name: str) -> str:
     ('N/m', 'Hz')
     """
     return SI[LIKE.get(name, name)][0]
+
+
+def field_of(name: str) -> tuple[str, float]:
+    """The field behind the name of an input, and what one unit of the name is of it.
+
+    >>> field_of("f"), field_of("y0")
+    (('omega', 6.283185307179586), ('y0', 1.0))
+    """
+    return ("omega", RAD_PER_CYCLE) if name == "f" else (name, 1.0)
 
 
 def _scale(units: Mapping[str, Scale], unit: str) -> Scale | None:

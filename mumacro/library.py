@@ -29,6 +29,7 @@ _DECLARED = "".join((_HERE / "kernel" / name).read_text("ascii") for name in ("d
 _FFI = FFI()
 _FFI.cdef("\n".join(line for line in _DECLARED.splitlines() if not line.startswith("#")))
 _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"))
+_POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
 _SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
 _NOTHING: Any = _FFI.NULL
 
@@ -127,6 +128,12 @@ class Kernel:
             self._values(data.pointer, quantity, *arrays)
         else:
             self._found.values_as(data.pointer, *kind, quantity, *arrays)
+
+    def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
+        """A quantity at one point in plain numbers, its bound and the source."""
+        point, code = _FFI.new(_POINT, (v, y)), _FFI.new(_CODE)
+        self._values(data.pointer, quantity, 1, point, point + 1, point + 2, point + 3, code)
+        return point[2], point[3], code[0]
 
     def slopes(self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0) -> None:
         """Value, slopes along ln v~ and ln y~ and their bounds: ``rows`` (5, N) from column ``start`` on."""

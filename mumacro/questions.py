@@ -23,7 +23,7 @@ from mumacro.command import (
 )  # fmt: skip
 from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
-from mumacro.inputs import NAMES, RAD_PER_CYCLE, unit_of
+from mumacro.inputs import NAMES, field_of, unit_of
 from mumacro.inverse import solve_for
 from mumacro.law import approximations, friction_law, sweep_values
 
@@ -35,11 +35,6 @@ STIFFNESS = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"
 CURVE = 400  # points of a curve in a picture
 ONE_K = "one k is needed: over an interval of it a wanted mu_macro has no single answer; solve for both ends"
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
-
-
-def _inner(name: str) -> tuple[str, float]:
-    """The input of the model behind a name, and what one unit of the name is of it."""
-    return ("omega", RAD_PER_CYCLE) if name == "f" else (name, 1.0)
 
 
 def law(words: Sequence[str]) -> str:
@@ -56,7 +51,7 @@ def law(words: Sequence[str]) -> str:
     (along, *ends), kind = chosen.along, kind_in(chosen)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
-    (inner, scale), unit = _inner(along), unit_of(along)
+    (inner, scale), unit = field_of(along), unit_of(along)
     case = read_case(chosen.words, kind, [along])
     start, stop = (scale * end for end in command.read_values((along, end) for end in ends))
     drawn = chosen.out is not None and chosen.out.suffix != ".csv"
@@ -97,7 +92,7 @@ def solve(words: Sequence[str]) -> str:
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     chosen = parser.parse_intermixed_args(words)
-    unknown, (inner, scale), unit = chosen.unknown, _inner(chosen.unknown), unit_of(chosen.unknown)
+    unknown, (inner, scale), unit = chosen.unknown, field_of(chosen.unknown), unit_of(chosen.unknown)
     kind = kind_in(chosen)
     if unknown not in kind.columns:
         raise UsageError(f"{unknown} does not belong to --direction {chosen.direction}: {', '.join(kind.columns)} do")

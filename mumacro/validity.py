@@ -16,6 +16,7 @@ import numpy as np
 from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import RAD_PER_CYCLE, as_columns, length_scale
+from mumacro.interval import without_interval
 from mumacro.measured import HARDLY
 from mumacro.settling import settling
 from mumacro.surrogate import Surrogate
@@ -53,7 +54,8 @@ def model_rows(
     surrogate : Surrogate
         The table.
     case : mapping
-        Inputs of :meth:`mumacro.Surrogate.evaluate`, numbers in SI.
+        Inputs of :meth:`mumacro.Surrogate.evaluate`, numbers in SI; of an interval of k its geometric middle is told,
+        without the row of k.
     contact, direction : str
         As there.
 
@@ -74,6 +76,7 @@ def model_rows(
     >>> found["text"]
     'k known to 10 % leaves mu_macro uncertain by 6 %: give k_range, or fit k'
     """
+    case, ends = without_interval(case, "")
     mu = surrogate.evaluate(**case, **kind_of(contact, direction).names).mu_macro
     six = _six(case)
     swing = case["Fz_amplitude"] if direction == "normal" else six["y0"]
@@ -84,7 +87,8 @@ def model_rows(
         text = f"y~ = {y:.3g}; contacts have 0.1 to 100: is y0 = {six['y0']:.3g} in metres?"
         return [{"row": "units", "text": text, "effect": None}]
     rows = [
-        _kind(surrogate, case, mu, contact, direction), _stiffness(surrogate, case, y, contact, direction),
+        _kind(surrogate, case, mu, contact, direction),
+        None if ends else _stiffness(surrogate, case, y, contact, direction),
         _tilt(six["mu0"], y), *(_cycle(surrogate, six) if direction == "across" else ()),
     ]  # fmt: skip
     return sorted((row for row in rows if row is not None), key=lambda row: ROWS.index(row["row"]))
@@ -96,16 +100,23 @@ def k_effect(
 ) -> float:  # fmt: skip
     """By how much, relatively, mu_macro may differ [-] where k may by the factor 1 + ``known`` up or down; 0 if rigid.
 
-    The largest of seven values of k, since mu_macro is no straight line in k.
+    The largest of seven values of k, since mu_macro is no straight line in k.  Over an interval of k half the width.
     """
     if not 0.0 < known < math.inf:
         raise InputError("known", known, "finite and > 0")
-    if math.isinf(found := _six(case)["k"]):
+    words = kind_of(contact, direction).names
+    one, ends = without_interval(case, "")
+    found = _six(one)["k"]
+    if math.isinf(found):
         return 0.0
-    k = found * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
-    mu = surrogate.evaluate(**{**case, "k": k}, **kind_of(contact, direction).names).mu_macro
-    apart = float(np.abs(mu - mu[3]).max())
-    return 0.0 if apart == 0.0 else apart / float(mu[3]) if mu[3] > 0.0 else math.inf
+    if ends:
+        over = surrogate.evaluate(**case, **words)
+        at, apart = over.mu_macro, 0.5 * (over.mu_macro_high - over.mu_macro_low)
+    else:
+        k = found * np.geomspace(1.0 / (1.0 + known), 1.0 + known, 7)  # the middle one is k
+        mu = surrogate.evaluate(**{**case, "k": k}, **words).mu_macro
+        at, apart = float(mu[3]), float(np.abs(mu - mu[3]).max())
+    return 0.0 if apart == 0.0 else apart / at if at > 0.0 else math.inf
 
 
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:

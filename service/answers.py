@@ -28,6 +28,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
+_USED = ("mu_macro", "error_bound", "v_tilde", "y_tilde", "length_scale")  # of an answer, by the quantities
 #: name of the regime of every source code
 REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
 
@@ -43,7 +44,6 @@ class Part:
     path: str
     unit: str
     text: str
-    kind: type = float
     names: tuple[str, ...] = ()
 
     @property
@@ -51,26 +51,17 @@ class Part:
         """Its meaning and unit."""
         return f"{self.text} [{self.unit}]"
 
-    def value(self, number: float) -> Any:
-        """One number of the column as JSON has it; NaN is written as null."""
-        if self.names:
-            return self.names[int(number)]
-        return (None if number != number else bool(number)) if self.kind is bool else number
-
     def values(self, column: Any) -> list[Any]:
-        """The column as JSON has it."""
-        if self.kind is float:
-            return list(column.tolist())
-        if self.names:
-            return list(np.array(self.names, dtype=object)[column].tolist())
-        return [self.value(number) for number in column.tolist()]
+        """The column as JSON has it; NaN is written as null."""
+        found = np.array(self.names, dtype=object)[column] if self.names else column
+        return list(found.tolist())
 
 
 @dataclass
 class Cases:
-    """Legal cases that quantities are computed for: arrays (n,), or numbers of numpy for one; k = inf is rigid contact.
+    """Cases that quantities are computed for: arrays (n,), or numbers of numpy for one; k = inf is rigid contact.
 
-    The groups are those of the library; the slopes, by name of the input, are there if a requested quantity needs them.
+    The slopes, by name of the input, are there if a requested quantity needs them.  What is not legal is NaN.
     """
 
     surrogate: Surrogate
@@ -80,32 +71,30 @@ class Cases:
     kind: Kind = SPRING
 
     def __post_init__(self) -> None:
-        answer = self.answer
-        found = [answer.mu_macro, answer.error_bound, answer.v_tilde, answer.y_tilde, answer.length_scale]
-        if isinstance(found[0], float):
-            found = list(map(np.float64, found))
+        self.columns = {name: _of_numpy(column) for name, column in self.columns.items()}
+        found = (_of_numpy(getattr(self.answer, name)) for name in _USED)
         self.mu_macro, self.error_bound, self.v_tilde, self.y_tilde, self.length_scale = found
-        self.at_rest: Any = (self.columns[self.kind.fields[3]] == 0.0) | (self.columns["omega"] == 0.0)
+        self.at_rest = (self.columns[self.kind.fields[3]] == 0.0) | (self.columns["omega"] == 0.0)
+        self.rigid = np.isinf(self.columns["k"])
         #: elastic, oscillating, with groups within double range
-        self.usable: Any = np.isfinite(self.y_tilde) & ~self.at_rest
+        self.usable = np.isfinite(self.y_tilde) & ~self.at_rest
+        self.words: dict[str, Any] = self.kind.names
 
-    def again(self, **changed: Any) -> Array:
-        """mu_macro with other values of some inputs, in the same shape; NaN where they are not legal."""
-        columns = [np.atleast_1d(changed.get(name, self.columns[name])) for name in self.kind.fields]
-        n = self.mu_macro.size
-        if self.kind == SPRING:
-            a, b, c, d, e, f = columns
-            found = self.surrogate.evaluate_columns(a, b, c, d, e, f, n)[0]
-        else:
-            named: dict[str, Any] = dict(zip(self.kind.fields, columns, strict=True))
-            found = self.surrogate.evaluate(**named, **self.kind.names).mu_macro
-        return np.broadcast_to(found, n).reshape(self.mu_macro.shape)
+    def at_speed(self, v0: Any) -> Array:
+        """mu_macro at another v0, in the same shape; NaN where that is not legal."""
+        columns = {name: np.atleast_1d(column) for name, column in {**self.columns, "v0": v0}.items()}
+        found = self.surrogate.evaluate(columns, **self.words).mu_macro
+        return np.broadcast_to(found, self.mu_macro.shape or (1,)).reshape(self.mu_macro.shape)
 
     def slopes(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """d mu_macro / d input and the bounds, NaN along k where contact is rigid."""
-        no_slope = where(np.isinf(self.columns["k"]), np.nan, 0.0)
+        no_slope = where(self.rigid, np.nan, 0.0)
         slopes, bounds = self.answer.gradient, self.answer.gradient_bound
         return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}
+
+
+def _of_numpy(column: Any) -> Any:
+    return np.float64(column) if isinstance(column, float) else column
 
 
 def where(condition: Any, one: Any, other: Any) -> Any:
@@ -132,9 +121,9 @@ class Quantity:
 DEFAULT = (
     Part("mu_macro", "-", "Macroscopic coefficient of friction"),
     Part("mu_ratio", "-", "mu_macro/mu0, from 0 to 1"),
-    Part("regime", "-", "How the contact moves", str, REGIME_NAMES),
+    Part("regime", "-", "How the contact moves", REGIME_NAMES),
     Part("error_bound", "-", "Bound of the absolute error of mu_macro"),
-    Part("source", "-", "Block of the table, or closed-form tail, that the value came from", str, tuple(SOURCES)),
+    Part("source", "-", "Block of the table, or closed-form tail, that the value came from", tuple(SOURCES)),
 )
 #: what an interval of k adds to it
 INTERVAL = (
@@ -146,13 +135,12 @@ _COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 40.0}  # in t
 QUANTITIES: dict[str, Quantity] = {}
 
 
-def register(
-    name: str, text: str, parts: Sequence[Part], cost: float, slopes: bool = False, **lacks: str
-) -> Callable[[Any], Any]:
-    """Add the quantity that the decorated function computes."""
+def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
+    """Add the quantity that the decorated function computes: by its name, with its docstring as the text."""
 
     def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
-        QUANTITIES[name] = Quantity(name, text, tuple(parts), compute, cost, slopes, lacks)
+        name, text = compute.__name__, (compute.__doc__ or "").removesuffix(".")
+        QUANTITIES[name] = Quantity(name, text, parts, compute, cost, slopes, lacks)
         return compute
 
     return add
@@ -169,7 +157,7 @@ def of_amplitude(part: Part) -> Part:
     if not part.path.endswith(".y0"):
         return part
     path, text = part.path.removesuffix("y0") + AMPLITUDE, part.text.replace("y0", AMPLITUDE)
-    return replace(part, path=path, text=text, unit=part.unit.replace("(m)", "(N)"))
+    return replace(part, path=path, text=text, unit=part.unit.replace("m", "N"))
 
 
 def said(asked: Asked) -> list[str]:
@@ -200,36 +188,17 @@ def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def answer_case(
-    surrogate: Surrogate, case: Mapping[str, float], include: Sequence[str] = (),
+    surrogate: Surrogate, case: Mapping[str, Any], include: Sequence[str] = (),
     std: Mapping[str, float] | None = None, asked: Asked = PLAIN,
 ) -> tuple[dict[str, Any], int]:  # fmt: skip
-    """The answer to one legal case as plain Python values, and the code of its source; -1: the case is not legal."""
-    if not include and asked == PLAIN:
-        macro, ratio, bound, source = surrogate.evaluate_case(*(case[name] for name in FIELDS))
-        return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[source], bound, SOURCES[source]), strict=True)), source
-    inputs: dict[str, Any] = {**case}
-    found = surrogate.evaluate(**inputs, **asked.kind.names, gradient=_need_slopes(include))
-    source = found.source_code
-    numbers = found.mu_macro, found.mu_ratio, REGIME_NAMES[source], found.error_bound, SOURCES[source]
-    cases = Cases(surrogate, _six({n: np.float64(case[n]) for n in asked.fields}, asked), found, std or {}, asked.kind)
-    ends = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
-    columns = zip(parts_of(include, asked)[len(_NAMES) :], [*ends, *_computed(cases, include)], strict=True)
-    more = nested({part.path: part.value(float(column)) for part, column in columns})
-    return {**dict(zip(_NAMES, numbers, strict=True)), **more}, source
-
-
-def _six(columns: dict[str, Any], asked: Asked) -> dict[str, Any]:
-    """Columns with the middle k of an interval."""
-    return {**columns, "k": middle(columns, "nan")[2]} if asked.interval else columns
-
-
-def _need_slopes(include: Sequence[str]) -> bool:
-    return any(QUANTITIES[name].slopes for name in include)
-
-
-def _computed(cases: Cases, include: Sequence[str]) -> list[Any]:
-    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        return [column for name in include for column in QUANTITIES[name].compute(cases)]
+    """The answer to one case as plain Python values, and the code of its source; InputError where it is not legal."""
+    if not include and asked is PLAIN:
+        macro, ratio, bound, code = surrogate.evaluate_case(*(case[name] for name in FIELDS))
+        return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)), code
+    found, more = _evaluated(surrogate, case, include, std, asked)
+    code = found.source_code
+    values = found.mu_macro, found.mu_ratio, REGIME_NAMES[code], found.error_bound, SOURCES[code]
+    return dict(zip(_NAMES, values, strict=True)) | nested({path: float(value) for path, value in more.items()}), code
 
 
 def answer_columns(
@@ -240,27 +209,29 @@ def answer_columns(
 
     ``six`` has n cases in columns of shape (n,) or (1,), in the order of the fields; k = inf is rigid contact.
     """
-    ends: dict[str, Any] = {}
-    names: Any = asked.kind.names
-    if asked == PLAIN:
-        macro, ratio, bound, source = surrogate.evaluate_columns(six[0], six[1], six[2], six[3], six[4], six[5], n)
-    else:
-        named: dict[str, Any] = dict(zip(asked.fields, six, strict=True))
-        whole: Any = surrogate.evaluate(**named, **names)
-        macro, ratio, bound, source = whole.mu_macro, whole.mu_ratio, whole.error_bound, whole.source_code
-        ends = {part.path: getattr(whole, part.path) for part in INTERVAL} if asked.interval else {}
-    parts = parts_of(include, asked)[len(DEFAULT) + len(ends) :]
-    found: dict[str, Any] = {part.path: np.full(n, np.nan) for part in parts}
-    where = np.flatnonzero(source >= 0)
-    if include and where.size:
-        legal: dict[str, Any] = {
-            name: column[where] if column.size == n else np.full(where.size, column[0])
-            for name, column in zip(asked.fields, six, strict=True)
-        }
-        legal = _six(legal, asked)
-        at_k = {name: legal[name] for name in asked.kind.fields}
-        answer = surrogate.evaluate(**at_k, **names, gradient=_need_slopes(include), groups=True)
-        cases = Cases(surrogate, legal, answer, std or {}, asked.kind)
-        for column, values in zip(found.values(), _computed(cases, include), strict=True):
-            column[where] = values
-    return {**dict(zip(_NAMES, (macro, ratio, source, bound, source), strict=True)), **ends, **found}, source
+    cases = {name: x if x.size == n else x.item() for name, x in zip(asked.fields, six, strict=True)}
+    found, more = _evaluated(surrogate, cases, include, std, asked)
+    codes = found.source_code
+    values = found.mu_macro, found.mu_ratio, codes, found.error_bound, codes
+    legal = codes >= 0
+    more = {path: np.where(legal, column, np.nan) for path, column in more.items()}
+    return {**dict(zip(_NAMES, values, strict=True)), **more}, codes
+
+
+def _evaluated(
+    surrogate: Surrogate, cases: Mapping[str, Any], include: Sequence[str], std: Mapping[str, float] | None,
+    asked: Asked,
+) -> tuple[Any, dict[str, Any]]:  # fmt: skip
+    """The library's answer, and the columns beside the default ones by path."""
+    slopes = any(QUANTITIES[name].slopes for name in include)
+    words: dict[str, Any] = asked.kind.names
+    found = surrogate.evaluate(**cases, **words, gradient=slopes, groups=bool(include))
+    more = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
+    if include:
+        if asked.interval:
+            cases = {**cases, "k": middle(cases, "nan")[2]}
+        known = Cases(surrogate, {name: cases[name] for name in asked.kind.fields}, found, std or {}, asked.kind)
+        with np.errstate(all="ignore"):
+            more += [column for name in include for column in QUANTITIES[name].compute(known)]
+    parts = parts_of(include, asked)[len(DEFAULT) :]
+    return found, {part.path: column for part, column in zip(parts, more, strict=True)}

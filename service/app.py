@@ -20,12 +20,12 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from . import __version__
-from .limits import Keys, Work
+from .limits import Work
 from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .observe import Metrics, Observe
 from .options import Case, CaseColumns
 from .problems import problem_of
-from .routes import Routes, batch, case, docs, fit, health, law, page, solve_for, stiffness, table
+from .routes import Routes, batch, case, contact, docs, health, page, questions, table
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 from .wire.json import dump
@@ -33,9 +33,7 @@ from .wire.json import dump
 __all__ = ["Application", "create_app"]
 
 ENDPOINTS = [
-    endpoint
-    for module in (case, batch, solve_for, law, stiffness, fit, table, health, docs, page)
-    for endpoint in module.ENDPOINTS
+    endpoint for module in (case, batch, questions, contact, table, health, docs, page) for endpoint in module.ENDPOINTS
 ]
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and oscillates across the "
@@ -45,6 +43,10 @@ _DESCRIPTION = (
 # models that are described by name only
 _MORE: Any = [(Case, "validation"), (CaseColumns, "validation")]
 _MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
+_KEYS = {
+    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
+    "bearer": {"type": "http", "scheme": "bearer"},
+}
 _log = logging.getLogger("mumacro.app")
 
 
@@ -66,15 +68,10 @@ async def _problem(request: Request, error: Exception) -> Response:
 
 
 class Application(FastAPI):
-    """The whole service.
+    """The whole service; ``state`` is what the endpoints share: settings, tables, metrics, work, openapi.
 
     FastAPI describes the endpoints, starts and ends the application, and answers what is none of them (the guide).
     Requests to endpoints do not pass its layers (docs/decisions.md).
-
-    Attributes
-    ----------
-    state : State
-        What the endpoints share: settings, tables, metrics, work, openapi.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -95,8 +92,7 @@ class Application(FastAPI):
             self.add_route("/guide", lambda _: RedirectResponse("guide/"))
             self.mount("/guide", StaticFiles(directory=settings.guide, html=True))
             opened.add("/guide")
-        routes = Routes(ENDPOINTS, super().__call__)
-        self._front: ASGIApp = Observe(routes, state.metrics, Keys(settings.keys()), opened)
+        self._front: ASGIApp = Observe(Routes(ENDPOINTS, super().__call__), state.metrics, settings.keys(), opened)
         if settings.cors_origins:
             self._front = CORSMiddleware(
                 self._front,
@@ -107,11 +103,8 @@ class Application(FastAPI):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request; the events of start and end are FastAPI's."""
-        if scope["type"] == "http":
-            scope["app"] = self
-            await self._front(scope, receive, send)
-        else:
-            await super().__call__(scope, receive, send)
+        scope["app"] = self
+        await (self._front if scope["type"] == "http" else super().__call__)(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
         """The description of the interface."""
@@ -120,11 +113,8 @@ class Application(FastAPI):
             _, more = models_json_schema(_MORE, ref_template="#/components/schemas/{model}")
             described["components"]["schemas"] |= more["$defs"]
             if self.state.settings.keys():
-                described["components"]["securitySchemes"] = {
-                    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
-                    "bearer": {"type": "http", "scheme": "bearer"},
-                }
-                described["security"] = [{"key": []}, {"bearer": []}]
+                described["components"]["securitySchemes"] = _KEYS
+                described["security"] = [{name: []} for name in _KEYS]
         return super().openapi()
 
 

@@ -19,6 +19,7 @@ from mumacro.contact import AMPLITUDE, SPRING
 from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import (
     GAP,
+    LIKE,
     MOST_HZ,
     POSITIVE,
     RAD_PER_CYCLE,
@@ -34,24 +35,24 @@ from mumacro.interval import BOUND, ENDS
 from .problems import FieldFault, Kind, RequestError, refuse
 
 __all__ = [
-    "INPUTS", "LIKE", "MAX_ERRORS", "PLAIN", "Asked", "Columns", "Reason", "asked_of", "checked", "columns_of",
-    "faults_in", "joined", "names_of", "number", "stranger", "too_large",
+    "INPUTS", "LEAST", "LIKE", "MAX_ERRORS", "PLAIN", "Asked", "Columns", "Reason", "asked_of", "bound_of", "checked",
+    "columns_of", "faults_in", "joined", "names_of", "not_finite", "number", "stranger", "too_large",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 #: the bad field, or None for the case as a whole, and why
 Reason = tuple[str | None, str]
 MAX_ERRORS = 1000  # bad cases of a batch that are listed
-STATE_OMEGA = "is required: omega [rad/s], or f [Hz] in its place"
-ONE_FREQUENCY = "omega is given, too: give exactly one of omega [rad/s] and f [Hz]"
-STATE_K = f"is required: the tangential stiffness [N/m], or {RIGID}"
+_STATE = {
+    "omega": "is required: omega [rad/s], or f [Hz] in its place",
+    "k": f"is required: the tangential stiffness [N/m], or {RIGID}",
+}
 LEFT_OUT = "must be left out: it is the unknown or swept input"
-#: an input that stands for another -> that one, whose units and bounds it has
-LIKE = {AMPLITUDE: "Fz", **dict.fromkeys(ENDS, "k")}
 _INTERVAL = frozenset(("k_range", *ENDS))
-_NAMES = frozenset(INPUTS)
-_LEAST = {name: 5e-324 if LIKE.get(name, name) in POSITIVE else 0.0 for name in (*INPUTS, *LIKE)} | {AMPLITUDE: 0.0}
-_MOST = {name: MOST_HZ if name == "f" else sys.float_info.max for name in (*INPUTS, *LIKE)}
+_NAMES, _FREQUENCIES = frozenset(INPUTS), {"omega", "f"}
+#: smallest and largest value of each input
+LEAST = {name: 5e-324 if LIKE.get(name, name) in POSITIVE else 0.0 for name in (*INPUTS, *LIKE)} | {AMPLITUDE: 0.0}
+_MOST = dict.fromkeys(LEAST, sys.float_info.max) | {"f": MOST_HZ}
 
 
 class Asked(NamedTuple):
@@ -72,16 +73,13 @@ PLAIN = Asked()
 
 def asked_of(given: Iterable[str], kind: ContactKind = SPRING) -> Asked:
     """What cases with these names are."""
-    return PLAIN if kind == SPRING and _INTERVAL.isdisjoint(given) else Asked(kind, not _INTERVAL.isdisjoint(given))
+    interval = not _INTERVAL.isdisjoint(given)
+    return Asked(kind, interval) if interval or kind != SPRING else PLAIN
 
 
 def names_of(asked: Asked) -> tuple[str, ...]:
     """All names that a case may have, for columns."""
-    return (
-        INPUTS
-        if asked == PLAIN
-        else tuple(n for name in asked.fields for n in ((name, "f") if name == "omega" else (name,)))
-    )
+    return INPUTS if asked == PLAIN else (*asked.fields[:-1], "f", asked.fields[-1])
 
 
 # --- one value, one case ------------------------------------------------------------------------------
@@ -94,7 +92,7 @@ def number(name: str, value: object, null_is_rigid: bool = True) -> tuple[float,
             found = float(value)
         except OverflowError:
             found = math.inf
-        if _LEAST[name] <= found <= _MOST[name]:
+        if LEAST[name] <= found <= _MOST[name]:
             return found, None
         return math.nan, _refusal(name, found)
     if name == "k" and ((isinstance(value, str) and is_rigid(value)) or (value is None and null_is_rigid)):
@@ -104,28 +102,35 @@ def number(name: str, value: object, null_is_rigid: bool = True) -> tuple[float,
     return math.nan, number_hint("Fz" if name == AMPLITUDE else name, value)
 
 
+def bound_of(name: str) -> str:
+    """What a value of an input must be."""
+    return f"finite and {'>' if LEAST[name] else '>='} 0"
+
+
 def _refusal(name: str, value: float) -> str:
     if name in _NAMES:
         return refusal(name, value)
-    return "is missing" if math.isnan(value) else f"must be finite and {'>' if _LEAST[name] else '>='} 0"
+    return "is missing" if math.isnan(value) else f"must be {bound_of(name)}"
+
+
+def not_finite(name: str, value: Any, *place: int) -> FieldFault | None:
+    """The fault of a value, or of an entry of a list, that is no finite number; None: it is one."""
+    kind = type(value) in (int, float)
+    if kind and abs(value) <= sys.float_info.max:
+        return None
+    return FieldFault((name, *place), "must be finite" if kind else number_hint(name, value), value)
 
 
 def faults_in(given: Iterable[str], left_out: Iterable[str] = (), asked: Asked = PLAIN) -> list[FieldFault]:
     """Faults between the names of the inputs that are given: missing ones, omega and f, or one that is asked for."""
     names, out = set(given), set(left_out)
-    if out & {"omega", "f"}:
-        out |= {"omega", "f"}
+    if out & _FREQUENCIES:
+        out |= _FREQUENCIES
     faults = [FieldFault.of(name, LEFT_OUT) for name in names_of(asked) if name in names & out]
-    for name in asked.fields:
-        if name in names or name in out:
-            continue
-        if name == "omega":
-            if "f" not in names:
-                faults.append(FieldFault.of(name, STATE_OMEGA))
-        else:
-            faults.append(FieldFault.of(name, STATE_K if name == "k" else "is required"))
-    if {"omega", "f"} <= names - out:
-        faults.append(FieldFault.of("f", ONE_FREQUENCY))
+    there = names | out | ({"omega"} if "f" in names else set())
+    faults += [FieldFault.of(name, _STATE.get(name, "is required")) for name in asked.fields if name not in there]
+    if names - out >= _FREQUENCIES:
+        faults.append(FieldFault.of("f", "omega is given, too: give exactly one of omega [rad/s] and f [Hz]"))
     return faults
 
 
@@ -140,9 +145,9 @@ def checked(
     """
     values: dict[str, float] = {}
     faults: list[FieldFault] = []
-    if asked != PLAIN:
-        given, faults = _with_ends(given)
-    names = _NAMES if asked == PLAIN else names_of(asked)
+    names = _NAMES
+    if asked is not PLAIN:
+        names, (given, faults) = frozenset(names_of(asked)), _with_ends(given)
     for name, value in given.items():
         if name not in names:
             told = stranger(name, asked, known) if len(faults) < 100 else "unknown"
@@ -151,7 +156,7 @@ def checked(
             values[name], reason = number(name, value, null_is_rigid)
             if reason is not None:
                 faults.append(FieldFault.of(name, reason, value))
-    if asked != PLAIN or left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
+    if asked is not PLAIN or left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
         faults += faults_in(values, left_out, asked)
     if "f" in values and not faults:
         values["omega"] = RAD_PER_CYCLE * values.pop("f")
@@ -166,20 +171,16 @@ def stranger(name: str, asked: Asked, known: Iterable[str]) -> str:
     return "must be left out beside an interval of it" if name == "k" else unknown_name(name, known)
 
 
-def _with_ends(given: Mapping[str, Any]) -> tuple[dict[str, Any], list[FieldFault]]:
+def _with_ends(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[FieldFault]]:
     """The inputs with both ends of an interval for ``k_range``, and faults."""
-    rest, faults = dict(given), list[FieldFault]()
-    if "k_range" in rest:
-        pair = rest.pop("k_range")
-        faults += [
-            FieldFault.of(end, "must be left out beside k_range") for end in ENDS if rest.pop(end, None) is not None
-        ]
-        if isinstance(pair, (list, tuple)) and len(pair) == 2:
-            rest |= zip(ENDS, pair, strict=True)
-        else:
-            faults.append(FieldFault.of("k_range", f"must be {BOUND}", pair))
-            rest |= dict.fromkeys(ENDS, 1.0)
-    return rest, faults
+    if "k_range" not in given:
+        return given, []
+    rest = {name: value for name, value in given.items() if name not in _INTERVAL}
+    faults = [FieldFault.of(end, "must be left out beside k_range") for end in ENDS if given.get(end) is not None]
+    pair = given["k_range"]
+    if isinstance(pair, (list, tuple)) and len(pair) == 2:
+        return {**rest, **dict(zip(ENDS, pair, strict=True))}, faults
+    return {**rest, **dict.fromkeys(ENDS, 1.0)}, [*faults, FieldFault.of("k_range", f"must be {BOUND}", pair)]
 
 
 # --- many cases ---------------------------------------------------------------------------------------
@@ -210,7 +211,7 @@ class Columns:
         case = {}
         for name, column in zip(self.asked.fields, self.six, strict=True):
             case[name] = value = column[index if column.size > 1 else 0].item()
-            if not _LEAST[name] <= value <= (math.inf if name == "k" else _MOST[name]):
+            if not LEAST[name] <= value <= (math.inf if name == "k" else _MOST[name]):
                 shown = "f" if name == "omega" and self.hertz else name
                 return shown, _refusal(shown, value)
         if self.asked.interval and case["k_low"] > case["k_high"]:
@@ -222,11 +223,8 @@ class Columns:
 
 def too_large(max_batch: int) -> RequestError:
     """The error for a batch with more cases than the settings allow."""
-    return RequestError(
-        Kind.BATCH_TOO_LARGE,
-        f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON",
-        max_batch=max_batch,
-    )
+    told = f"a batch may have up to {max_batch} cases, this one has more: split it, or stream it as NDJSON"
+    return RequestError(Kind.BATCH_TOO_LARGE, told, max_batch=max_batch)
 
 
 def columns_of(
@@ -239,51 +237,35 @@ def columns_of(
     together with the ``faults`` that were found before.
     """
     asked = asked_of(given, kind)
-    if asked != PLAIN:
-        given, more = _with_ends(given)
-        faults = [*faults, *more]
+    given, of_ends = _with_ends(given)
     names = names_of(asked)
-    lists = {name: value for name, value in given.items() if isinstance(value, (list, np.ndarray)) and name in names}
+    lists = {name: given[name] for name in names if isinstance(given.get(name), (list, np.ndarray))}
     if any(len(value) > max_batch for value in lists.values()):
         raise too_large(max_batch)
-    plain, more = checked(
-        {name: 1.0 if name in lists else value for name, value in given.items()}, null_is_rigid=False,
-        known=known, asked=asked,
-    )  # fmt: skip
-    faults = [*faults, *more]
-    lengths = {name: len(value) for name, value in lists.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name}: {lengths[name]}" for name in names if name in lengths)
-        first = next(lengths[name] for name in names if name in lengths)
-        faults += [
-            FieldFault.of(name, f"lists must have one length; given {told}")
-            for name in names
-            if lengths.get(name, first) != first
-        ]
-    if faults:
-        refuse(faults)
+    alone = {name: 1.0 if name in lists else value for name, value in given.items()}
+    plain, of_values = checked(alone, null_is_rigid=False, known=known, asked=asked)
+    size = len(next(iter(lists.values()), "1"))
+    told = "lists must have one length; given " + ", ".join(f"{name}: {len(value)}" for name, value in lists.items())
+    of_lengths = [FieldFault.of(name, told) for name, value in lists.items() if len(value) != size]
+    if found := [*faults, *of_ends, *of_values, *of_lengths]:
+        refuse(found)
     reasons: dict[int, Reason] = {}
     columns = {name: np.array([value]) for name, value in plain.items()}
-    for name in names:  # in their order, so that the first bad field of a case is told
-        if name in lists:
-            columns[name] = _column(name, lists[name], reasons)
+    # in the order of the names, so that the first bad field of a case is told
+    columns |= {name: _column(name, value, reasons) for name, value in lists.items()}
     if "f" in lists:
         with np.errstate(over="ignore"):  # infinite, which is refused
             columns["omega"] = columns["f"] * RAD_PER_CYCLE
-    size = next(iter(lengths.values()), 1)
     return Columns(size, [columns[name] for name in asked.fields], reasons, "f" in lists, bool(lists), asked=asked)
 
 
 def joined(name: str, parts: list[Any]) -> list[Any] | Array:
     """The parts of a column, arrays and lists, as one array, or as a list if one is a list."""
-    if any(isinstance(part, list) for part in parts):
-        lists = (part if isinstance(part, list) else _listed(name, part) for part in parts)
-        return list(chain.from_iterable(lists))
-    return parts[1] if len(parts) == 2 else np.concatenate(parts)
-
-
-def _listed(name: str, part: Array) -> list[Any]:
-    return [RIGID if name == "k" and value == math.inf else value for value in part.tolist()]
+    if not any(isinstance(part, list) for part in parts):
+        return parts[1] if len(parts) == 2 else np.concatenate(parts)
+    words = {math.inf: RIGID} if name == "k" else {}
+    lists = (part if isinstance(part, list) else [words.get(x, x) for x in part.tolist()] for part in parts)
+    return list(chain.from_iterable(lists))
 
 
 def _column(name: str, values: list[Any] | Array, reasons: dict[int, Reason]) -> Array:

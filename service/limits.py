@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from typing import TypeVar
 
 from starlette.requests import ClientDisconnect
@@ -19,10 +19,10 @@ from starlette.types import Receive, Scope
 
 from mumacro.processors import processors
 
-from .problems import CLOSE, Kind, RequestError
+from .problems import Kind, RequestError
 from .settings import Settings
 
-__all__ = ["AT_ONCE", "SMALL_BODY", "Keys", "Slots", "Work", "check_head", "drained", "media_type_of", "read_body"]
+__all__ = ["AT_ONCE", "SMALL_BODY", "Slots", "Work", "check_head", "drained", "holder_of", "media_type_of", "read_body"]
 
 T = TypeVar("T")
 SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
@@ -34,59 +34,46 @@ _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
 _ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
 
 
-class Keys:
-    """API keys and the names of their holders, by key; with none, the service is open to all."""
-
-    def __init__(self, keys: Mapping[str, str]) -> None:
-        self._keys = [(key.encode("ascii"), name) for key, name in keys.items()]
-
-    def __bool__(self) -> bool:
-        return bool(self._keys)
-
-    def holder(self, headers: Mapping[bytes, bytes]) -> str:
-        """The name of the holder of the request's key."""
-        offered = headers.get(b"x-api-key")
-        if offered is None:
-            scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
-            offered = credentials.strip() if scheme.lower() == b"bearer" else b""
-        found = None
-        for key, name in self._keys:  # compares all keys: the time does not depend on the key sent
-            if secrets.compare_digest(offered, key):
-                found = name
-        if found is None:
-            fields = {"WWW-Authenticate": "Bearer", **CLOSE}
-            told = "send the API key as X-API-Key or as Authorization: Bearer"
-            raise RequestError(Kind.UNAUTHORIZED, told, headers=fields)
-        return found
+def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
+    """The name of the holder of the request's key; ``keys`` are the names by key."""
+    offered = headers.get(b"x-api-key")
+    if offered is None:
+        scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
+        offered = credentials.strip() if scheme.lower() == b"bearer" else b""
+    # compares all keys: the time does not depend on the key sent
+    found = [name for key, name in keys.items() if secrets.compare_digest(offered, key.encode("ascii"))]
+    if not found:
+        told = "send the API key as X-API-Key or as Authorization: Bearer"
+        raise RequestError(Kind.UNAUTHORIZED, told, headers={"WWW-Authenticate": "Bearer"})
+    return found[0]
 
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
-    """Refuse a head that says two things, or asks for another protocol."""
+    """Refuse a head that says two things, or asks for another protocol, as which its body would be read."""
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
             if names.count(name) > 1:
-                told = f"the header {name.decode()} is given more than once"
-                raise RequestError(Kind.MALFORMED_BODY, told, headers=CLOSE)
+                raise RequestError(Kind.MALFORMED_HTTP, f"the header {name.decode()} is given more than once")
     if b"upgrade" in headers and scope["method"] not in ("GET", "HEAD"):
-        # the body would be read as another protocol
-        told = "this service does not upgrade connections: send no Upgrade"
-        raise RequestError(Kind.MALFORMED_BODY, told, headers=CLOSE)
+        raise RequestError(Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade")
 
 
 def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
     """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first."""
-    given = headers.get(b"content-type", b"").decode("latin-1")
-    media, _, parameters = given.lower().partition(";")
-    found = known.get(media.strip()) if given else next(iter(known.values()))
-    charset = parameters.partition("charset=")[2].partition(";")[0].strip('" ')
-    if found is None or charset not in ("", "utf-8", "utf8", "us-ascii"):
+    given = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(known))
+    found = known.get(given)
+    if found is None:
+        media, _, parameters = given.partition(";")
+        charset = parameters.partition("charset=")[2].partition(";")[0].strip('" ')
+        found = known.get(media.strip()) if charset in ("", "utf-8", "utf8", "us-ascii") else None
+    if found is None:
         offer = ", ".join(dict.fromkeys(known.values()))
-        fields = {"Accept-Post": offer, **CLOSE}
-        raise RequestError(Kind.UNSUPPORTED_BODY, f"send {offer}, not {given[:80]}", headers=fields)
+        told = f"send {offer}, not {given[:80]}"
+        raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Post": offer})
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":
-        fields = {"Accept-Encoding": "identity", **CLOSE}
-        raise RequestError(Kind.UNSUPPORTED_BODY, "send the body without Content-Encoding", headers=fields)
+        told = "send the body without Content-Encoding"
+        raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Encoding": "identity"})
     return found
 
 
@@ -94,11 +81,19 @@ async def read_body(
     headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
 ) -> bytearray:
     """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
+
+    def check(size: int) -> None:
+        if size > limit:
+            told = (
+                f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
+                "Content-Length if they are more, and read the answer while you send"
+            )
+            raise RequestError(Kind.BODY_TOO_LARGE, told, max_bytes=limit)
+        if size > SMALL_BODY:
+            large()
+
     length = headers.get(b"content-length", b"0")
-    if not length.isdigit() or len(length) > 18 or int(length) > limit:
-        raise _too_large(limit)
-    if int(length) > SMALL_BODY:
-        large()
+    check(int(length) if length.isdigit() and len(length) < 19 else limit + 1)
     body, more = bytearray(), True
     while more:
         message = await receive()
@@ -106,31 +101,19 @@ async def read_body(
             raise ClientDisconnect
         body += message.get("body", b"")
         more = message.get("more_body", False)
-        if len(body) > limit:
-            raise _too_large(limit)
-        if len(body) > SMALL_BODY:
-            large()
+        check(len(body))
     return body
-
-
-def _too_large(limit: int) -> RequestError:
-    told = (
-        f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
-        "Content-Length if they are more, and read the answer while you send"
-    )
-    # The rest of the body is not used: without "close" the server would read all of it.
-    return RequestError(Kind.BODY_TOO_LARGE, told, headers=CLOSE, max_bytes=limit)
 
 
 async def drained(receive: Receive) -> None:
     """Read and drop the rest of a body that is refused, for a while: else many clients see a reset and no reason."""
-    until, count, more = asyncio.get_running_loop().time() + _LINGER_S, 0, True
+    count, more = 0, True
     with suppress(TimeoutError):
-        while more and count < _LINGER:
-            async with asyncio.timeout(min(_PAUSE_S, until - asyncio.get_running_loop().time())):
-                message = await receive()
-            count += len(message.get("body", b""))
-            more = message.get("more_body", False)
+        async with asyncio.timeout(_LINGER_S):
+            while more and count < _LINGER:
+                message = await asyncio.wait_for(receive(), _PAUSE_S)
+                count += len(message.get("body", b""))
+                more = message.get("more_body", False)
 
 
 def _stand_back() -> None:
@@ -145,27 +128,23 @@ def _stand_back() -> None:
 class Slots:
     """The right to run a large request: so many at the same time, and the threads that run them."""
 
-    def __init__(self, number: int, threads: int, name: str, behind: bool) -> None:
-        self.number = number
-        self.used = 0
-        self.threads = ThreadPoolExecutor(threads, name, initializer=_stand_back if behind else None)
-        self._name = name
+    def __init__(self, number: int, name: str, initializer: Callable[[], None] | None = None) -> None:
+        self.number, self.used, self._name = number, 0, name
+        self.threads = ThreadPoolExecutor(processors(), name, initializer=initializer)
 
     def take(self) -> None:
         """Take a slot; the code that called this gives it back."""
         if self.used >= self.number:
-            raise RequestError(Kind.OVERLOADED, f"{self.used} {self._name} are being answered already", headers=CLOSE)
+            raise RequestError(Kind.OVERLOADED, f"{self.used} {self._name} are being answered already")
         self.used += 1
 
     def give_back(self) -> None:
         """Give a slot back."""
         self.used -= 1
 
-    async def run(self, work: Callable[[], T], cost: float = float("inf")) -> T:
+    async def run(self, work: Callable[[], T], cost: float) -> T:
         """Do the work at once if it is small, else in a thread, so that it delays no other request."""
-        if cost <= AT_ONCE:
-            return work()
-        return await asyncio.get_running_loop().run_in_executor(self.threads, work)
+        return work() if cost <= AT_ONCE else await asyncio.wrap_future(self.threads.submit(work))
 
 
 class Work:
@@ -173,44 +152,37 @@ class Work:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        count = processors()
-        self.batches = Slots(settings.max_batches, count, "batches", behind=True)
-        self.questions = Slots(QUESTIONS, count, "questions", behind=False)
+        self.batches = Slots(settings.max_batches, "batches", _stand_back)
+        self.questions = Slots(QUESTIONS, "questions")
 
     def close(self) -> None:
         """Let no thread keep the process alive."""
         for slots in (self.batches, self.questions):
             slots.threads.shutdown(wait=False, cancel_futures=True)
 
-    @asynccontextmanager
-    async def deadline(self) -> AsyncIterator[None]:
+    def deadline(self) -> AbstractAsyncContextManager[None]:
         """One time limit for a whole answer: reading, computing and sending."""
-        limit = self.settings.time_limit_s
-        try:
-            async with asyncio.timeout(limit):
-                yield
-        except TimeoutError:
-            raise RequestError(Kind.TOOK_TOO_LONG, f"a request may take up to {limit} s", headers=CLOSE) from None
+        return _within(self.settings.time_limit_s, Kind.TOOK_TOO_LONG, "a request")
 
     async def question(self, work: Callable[[], T]) -> T:
         """Do the work of a question in a thread; its slot is held until it is done, even without a client."""
         self.questions.take()
-        task = asyncio.ensure_future(self.questions.run(work))
-
-        def done(task: "asyncio.Future[T]") -> None:
-            self.questions.give_back()
-            if not task.cancelled():
-                task.exception()
-
-        task.add_done_callback(done)
+        loop = asyncio.get_running_loop()
+        task = self.questions.threads.submit(work)
+        task.add_done_callback(lambda _: loop.call_soon_threadsafe(self.questions.give_back))
         async with self.deadline():
-            return await asyncio.shield(task)
+            return await asyncio.wrap_future(task)
 
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
-        limit = self.settings.client_timeout_s
-        try:
-            async with asyncio.timeout(limit):
-                return await move
-        except TimeoutError:
-            raise RequestError(Kind.SLOW_CLIENT, f"a client may take up to {limit} s", headers=CLOSE) from None
+        async with _within(self.settings.client_timeout_s, Kind.SLOW_CLIENT, "a client"):
+            return await move
+
+
+@asynccontextmanager
+async def _within(limit: int, late: Kind, who: str) -> AsyncIterator[None]:
+    try:
+        async with asyncio.timeout(limit):
+            yield
+    except TimeoutError:
+        raise RequestError(late, f"{who} may take up to {limit} s") from None

@@ -1,157 +1,149 @@
-"""Models of answers, for OpenAPI: the columns come from the registry of :mod:`service.answers`."""
+"""Models for OpenAPI, and those of answers: the columns come from the registry of :mod:`service.answers`."""
 
+from collections.abc import Iterable
+from functools import cache
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from .answers import DEFAULT, INTERVAL, QUANTITIES, Part, nested, of_amplitude
+from .quantities import INCLUDES
 
 __all__ = [
-    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "TableAnswer",
-    "TableLabel", "included",
+    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "Strict",
+    "TableAnswer", "TableLabel", "default", "grouped", "included", "many", "model", "optional", "told",
 ]  # fmt: skip
 
-
-class TableLabel(BaseModel):
-    """The table that an answer came from."""
-
-    id: str = Field(description="Name of the table")
-    tolerance: float = Field(description="The error of mu_macro/mu0 [-] that it was built to")
+_create: Any = create_model
 
 
-class Answered(BaseModel):
-    """The fields of every answer."""
+class Strict(BaseModel):
+    """What has its own members only, of their own types."""
 
-    table: TableLabel
-    api_version: str
-
-
-class BatchFault(BaseModel):
-    """Why one case of a batch has no result."""
-
-    index: int = Field(description="Position in the batch, from 0")
-    field: str | None = Field(description="The bad field; null when the case as a whole is bad")
-    reason: str
+    model_config = ConfigDict(strict=True, extra="forbid")
 
 
-class _BatchEnd(Answered):
-    errors: list[BatchFault] = Field(description="One entry per bad case, in order; the first 1000 of them")
-    n_errors: int = Field(description="Number of bad cases, listed or not")
+def model(name: str, text: str, /, *bases: type[BaseModel], example: Any = None, **members: Any) -> Any:
+    """A model; a member is a type, or what :func:`told` or :func:`optional` gives."""
+    given = {key: member if isinstance(member, tuple) else (member, ...) for key, member in members.items()}
+    found = _create(name, __base__=bases or None, __doc__=text, **given)
+    if example is not None:
+        found.model_config["json_schema_extra"] = {"examples": [example]}
+    return found
 
 
-def _kind(part: Part, listed: bool, null: bool) -> Any:
-    kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else part.kind
+def told(kind: Any, text: str) -> tuple[Any, Any]:
+    """A member with its meaning."""
+    return kind, Field(description=text)
+
+
+def optional(kind: Any, text: str = "") -> tuple[Any, Any]:
+    """A member that may be left out."""
+    return kind | None, Field(None, description=text or None)
+
+
+def many(kind: Any) -> Any:
+    """A list of a kind, or of a model."""
+    return list[kind]
+
+
+TableLabel = model(
+    "TableLabel", "The table that an answer came from.", id=told(str, "Name of the table"),
+    tolerance=told(float, "The error of mu_macro/mu0 [-] that it was built to"),
+)  # fmt: skip
+Answered = model("Answered", "The fields of every answer.", table=TableLabel, api_version=str)
+BatchFault = model(
+    "BatchFault", "Why one case of a batch has no result.", index=told(int, "Position in the batch, from 0"),
+    field=told(str | None, "The bad field; null when the case as a whole is bad"), reason=str,
+)  # fmt: skip
+_BatchEnd = model(
+    "_BatchEnd", "", Answered,
+    errors=told(many(BatchFault), "One entry per bad case, in order; the first 1000 of them"),
+    n_errors=told(int, "Number of bad cases, listed or not"),
+)  # fmt: skip
+
+
+# --- columns ------------------------------------------------------------------------------------------
+
+
+def _kind(part: Part, listed: bool, null: bool = True) -> Any:
+    kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else str if part.names else float
     kind = kind | None if null else kind
-    return list[kind] if listed else kind
+    return many(kind) if listed else kind
 
 
 def default(listed: bool) -> dict[str, Any]:
     """The default outputs as members of a model."""
-    return {
-        part.path: (_kind(part, listed, listed or part.path == "error_bound"), Field(description=part.described))
-        for part in DEFAULT
-    } | {
-        part.path: (
-            _kind(part, listed, True) | None,
-            Field(None, description=f"Only for an interval. {part.described}"),
-        )
-        for part in INTERVAL
+    members = {
+        part.path: told(_kind(part, listed, listed or part.path == "error_bound"), part.described) for part in DEFAULT
     }
+    ends = {part.path: optional(_kind(part, listed), f"Only for an interval. {part.described}") for part in INTERVAL}
+    return members | ends
 
 
-def included(listed: bool) -> dict[str, Any]:
-    """Members that ``include`` adds to a model of an answer."""
+def grouped(parts: Iterable[Part], listed: bool, text: str) -> dict[str, Any]:
+    """Columns that are there if requested as members of a model, those with a dot in their path in models of theirs."""
+    members: dict[str, Any] = {}
+    for part in parts:
+        either = {one.path: one for one in (part, of_amplitude(part))}
+        make = told if len(either) == 1 else optional  # else there is one of the two
+        members |= {path: make(_kind(one, listed), one.described) for path, one in either.items()}
     fields: dict[str, Any] = {}
-    for quantity in QUANTITIES.values():
-        kinds: dict[str, Any] = {}
-        for part in quantity.parts:
-            kinds[part.path] = (_kind(part, listed, True), Field(description=part.described))
-            other = of_amplitude(part)
-            if other != part:  # there is one of them
-                for one in (part, other):
-                    kinds[one.path] = (_kind(one, listed, True) | None, Field(None, description=one.described))
-        for name, found in nested(kinds).items():
-            if isinstance(found, dict):
-                title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
-                model: Any = create_model(title, __doc__=f"{quantity.text}.", **found)
-                fields[name] = (model | None, Field(None, description="Only if requested"))
-            else:
-                kind, told = found
-                fields[name] = (kind | None, Field(None, description=f"Only if requested. {told.description}"))
+    for name, found in nested(members).items():
+        if isinstance(found, dict):
+            title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
+            fields[name] = optional(model(title, f"{text}.", **found), "Only if requested")
+        else:
+            fields[name] = optional(found[0], f"Only if requested. {found[1].description}")
     return fields
 
 
-_made: Any = create_model
-Result: type[BaseModel] = _made("Result", __doc__="Answer to one case.", **default(False), **included(False))
+@cache
+def included(listed: bool) -> dict[str, Any]:
+    """Members that ``include`` adds to a model of an answer."""
+    found = (grouped(QUANTITIES[name].parts, listed, QUANTITIES[name].text) for name in INCLUDES)
+    return {name: member for members in found for name, member in members.items()}
 
 
-class ModelRow(BaseModel):
-    """One thing that the model leaves out, see docs/validity.md."""
-
-    row: str = Field(description="Its name")
-    text: str = Field(description="What it does here")
-    effect: float | None = Field(description="Relative change of mu_macro; null: not known")
+Result = model("Result", "Answer to one case.", **default(False), **included(False))
 
 
-_about: Any = (list[ModelRow] | None, Field(None, description="Only if requested. What the model leaves out here"))
-_digits: Any = (int | None, Field(None, description="Only with model. Digits of mu_macro that k supports"))
-CaseAnswer: type[BaseModel] = _made(
-    "CaseAnswer", __base__=(Result, Answered), __doc__="Answer to one case.", model=_about, digits=_digits
-)
-ColumnsAnswer: type[BaseModel] = _made(
-    "ColumnsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in columns, order kept; null: a bad case.",
+ModelRow = model(
+    "ModelRow", "One thing that the model leaves out, see docs/validity.md.", row=told(str, "Its name"),
+    text=told(str, "What it does here"), effect=told(float | None, "Relative change of mu_macro; null: not known"),
+)  # fmt: skip
+CaseAnswer = model(
+    "CaseAnswer", "Answer to one case.", Result, Answered,
+    model=optional(many(ModelRow), "Only if requested. What the model leaves out here"),
+    digits=optional(int, "Only with model. Digits of mu_macro that k supports"),
+)  # fmt: skip
+ColumnsAnswer = model(
+    "ColumnsAnswer", "Answer to a batch in columns, order kept; null: a bad case.", _BatchEnd,
     **default(True), **included(True),
 )  # fmt: skip
-RowsAnswer: type[BaseModel] = _made(
-    "RowsAnswer", __base__=_BatchEnd, __doc__="Answer to a batch in rows, order kept; null where a case is bad.",
-    results=(list[Result | None], ...),  # type: ignore[valid-type]
+RowsAnswer = model(
+    "RowsAnswer", "Answer to a batch in rows, order kept; null where a case is bad.", _BatchEnd,
+    results=many(Result | None),
 )  # fmt: skip
-
-
-class TableAnswer(Answered):
-    """Properties of a table."""
-
-    id: str
-    tolerance: float
-    checksum: str = Field(description="SHA-256 of the table's content")
-    file: str
-    size_bytes: int
-    max_abs_error: float | None = Field(description="Largest verified absolute error of mu_macro/mu0 [-]")
-    max_rel_error: float | None = Field(description="Largest verified relative error of mu_macro [-]")
-    attributes: dict[str, Any] = Field(description="Root attributes of the file")
-    blocks: list[dict[str, Any]]
-    loaded: list[TableLabel] = Field(description="All loaded tables, tightest first")
-    service_version: str
-
-
-class Health(BaseModel):
-    """Answer of a health endpoint."""
-
-    status: Literal["alive", "ready"]
-    tables: list[TableLabel] | None = None
-    api_version: str
-    service_version: str
-
-
-class FieldProblem(BaseModel):
-    """One bad field."""
-
-    pointer: str | None = Field(None, description="JSON pointer into the body")
-    parameter: str | None = Field(None, description="Query parameter")
-    field: str
-    value: Any = Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")
-    reason: str
-    bound: str | None = None
-
-
-class Problem(BaseModel):
-    """Problem details, RFC 9457."""
-
-    type: str
-    title: str
-    status: int
-    detail: str
-    instance: str
-    request_id: str | None = None
-    errors: list[FieldProblem] | None = None
-    n_errors: int | None = None
+TableAnswer = model(
+    "TableAnswer", "Properties of a table.", Answered, id=str, tolerance=float,
+    checksum=told(str, "SHA-256 of the table's content"), file=str, size_bytes=int,
+    max_abs_error=told(float | None, "Largest verified absolute error of mu_macro/mu0 [-]"),
+    max_rel_error=told(float | None, "Largest verified relative error of mu_macro [-]"),
+    attributes=told(dict[str, Any], "Root attributes of the file"), blocks=list[dict[str, Any]],
+    loaded=told(many(TableLabel), "All loaded tables, tightest first"), service_version=str,
+)  # fmt: skip
+Health = model(
+    "Health", "Answer of a health endpoint.", status=Literal["alive", "ready"], tables=optional(many(TableLabel)),
+    api_version=str, service_version=str,
+)  # fmt: skip
+FieldProblem = model(
+    "FieldProblem", "One bad field.", pointer=optional(str, "JSON pointer into the body"),
+    parameter=optional(str, "Query parameter"), field=str,
+    value=(Any, Field(None, description="As given; a number that JSON cannot hold is a text, such as NaN")),
+    reason=str, bound=optional(str),
+)  # fmt: skip
+Problem = model(
+    "Problem", "Problem details, RFC 9457.", type=str, title=str, status=int, detail=str, instance=str,
+    request_id=optional(str), errors=optional(many(FieldProblem)), n_errors=optional(int),
+)  # fmt: skip

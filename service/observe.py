@@ -1,27 +1,28 @@
 """What is seen of a request from outside: its id, its log line, its counters, and the answer to an exception.
 
-Logs are JSON lines on standard output, kept by ``logging.handlers.BufferingHandler`` for a thread.  Counters are those
-of prometheus_client; several workers share them through its multiprocess mode, in a private folder that is made at
-the start.
+Logs are JSON lines on standard output, written by a thread.  Counters are those of prometheus_client; several workers
+share them through its multiprocess mode, in a private folder that is made at the start.
 """
 
 import itertools
 import logging
-import logging.handlers
 import os
 import re
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
 import orjson
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics, generate_latest
+from prometheus_client.multiprocess import MultiProcessCollector
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -29,8 +30,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from mumacro.errors import MumacroError
 
 from .answers import REGIME_NAMES, SOURCES
-from .limits import Keys, check_head, drained
-from .problems import CLOSE, Kind, RequestError, problem_of
+from .limits import check_head, drained, holder_of
+from .problems import Kind, RequestError, problem_of
 from .routes import path_of
 from .tables import LoadedTable, Tables
 
@@ -46,17 +47,9 @@ _MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropp
 _WRITE_EVERY_S = 0.05
 _NO_SNIFF = (b"x-content-type-options", b"nosniff")
 
+_log = logging.getLogger(__name__)
 _access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
-
-
-# --- logs ---------------------------------------------------------------------------------------------
-
-
-@lru_cache(1)
-def _second(seconds: int) -> str:
-    """A time in words; to make it takes longer than the rest of a line."""
-    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
 
 
 class JsonFormatter(logging.Formatter):
@@ -65,7 +58,7 @@ class JsonFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
         line: dict[str, Any] = {
-            "time": f"{_second(int(record.created))}.{int(record.created % 1.0 * 1e3):03d}+00:00",
+            "time": datetime.fromtimestamp(record.created, UTC),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),
@@ -76,36 +69,35 @@ class JsonFormatter(logging.Formatter):
         return orjson.dumps(line, default=str).decode()
 
 
-class LogLines(logging.handlers.BufferingHandler):
+class LogLines(logging.Handler):
     """Keeps records for a thread that writes them twenty times a second: a stalled reader delays no request.
 
-    Records that find the buffer full are dropped, and counted in a line that follows.
+    ``logging.handlers.QueueListener`` would wake its thread for every record.
     """
 
     def __init__(self) -> None:
-        super().__init__(_MOST_WAITING)
+        super().__init__()
         self.setFormatter(JsonFormatter())
-        self._dropped, self._writes = 0, False
+        self._waiting, self._dropped, self._writes = deque[logging.LogRecord](), 0, False
         threading.Thread(target=self._write, name="log", daemon=True).start()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a record if there is room."""
-        if len(self.buffer) < self.capacity:
-            self.buffer.append(record)
+        if len(self._waiting) < _MOST_WAITING:
+            self._waiting.append(record)
         else:
             self._dropped += 1
 
     def _write(self) -> None:
         """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
+        told = 0
         while True:
             time.sleep(_WRITE_EVERY_S)
-            with self.lock or nullcontext():
-                records, self.buffer, dropped, self._dropped = self.buffer, [], self._dropped, 0
-                self._writes = bool(records)
-            if dropped:
-                told = f"{dropped} lines of the log were dropped: standard output was not read in time"
-                fields = {"name": __name__, "levelno": logging.WARNING, "levelname": "WARNING", "msg": told}
-                records.append(logging.makeLogRecord(fields))
+            self._writes = True
+            records = [self._waiting.popleft() for _ in range(len(self._waiting))]
+            if more := self._dropped - told:
+                told += more
+                _log.warning("%d lines of the log were dropped: standard output was not read in time", more)
             rest = memoryview("".join(f"{self.format(record)}\n" for record in records).encode())
             with suppress(OSError):  # the reader is gone
                 while rest:
@@ -115,7 +107,7 @@ class LogLines(logging.handlers.BufferingHandler):
     def flush(self) -> None:
         """At the end, wait a second at most for the last lines."""
         until = time.monotonic() + 1.0
-        while (self.buffer or self._writes) and time.monotonic() < until:
+        while (self._waiting or self._writes) and time.monotonic() < until:
             time.sleep(0.01)
 
 
@@ -123,12 +115,13 @@ class AccessRecord(logging.LogRecord):
     """The record of a request.  It has no place in a source file: finding that takes longer than all the rest."""
 
     def __init__(self, level: int, fields: dict[str, Any]) -> None:
-        own = {"levelno": level, "levelname": _LEVELS[level], "created": time.time(), "fields": fields}
-        self.__dict__ = {**_SAME, **own}
+        self.__dict__ = {**_SAME[level], "created": time.time(), "fields": fields}
 
 
-_LEVELS = {logging.DEBUG: "DEBUG", logging.INFO: "INFO"}
-_SAME = vars(logging.LogRecord("mumacro.access", logging.INFO, "", 0, "request", None, None))
+_SAME = {
+    level: vars(logging.LogRecord("mumacro.access", level, "", 0, "request", None, None))
+    for level in (logging.DEBUG, logging.INFO)
+}
 
 
 def log_config(level: str) -> dict[str, Any]:
@@ -142,68 +135,58 @@ def log_config(level: str) -> dict[str, Any]:
     }
 
 
-# --- counters -----------------------------------------------------------------------------------------
-
-
 @contextmanager
 def shared_counters() -> Iterator[None]:
     """A private folder for the counters of all workers, in memory if possible; it is empty, and removed at the end.
 
     Without a writable folder every worker reports its own counters.
     """
+    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108  (a folder of its own is made there)
     with ExitStack() as stack:
-        for place in ("/dev/shm", None):  # noqa: S108  (a folder of its own is made there)
-            with suppress(OSError):
-                made = tempfile.TemporaryDirectory(prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True)
-                os.environ[_SHARED] = stack.enter_context(made)
-                break
+        with suppress(OSError):
+            made = tempfile.TemporaryDirectory(prefix="mumacro-metrics-", dir=place, ignore_cleanup_errors=True)
+            os.environ[_SHARED] = stack.enter_context(made)
         yield
-        os.environ.pop(_SHARED, None)
 
 
 class Metrics:
     """Counters of requests and cases."""
 
     def __init__(self, paths: frozenset[str]) -> None:
-        from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics
-
         disable_created_metrics()  # type: ignore[no-untyped-call]
         self._paths = paths
         self.registry = own = CollectorRegistry()
-        self._requests = Counter("mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own)
+        requests = Counter("mumacro_requests", "Finished requests", ["route", "method", "status"], registry=own)
         told = "From the head of a request to the end of its answer"
-        self._durations = Histogram(
-            "mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own
-        )
-        self._cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own)
-        self._bad = Counter("mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own)
+        seconds = Histogram("mumacro_request_duration_seconds", told, ["route"], buckets=_BUCKETS_S, registry=own)
+        cases = Counter("mumacro_cases", "Answered cases", ["table", "source", "regime"], registry=own)
+        bad = Counter("mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=own)
         labels = ["id", "tolerance"]
         self._info = Gauge("mumacro_table_info", "Loaded tables", labels, registry=own, multiprocess_mode="mostrecent")
-        self._known: dict[tuple[str, str, int], tuple[Any, Any]] = {}
-        self._sources: dict[tuple[str, int], Any] = {}
+        # a look-up of labels takes longer than counting
+        self._of_request = cache(lambda *labels: (requests.labels(*labels), seconds.labels(labels[0])))
+        self._of_source = cache(
+            lambda table, code: (
+                bad.labels(table) if code < 0 else cases.labels(table, SOURCES[code], REGIME_NAMES[code])
+            )
+        )
 
     def start(self, tables: Tables) -> None:
         """Name the loaded tables."""
         for table in tables.loaded:
             self._info.labels(table.id, format(table.surrogate.tolerance, "g")).set(1)
-            self._bad.labels(table.id)
+            self._of_source(table.id, -1)
 
     def request(self, path: str, method: str, status: int, seconds: float) -> None:
         """Count one request."""
-        key = path if path in self._paths else "other", method if method in _METHODS else "other", status
-        if key not in self._known:
-            self._known[key] = self._requests.labels(*key), self._durations.labels(key[0])
-        count, durations = self._known[key]
+        path, method = path if path in self._paths else "other", method if method in _METHODS else "other"
+        count, durations = self._of_request(path, method, status)
         count.inc()
         durations.observe(seconds)
 
     def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
         """Count answered cases of one source code; -1 are bad ones."""
-        key = table.id, source
-        if key not in self._sources:
-            names = table.id, SOURCES[source], REGIME_NAMES[source]
-            self._sources[key] = self._bad.labels(table.id) if source < 0 else self._cases.labels(*names)
-        self._sources[key].inc(number)
+        self._of_source(table.id, source).inc(number)
 
     def cases(self, table: LoadedTable, source: Any) -> None:
         """Count the cases of a batch by their source codes, bad ones among them."""
@@ -213,9 +196,6 @@ class Metrics:
 
     def text(self) -> bytes:
         """The exposition format of Prometheus; with several workers, the sum over all."""
-        from prometheus_client import CollectorRegistry, generate_latest
-        from prometheus_client.multiprocess import MultiProcessCollector
-
         registry = self.registry
         if _SHARED in os.environ:
             registry = CollectorRegistry()
@@ -223,16 +203,13 @@ class Metrics:
         return generate_latest(registry)
 
 
-# --- one request --------------------------------------------------------------------------------------
-
-
 class Observe:
     """Middleware: id, key, log line, counters, and problem details for every exception.
 
-    ``open_paths`` need no key; ``/guide`` among them opens all that is below it.
+    ``open_paths``, and what is below ``/guide/``, need no key.
     """
 
-    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Keys, open_paths: AbstractSet[str]) -> None:
+    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Mapping[str, str], open_paths: AbstractSet[str]) -> None:
         self.app = app
         self._metrics, self._keys, self._open_paths = metrics, keys, open_paths
         self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
@@ -255,10 +232,10 @@ class Observe:
 
         try:
             if "full" in scope.get("state", ()) and path not in HEALTH_PATHS:
-                raise RequestError(Kind.OVERLOADED, "too many connections are open", headers=CLOSE)
+                raise RequestError(Kind.OVERLOADED, "too many connections are open")
             check_head(scope, headers)
-            if self._keys and not self._is_open(path):
-                holder = self._keys.holder(headers)
+            if self._keys and path not in self._open_paths and not path.startswith("/guide/"):
+                holder = holder_of(headers, self._keys)
             await self.app(scope, receive, send_marked)
         except ClientDisconnect:
             status = 499  # the usual status for a client that disconnected before the answer
@@ -271,7 +248,7 @@ class Observe:
                 raise ClientDisconnect from error
             answer = problem_of(error, scope)
             late = getattr(error, "kind", None) in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
-            if answer.headers.get("connection") == "close" and not late and b"expect" not in headers:
+            if "connection" in answer.headers and not late and b"expect" not in headers:
                 await drained(receive)
             await answer(scope, receive, send_marked)
         finally:
@@ -283,10 +260,6 @@ class Observe:
                 fields = {
                     "request_id": identity, "method": scope["method"], "path": path, "status": status,
                     "duration_ms": round(1e3 * seconds, 3), "client": client[0][:_MOST_SHOWN] if client else None,
+                    **({} if holder is None else {"key": holder}),
                 }  # fmt: skip
-                if holder is not None:
-                    fields["key"] = holder
                 _access.handle(AccessRecord(level, fields))
-
-    def _is_open(self, path: str) -> bool:
-        return path in self._open_paths or (path.startswith("/guide/") and "/guide" in self._open_paths)

@@ -5,15 +5,16 @@ request id, and for bad fields ``errors`` with a JSON pointer (bodies) or a para
 must be.  All faults of a request are reported at once.  No traceback reaches a user.
 """
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
-from http import HTTPStatus
-from typing import Any, NoReturn
+from typing import Any, NoReturn, get_args
 
 import orjson
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import Scope
@@ -22,16 +23,11 @@ from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs import BOUNDS, number_hint, unknown_name
 from mumacro.inputs import NAMES as INPUTS
 
-__all__ = ["CLOSE", "FieldFault", "Kind", "RequestError", "document_of", "faults_of", "problem_of", "refuse"]
+__all__ = ["FieldFault", "Kind", "RequestError", "document_of", "faults_of", "problem_of", "refuse"]
 
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
-#: header of a response that is sent before the whole request was read
-CLOSE = {"Connection": "close"}
-
-
-# --- bad fields -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -72,17 +68,13 @@ class FieldFault:
 
 def _shown(value: object) -> object:
     """The value as JSON can hold it, and short enough to be shown: NaN becomes the text "NaN"."""
-    if value is None or isinstance(value, bool):
-        return value
-    if isinstance(value, float):
-        if math.isfinite(value):
-            return value
-        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
-    if isinstance(value, int):
-        return value if -(2**63) <= value < 2**64 else "an integer beyond double range"
     if isinstance(value, str):
         short = value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
         return short.encode("utf-8", "replace").decode()  # half of a surrogate pair is no text
+    if isinstance(value, float):
+        return value if math.isfinite(value) else json.dumps(value)
+    if value is None or isinstance(value, int):
+        return value if value is None or -(2**63) <= value < 2**64 else "an integer beyond double range"
     return "an object" if isinstance(value, Mapping) else "a list" if isinstance(value, Sequence) else "a value"
 
 
@@ -105,39 +97,56 @@ def faults_of(
     for entry in error.errors(include_url=False):
         path, kind, value = entry["loc"], entry["type"], entry["input"]
         if kind == "missing":
-            fault = FieldFault(path, "is required")
+            value, reason = _NO_VALUE, "is required"
         elif kind == "extra_forbidden":
-            fault = FieldFault(path, unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS), value)
+            reason = unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS)
         elif kind == "relation":  # between fields: the model names the one to change
-            fault = FieldFault((*path, entry["ctx"]["field"]), entry["ctx"]["reason"])
+            path, value, reason = (*path, entry["ctx"]["field"]), _NO_VALUE, entry["ctx"]["reason"]
+        elif kind == "float_type":
+            reason = number_hint(str(path[0]), value)
         else:
-            extra: Any = model.model_fields[str(path[0])].json_schema_extra
-            hint = number_hint(str(path[0]), value) if kind == "float_type" else f"must be {extra['bound']}"
-            fault = FieldFault(path, hint, value)
-        found.setdefault(fault.path, replace(fault, parameter=parameter))
+            extra: Any = _field(model, path).json_schema_extra
+            reason = f"must be {extra['bound']}"
+        found.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(found.values())
 
 
-# --- errors ---------------------------------------------------------------------------------------------
+def _field(model: type[BaseModel], path: tuple[str | int, ...]) -> FieldInfo:
+    """The field at ``path``, or the last one on the way that is a field."""
+    field = model.model_fields[str(path[0])]
+    for inner in get_args(field.annotation):
+        if len(path) > 1 and isinstance(inner, type) and issubclass(inner, BaseModel) and path[1] in inner.model_fields:
+            return inner.model_fields[str(path[1])]
+    return field
 
 
 class Kind(Enum):
-    """A type of problem: its status, its title, and where it passes the seconds after which to ask again."""
+    """A type of problem: status, title, whether the connection closes, and seconds after which to ask again.
 
+    It closes where the rest of the request is not read.
+    """
+
+    MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", True
     MALFORMED_BODY = 400, "The request cannot be read"
-    UNAUTHORIZED = 401, "An API key is needed"
-    SLOW_CLIENT = 408, "The request did not come in time"
-    BODY_TOO_LARGE = 413, "The body is too large"
+    UNAUTHORIZED = 401, "An API key is needed", True
+    NOT_FOUND = 404, "Not Found"
+    METHOD_NOT_ALLOWED = 405, "Method Not Allowed"
+    SLOW_CLIENT = 408, "The request did not come in time", True
+    BODY_TOO_LARGE = 413, "The body is too large", True
     BATCH_TOO_LARGE = 413, "The batch is too large"
-    UNSUPPORTED_BODY = 415, "The body's media type is not supported"
+    UNSUPPORTED_BODY = 415, "The body's media type is not supported", True
+    RANGE_NOT_SATISFIABLE = 416, "The file has no such part"
     INVALID_VALUE = 422, "The request holds invalid values"
-    HEAD_TOO_LARGE = 431, "The head is too large"
+    HEAD_TOO_LARGE = 431, "The head is too large", True
     UNEXPECTED = 500, "An unexpected error"
     NOT_INSTALLED = 501, "This service lacks a package"
-    NOT_READY = 503, "The service is not ready", 5
-    OVERLOADED = 503, "The service is overloaded", 1
-    OUT_OF_MEMORY = 503, "The service has too little memory", 1
-    TOOK_TOO_LONG = 503, "The request took too long", 1
+    NOT_READY = 503, "The service is not ready", False, 5
+    OVERLOADED = 503, "The service is overloaded", True, 1
+    OUT_OF_MEMORY = 503, "The service has too little memory", False, 1
+    TOOK_TOO_LONG = 503, "The request took too long", True, 1
+
+    def __init__(self, status: int, title: str, closes: bool = False, retry_after_s: int | None = None) -> None:
+        self.status, self.title, self.closes, self.retry_after_s = status, title, closes, retry_after_s
 
 
 class RequestError(MumacroError):
@@ -156,6 +165,10 @@ def request_error(error: Exception) -> RequestError:
     """What an exception means for its request; nothing of an unknown one is told."""
     if isinstance(error, RequestError):
         return error
+    if isinstance(error, HTTPException):  # of Starlette: no such path, method or part of a file
+        named = {Kind.MALFORMED_BODY, Kind.NOT_FOUND, Kind.METHOD_NOT_ALLOWED, Kind.RANGE_NOT_SATISFIABLE}
+        kind = next((kind for kind in named if kind.status == error.status_code), Kind.UNEXPECTED)
+        return RequestError(kind, error.detail, headers=error.headers)
     if isinstance(error, InputError):
         fault = FieldFault.of(error.field, f"must be {error.bound}", error.value)
         return RequestError(Kind.INVALID_VALUE, f"{error.field} must be {error.bound}", [fault])
@@ -169,35 +182,26 @@ def request_error(error: Exception) -> RequestError:
 
 def document_of(error: Exception, scope: Scope) -> dict[str, Any]:
     """The problem document of an exception."""
-    body: dict[str, Any] = {"type": "", "title": "", "status": 0, "detail": "", "instance": scope["path"]}
+    found = request_error(error)
+    slug = found.kind.name.lower().replace("_", "-")
+    body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": found.kind.title}
+    body |= {"status": found.kind.status, "detail": found.detail, "instance": scope["path"]}
     if "request_id" in scope:
         body["request_id"] = scope["request_id"]
-    if isinstance(error, HTTPException):
-        slug = title = HTTPStatus(error.status_code).phrase
-        body |= {"status": error.status_code, "detail": error.detail}
-    else:
-        found = request_error(error)
-        slug, (status, title) = found.kind.name, found.kind.value[:2]
-        body |= {"status": status, "detail": found.detail}
-        if found.faults:
-            query = scope["method"] in ("GET", "HEAD")
-            body["errors"] = [fault.as_json(query) for fault in found.faults[:MAX_FIELD_FAULTS]]
-            body["n_errors"] = len(found.faults)
-        body |= found.members
-    slug = slug.lower().replace("_", "-").replace(" ", "-")
-    return {**body, "type": f"urn:problem-type:mumacro:{slug}", "title": title}
+    if found.faults:
+        query = scope["method"] in ("GET", "HEAD")
+        body["errors"] = [fault.as_json(query) for fault in found.faults[:MAX_FIELD_FAULTS]]
+        body["n_errors"] = len(found.faults)
+    return body | found.members
 
 
 def problem_of(error: Exception, scope: Scope) -> Response:
     """The response to an exception."""
-    document = document_of(error, scope)
-    headers = {"Cache-Control": "no-store"}
-    if isinstance(error, HTTPException):
-        headers |= error.headers or {}
-    else:
-        found = request_error(error)
-        headers |= found.headers
-        for seconds in found.kind.value[2:]:
-            headers["Retry-After"] = str(seconds)
-    content = orjson.dumps(document)
-    return Response(content, document["status"], headers=headers, media_type="application/problem+json")
+    found = request_error(error)
+    headers = {"Cache-Control": "no-store", **found.headers}
+    if found.kind.closes:
+        headers["Connection"] = "close"
+    if found.kind.retry_after_s is not None:
+        headers["Retry-After"] = str(found.kind.retry_after_s)
+    content = orjson.dumps(document_of(found, scope))
+    return Response(content, found.kind.status, headers=headers, media_type="application/problem+json")

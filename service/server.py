@@ -5,21 +5,20 @@ promise of stability: pyproject.toml bounds the version, and the tests try every
 """
 
 import math
+from itertools import chain
 from typing import Any, ClassVar
 
-import orjson
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from .problems import Kind, RequestError, document_of
+from .problems import Kind, RequestError, problem_of
 
 __all__ = ["Connection"]
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
-_LOOK_EVERY_S = 0.25  # for connections whose time is over
+_LOOK_EVERY_S = 0.25  # whether the time of a connection is over
 _TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
-_ONE_HOST = RequestError(Kind.MALFORMED_BODY, "a request has one Host")
 
 
 class Connection(HttpToolsProtocol):
@@ -31,10 +30,8 @@ class Connection(HttpToolsProtocol):
 
     #: connections without a request, the longest waiting first
     waiting: ClassVar[dict["Connection", None]] = {}
-    #: the event loop whose connections are looked at
-    looked_at: ClassVar[Any] = None
     _due = _end = math.inf  # when the client must have moved, and the answer be complete
-    _arrived = _head = 0  # bytes of the last read; bytes since the head began
+    _bytes = 0  # since the last answer
     _in_head = _second = False
     _refusal: RequestError | None = None
 
@@ -42,38 +39,35 @@ class Connection(HttpToolsProtocol):
         super().__init__(*arguments, **named)
         self._settings = self.app_state["settings"]
 
-    # --- time -----------------------------------------------------------------------------------------
-
     @property
     def _busy(self) -> bool:
         return self.cycle is not None and not self.cycle.response_complete
 
     def _watch(self) -> None:
-        if self._due == math.inf:
-            self._due = self.loop.time() + self._settings.client_timeout_s
+        self._due = min(self._due, self.loop.time() + self._settings.client_timeout_s)
 
     def _look(self) -> None:
-        """End the connections whose time is over: with 408 where a request has begun and its answer has not."""
+        """End the connection if its time is over: with 408 where a request has begun and its answer has not."""
         now = self.loop.time()
-        for one in list(self.connections):
-            if isinstance(one, Connection) and now > min(one._due, one._end):
-                if now <= one._end and (one._in_head or (one._busy and not one.cycle.response_started)):
-                    told = f"a client may take up to {self._settings.client_timeout_s} s"
-                    one._refuse(RequestError(Kind.SLOW_CLIENT, told))
-                else:
-                    one.transport.abort()
-        if self.connections:
+        if now > self._due and (self._in_head or self._busy) and now <= self._end:
+            self._refuse(RequestError(Kind.SLOW_CLIENT, f"a client may take up to {self._settings.client_timeout_s} s"))
+        elif now > min(self._due, self._end):
+            self.transport.abort()
+        if self in self.connections:
             self.loop.call_later(_LOOK_EVERY_S, self._look)
-        else:
-            Connection.looked_at = None
 
-    # --- the connection -------------------------------------------------------------------------------
+    def _refuse(self, error: RequestError) -> None:
+        if self._busy and self.cycle.response_started:
+            self.transport.abort()
+        elif not self.transport.is_closing():
+            answer = problem_of(error, {"path": "", "method": "GET", **(self.scope or {})})
+            fields = b"".join(b"%b: %b\r\n" % field for field in answer.raw_headers)
+            start = b"HTTP/1.1 %d %b" % (error.kind.status, error.kind.title.encode())
+            self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))
+            self.transport.close()
 
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
-        if Connection.looked_at is not self.loop:
-            Connection.looked_at = self.loop
-            self.loop.call_later(_LOOK_EVERY_S, self._look)
         super().connection_made(transport)
         if len(self.connections) > self._settings.max_connections and self.waiting:
             oldest = next(iter(self.waiting))
@@ -82,6 +76,7 @@ class Connection(HttpToolsProtocol):
             oldest.transport.abort()
         self.waiting[self] = None
         self._watch()
+        self._look()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""
@@ -99,32 +94,17 @@ class Connection(HttpToolsProtocol):
         """Read some bytes, unless they follow a request that is not answered yet."""
         if self._second or self.transport.is_closing():
             return
-        self._arrived = len(data)
-        self._head += len(data)
+        self._bytes += len(data)
         super().data_received(data)
         if self._in_head or not self._busy:
             self._watch()
-        if self._in_head and self._head > MAX_HEAD and not self.transport.is_closing():
+        if self._in_head and self._bytes > MAX_HEAD:
             self._refuse(_TOO_LARGE)
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what the parser, or a limit here, has refused."""
-        if self._second:
-            return
-        if self._busy and self.cycle.response_started:
-            self.transport.abort()
-        else:
-            self._refuse(self._refusal or RequestError(Kind.MALFORMED_BODY, msg))
-
-    def _refuse(self, error: RequestError) -> None:
-        self._due = self._end = math.inf
-        document = document_of(error, {"path": "", "method": "GET", **(self.scope or {})})
-        text = orjson.dumps(document)
-        self.transport.write(
-            b"HTTP/1.1 %d %b\r\ncontent-type: application/problem+json\r\ncontent-length: %d\r\nconnection: close\r\n"
-            b"\r\n%b" % (document["status"], document["title"].encode(), len(text), text)
-        )
-        self.transport.close()
+        if not self._second:
+            self._refuse(self._refusal or RequestError(Kind.MALFORMED_HTTP, msg))
 
     def pause_writing(self) -> None:
         """Give the client its time to read."""
@@ -136,37 +116,30 @@ class Connection(HttpToolsProtocol):
         super().resume_writing()
         self._due = math.inf
 
-    # --- calls of the parser; what they raise ends in send_400_response ---------------------------------
-
-    def _raise(self, error: RequestError) -> None:
-        self._refusal = error
-        raise error
-
     def on_message_begin(self) -> None:
         """Begin a head, if the request before it is answered."""
         if self._busy:
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
-        self._in_head, self._head = True, self._arrived
+        self._in_head = True
         super().on_message_begin()
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """Take a field of the head; those after a body are dropped."""
-        if self._in_head:
-            super().on_header(name, value)
-            if len(self.headers) > MAX_FIELDS:
-                self._raise(_TOO_LARGE)
+        """Take a field of the head, or one that follows a body."""
+        super().on_header(name, value)
+        if len(self.headers) > MAX_FIELDS:
+            self._refusal = _TOO_LARGE
+            raise _TOO_LARGE
 
     def on_headers_complete(self) -> None:
         """Begin a request."""
-        size, hosts = len(self.url), 0
-        for name, value in self.headers:
-            size += len(name) + len(value)
-            hosts += name == b"host"
-        if size > MAX_HEAD:
-            self._raise(_TOO_LARGE)
-        if hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
-            self._raise(_ONE_HOST)
+        hosts = [name for name, _ in self.headers].count(b"host")
+        if self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD:
+            self._refusal = _TOO_LARGE
+        elif hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
+            self._refusal = RequestError(Kind.MALFORMED_HTTP, "a request has one Host")
+        if self._refusal:
+            raise self._refusal
         self._in_head = False
         self.waiting.pop(self, None)
         if len(self.connections) > self._settings.max_connections:
@@ -184,6 +157,6 @@ class Connection(HttpToolsProtocol):
 
     def on_response_complete(self) -> None:
         """Wait for the next request."""
-        self._due = self._end = math.inf
+        self._due, self._end, self._bytes = math.inf, math.inf, 0
         self.waiting[self] = None
         super().on_response_complete()

@@ -6,12 +6,11 @@ names the variable, the value and what it must be; the value of the API key is n
 
 import os
 import re
-from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError, field_validator
+from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 __all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
@@ -24,30 +23,22 @@ class SettingsError(ValueError):
     """One or more settings cannot be used; the text says which, and what they must be."""
 
 
-def _split_paths(value: object) -> object:
-    """``a:b`` (``a;b`` on Windows) -> (``a``, ``b``); one path or a sequence of paths is taken as it is."""
-    if isinstance(value, str):
-        return tuple(part for part in value.split(os.pathsep) if part)
-    if isinstance(value, Path):
-        return (value,)
-    if isinstance(value, Sequence):
-        return tuple(value)
-    return value
+def _split(separator: str) -> BeforeValidator:
+    """``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
+
+    def split(value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        return [part.strip() for part in value.split(separator) if part.strip()]
+
+    return BeforeValidator(split)
 
 
-def _split_list(value: object) -> object:
-    """``a, b`` -> (``a``, ``b``)."""
-    if isinstance(value, str):
-        return tuple(part.strip() for part in value.split(",") if part.strip())
-    return value
-
-
-def _split_keys(value: object) -> object:
-    """``a=1,b=2`` -> {``a``: ``1``, ``b``: ``2``}."""
-    if isinstance(value, str):
-        pairs = [part.partition("=") for part in value.split(",") if part.strip()]
-        return {name.strip(): key for name, _, key in pairs}
-    return value
+def _pairs(value: object) -> object:
+    """[``a=1``, ``b=2``] -> {``a``: ``1``, ``b``: ``2``}."""
+    if not isinstance(value, list):
+        return value
+    return {name.strip(): key for name, _, key in (part.partition("=") for part in value)}
 
 
 def _default_tables() -> tuple[Path, ...]:
@@ -69,6 +60,16 @@ def _usable(key: SecretStr) -> SecretStr:
     return key
 
 
+def _one_name_each(keys: dict[str, SecretStr]) -> dict[str, SecretStr]:
+    if len({key.get_secret_value() for key in keys.values()}) != len(keys):
+        raise ValueError("two names for one key")
+    return keys
+
+
+def _whole(default: int, least: int, most: int, more: str = "") -> Any:
+    return Field(default, ge=least, le=most, description=f"an integer from {least}{more} to {most}")
+
+
 Key = Annotated[SecretStr, AfterValidator(_usable)]
 KeyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")]
 
@@ -78,26 +79,26 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
-    tables: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(_split_paths)] = Field(
+    tables: Annotated[tuple[Path, ...], NoDecode, _split(os.pathsep)] = Field(
         default_factory=_default_tables,
         min_length=1,
         description=f"a table file or a directory of *.nc files, or several joined by {os.pathsep!r}",
     )
     host: str = Field("127.0.0.1", min_length=1, description="an address or host name to listen on")
-    port: int = Field(8000, ge=0, le=65535, description="an integer from 0 (any free port) to 65535")
-    workers: int = Field(1, ge=1, le=256, description="an integer from 1 to 256")
-    max_body_bytes: int = Field(16 * 2**20, ge=1024, le=2**31, description="an integer from 1024 to 2147483648")
-    max_batch: int = Field(100_000, ge=1, le=10_000_000, description="an integer from 1 to 10000000")
-    max_batches: int = Field(4, ge=1, le=1024, description="an integer from 1 to 1024")
-    max_connections: int = Field(1000, ge=1, le=1_000_000, description="an integer from 1 to 1000000")
-    keep_alive_s: int = Field(75, ge=1, le=3600, description="an integer from 1 to 3600")
-    client_timeout_s: int = Field(30, ge=1, le=3600, description="an integer from 1 to 3600")
-    time_limit_s: int = Field(300, ge=1, le=86400, description="an integer from 1 to 86400")
+    port: int = _whole(8000, 0, 65535, " (any free port)")
+    workers: int = _whole(1, 1, 256)
+    max_body_bytes: int = _whole(16 * 2**20, 1024, 2**31)
+    max_batch: int = _whole(100_000, 1, 10_000_000)
+    max_batches: int = _whole(4, 1, 1024)
+    max_connections: int = _whole(1000, 1, 1_000_000)
+    keep_alive_s: int = _whole(75, 1, 3600)
+    client_timeout_s: int = _whole(30, 1, 3600)
+    time_limit_s: int = _whole(300, 1, 86400)
     api_key: Key | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
-    api_keys: Annotated[dict[KeyName, Key], NoDecode, BeforeValidator(_split_keys)] = Field(
-        default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -"
-    )
-    cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split_list)] = Field(
+    api_keys: Annotated[
+        dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), _split(","), AfterValidator(_one_name_each)
+    ] = Field(default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -")
+    cors_origins: Annotated[tuple[str, ...], NoDecode, _split(",")] = Field(
         (), description="origins such as https://tool.example joined by commas, or *"
     )
     root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
@@ -105,22 +106,10 @@ class Settings(BaseSettings):
     guide: DirectoryPath | None = Field(
         default_factory=_default_guide, description="a directory with the built documentation"
     )
-    log_level: Literal["debug", "info", "warning", "error", "critical"] = Field(
+    log_level: Annotated[Literal["debug", "info", "warning", "error", "critical"], BeforeValidator(str.lower)] = Field(
         "info", description="one of debug, info, warning, error, critical"
     )
-    shutdown_grace_s: int = Field(10, ge=0, le=3600, description="an integer from 0 to 3600")
-
-    @field_validator("log_level", mode="before")
-    @classmethod
-    def _lower(cls, value: object) -> object:
-        return value.lower() if isinstance(value, str) else value
-
-    @field_validator("api_keys")
-    @classmethod
-    def _one_name_each(cls, keys: dict[str, SecretStr]) -> dict[str, SecretStr]:
-        if len({key.get_secret_value() for key in keys.values()}) != len(keys):
-            raise ValueError("two names for one key")
-        return keys
+    shutdown_grace_s: int = _whole(10, 0, 3600)
 
     def keys(self) -> dict[str, str]:
         """API key -> name of its holder, which logs show; empty where no key is needed."""
@@ -150,9 +139,8 @@ def load_settings(**chosen: Any) -> Settings:
     except ValidationError as error:
         lines: dict[str, str] = {}
         for problem in error.errors(include_url=False):
-            name = str(problem["loc"][0]).lower() if problem["loc"] else "settings"
-            field = Settings.model_fields.get(name)
-            bound = field.description if field is not None else "a known setting"
+            name = str(problem["loc"][0]).lower()
+            bound = Settings.model_fields[name].description
             given = "(hidden)" if name in ("api_key", "api_keys") else repr(problem["input"])[:200]
             lines.setdefault(name, f"{PREFIX}{name.upper()} must be {bound}, got {given}")
         raise SettingsError("; ".join(lines.values())) from None

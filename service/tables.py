@@ -1,7 +1,6 @@
 """The loaded tables.  Each is opened and its checksum and a known answer are checked before the service is ready."""
 
 import logging
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,27 +19,23 @@ _log = logging.getLogger("mumacro.tables")
 def table_files(paths: Sequence[Path]) -> list[Path]:
     """Files among ``paths``, and the ``*.nc`` files of the directories among them, in order of name.
 
-    Raises
-    ------
-    TableError
-        A path is missing, or a directory holds no table.
+    TableError where a path is missing, or a directory holds no table.
     """
     files: list[Path] = []
     for path in paths:
-        if path.is_dir():
-            found = sorted(file for file in path.glob("*.nc") if not file.name.startswith("."))
-            if not found:
-                raise TableError(path, "the directory holds no *.nc file")
-            files.extend(found)
-        elif path.exists():
-            files.append(path)
-        else:
-            raise TableError(path, "missing")
+        found = [path] if path.is_file() else sorted(path.glob("[!.]*.nc"))
+        if not found:
+            raise TableError(path, "the directory holds no *.nc file" if path.is_dir() else "missing")
+        files += found
     return files
 
 
 def _stamp(path: Path) -> tuple[int, int, int]:
-    status = os.stat(path)
+    """The state of a file; TableError where there is none."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise TableError(path, "the file is gone") from error
     return status.st_size, status.st_mtime_ns, status.st_ino
 
 
@@ -53,17 +48,8 @@ class LoadedTable:
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Read and check one table.
-
-        Raises
-        ------
-        TableError
-            The file is missing or damaged, or its known answer is wrong.
-        """
-        try:
-            stamp = _stamp(path)
-        except OSError as error:
-            raise TableError(path, error.strerror or "unreadable") from error
+        """Read and check one table; TableError where it is damaged, or its known answer is wrong."""
+        stamp = _stamp(path)
         surrogate = Surrogate.open(path, threads=1)
         surrogate.self_check()
         return cls(surrogate, stamp)
@@ -77,21 +63,10 @@ class LoadedTable:
         self.size_bytes = self.stamp[0]
 
     def check(self) -> None:
-        """Check the known answer again, and whether the file is unchanged.
-
-        Raises
-        ------
-        TableError
-            The answer is wrong, or the file was changed after it was loaded.
-        """
+        """Check the known answer again, and that the file is as it was; else TableError."""
         self.surrogate.self_check()
-        path = self.surrogate.path
-        try:
-            same = _stamp(path) == self.stamp
-        except OSError as error:
-            raise TableError(path, "the file is gone") from error
-        if not same:
-            raise TableError(path, "the file was changed after it was loaded; restart the service")
+        if _stamp(self.surrogate.path) != self.stamp:
+            raise TableError(self.surrogate.path, "the file was changed after it was loaded; restart the service")
 
 
 class Tables:
@@ -117,17 +92,14 @@ class Tables:
             self.fault = "the tables could not be loaded; the log has the reason"
             _log.exception("no tables")
         else:
-            tables.sort(key=lambda table: (table.surrogate.tolerance, table.id))
-            self.loaded, self.fault = tuple(tables), None
-            _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in tables]}})
+            self.loaded = tuple(sorted(tables, key=lambda table: (table.surrogate.tolerance, table.id)))
+            self.fault = None
+            _log.info("tables are loaded", extra={"fields": {"tables": [table.label for table in self.loaded]}})
 
     def check(self) -> None:
-        """Raise RequestError if a table does not give its known answer or its file was changed."""
-        try:
-            for table in self._ready():
-                table.check()
-        except TableError as error:
-            raise RequestError(Kind.NOT_READY, f"table {error.path.name}: {error.reason}") from error
+        """Check every table again; TableError, or RequestError where none is loaded."""
+        for table in self._ready():
+            table.check()
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
         """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-])."""

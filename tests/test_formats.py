@@ -150,7 +150,7 @@ def test_eval_answers_files_of_every_format(tmp_path: Path, good: list[Row], giv
 
 # --- what include adds ----------------------------------------------------------------------------------
 
-INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "regime_certain", "std"]
+INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
 
 
 def flat(document: Row, path: str = "") -> Row:

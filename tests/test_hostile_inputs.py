@@ -116,8 +116,8 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
         assert parts(ask(table, one, 0.5))[0] == parts(ask(table, 1.0, 0.5))[0]
     for empty in (np.empty(0), [], np.empty((0, 3))):
         assert np.shape(parts(ask(table, empty, 0.5))[0]) == np.shape(empty)
-    assert isinstance(parts(ask(table, np.array(0.1), np.array(0.5))[0]), float)
-    assert parts(ask(table, np.broadcast_to(0.1, (3, 4))[0], 0.5)).shape == (3, 4)
+    assert isinstance(parts(ask(table, np.array(0.1), np.array(0.5)))[0], float)
+    assert parts(ask(table, np.broadcast_to(0.1, (3, 4)), 0.5))[0].shape == (3, 4)
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])

@@ -36,6 +36,9 @@ def same(table: Surrogate, v: Array, y: Array, name: str = "mu_ratio") -> None:
     value, bound, source, *slopes = one_by_one(table, v, y, name)
     for many, alone in zip(table.quantity(name, v, y), (value, bound, source), strict=True):
         np.testing.assert_array_equal(many, alone)
+    points = [table.quantity(name, float(a), float(b)) for a, b in zip(v, y, strict=True)]
+    for plain, alone in zip(zip(*points, strict=True), (value, bound, source), strict=True):
+        np.testing.assert_array_equal(plain, alone)
     for many, alone in zip(table.slopes(v, y, name, bounds=True), slopes, strict=True):
         np.testing.assert_array_equal(many, alone)
     assert np.all((value >= 0.0) & (bound >= 0.0))

@@ -1,8 +1,6 @@
 """Bracketed Newton steps: every shape of curve, and the number of evaluations for ordinary ones."""
 
 import math
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -140,13 +138,3 @@ def test_an_ordinary_target_takes_few_evaluations(surrogate, monkeypatch):
     # a bisection of the bits takes 50 or more
     assert len(calls) <= 12
     assert sum(calls) <= 6 * 1000
-
-
-@pytest.mark.slow
-def test_the_comparison_of_methods_runs(repository):
-    command = [sys.executable, "benchmarks/inverse.py", "--quick", "--rounds", "1"]
-    done = subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
-    rows = [line.split("|")[1:-1] for line in done.stdout.splitlines() if line.startswith("|")][2:]
-    assert [(row[0].strip(), int(row[1])) for row in rows] == [(x, n) for x in ("v0", "y0", "k") for n in (1, 100)]
-    assert all(float(row[2]) > 0.0 for row in rows)

@@ -1,5 +1,7 @@
 """Balls, other directions and intervals of k over HTTP: every form gives the library's answer, bit for bit."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,11 @@ def test_bad_rows_spoil_only_themselves(client):
     (fault,) = answer["errors"]
     assert (fault["index"], fault["field"]) == (1, "Fz_amplitude")
     assert "lifts off" in fault["reason"]
+    lines = "\n".join(json.dumps({**given, "Fz_amplitude": force}) for force in (10.0, 3.0))
+    reply = client.post(BATCH, content=lines, headers={"Content-Type": "application/x-ndjson"})
+    refused, good = map(json.loads, reply.text.splitlines())  # a bad line does not end the stream
+    assert "lifts off" in refused["errors"][0]["reason"]
+    assert good["mu_macro"] == answer["mu_macro"][0]
 
 
 @pytest.mark.parametrize("v0", [1e-4, 0.02, 5.0])
@@ -80,7 +87,7 @@ def test_bad_rows_spoil_only_themselves(client):
 def test_included_quantities_are_the_librarys(client, surrogate, name, v0):
     options, inputs = ASKED[name]
     case = {**RIG, **inputs, "v0": v0}
-    include = ["groups", "limits", "gradient", "stick_fraction", "std", "regime_certain"]
+    include = ["groups", "limits", "gradient", "stick_fraction", "std"]
     include += [] if name == "normal" else ["power"]
     more = {**options, "include": include, "std": {"k": 1e4}}
     answer = client.post(PATH, json={**case, **more}).json()

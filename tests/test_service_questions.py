@@ -96,13 +96,6 @@ def test_a_law_is_single_answers_in_a_row(client):
     assert "approximations" not in law
 
 
-def test_a_family_has_a_law_for_each_of_its_values(client):
-    laws = answered(client, "law", LAW, k=..., family={"k": [1e5, 1e6]})
-    assert (laws["family"], laws["family_unit"]) == ("k", "N/m")
-    assert [curve["value"] for curve in laws["curves"]] == [1e5, 1e6]
-    assert laws["curves"][1]["mu_macro"] == answered(client, "law", LAW)["mu_macro"]
-
-
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega", "f"])
 def test_a_law_goes_along_any_input_and_has_approximations(client, along):
     name, per = ("omega", 2 * math.pi) if along == "f" else (along, 1.0)
@@ -140,6 +133,12 @@ def test_the_table_for_spreadsheets_is_the_law(client):
     assert response.text.count("\r\n") == 34
     head = client.head("/v1/law.csv", params=LAW)
     assert (head.status_code, head.content) == (200, b"")
+
+
+def test_the_table_for_spreadsheets_has_what_is_included(client):
+    law = answered(client, "law", LAW, include=["power"])
+    header, *rows = csv.reader(io.StringIO(client.get("/v1/law.csv", params={**LAW, "include": "power"}).text))
+    assert [float(row[header.index("power.saved [W]")]) for row in rows] == law["power"]["saved"]
 
 
 # --- stiffness and fit ----------------------------------------------------------------------------------

@@ -5,10 +5,11 @@ answer.  What is refused is raised, see :mod:`service.problems`.
 """
 
 import inspect
+import string
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 from urllib.parse import parse_qsl
 
 from fastapi import Body, FastAPI, Query
@@ -18,28 +19,18 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from mumacro.contact import AMPLITUDE
-from mumacro.inputs import NAMES as INPUTS
-
+from ..case import Asked
 from ..limits import SMALL_BODY, media_type_of, read_body
-from ..options import split_names
+from ..options import NAMES, Options, query_of, read_form
 from ..problems import FieldFault, Kind, RequestError, refuse
+from ..tables import LoadedTable
 from ..wire.json import decode
 
 __all__ = [
-    "JSON",
-    "Endpoint",
-    "Routes",
-    "file_answer",
-    "given_in_body",
-    "given_in_query",
-    "in_thread",
-    "path_of",
-    "reply",
-]
+    "Asking", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "in_thread", "path_of", "reply",
+]  # fmt: skip
 
-JSON = "application/json"
-_JSON_ONLY = {JSON: JSON}
+_JSON = "application/json"
 _WHY = {
     400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
     401: "The service needs an API key, and none or a wrong one was sent",
@@ -51,9 +42,11 @@ _WHY = {
     501: "The service was installed without a package that this needs",
     503: "Not ready or overloaded; see Retry-After",
 }
+_PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()  # of a query that needs no decoding
 _PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
 _ID = {"X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}}
 _RETRY = {"description": "Seconds after which to send the request again", "schema": {"type": "integer"}}
+_STD = frozenset(f"std_{name}" for name in NAMES)
 
 
 @dataclass(frozen=True)
@@ -64,8 +57,7 @@ class Endpoint:
     method: str  # GET answers HEAD, too
     answer: Callable[[Request], Awaitable[Response]]  # its name is the operation's id
     summary: str = ""
-    query: type[BaseModel] | None = None
-    body: type[BaseModel] | None = None
+    form: type[BaseModel] | None = None  # what is asked: a body; of GET, and beside a ``request``, its query
     model: Any = None  # of the answer
     statuses: tuple[int, ...] = ()  # of the problems that it can give, beside those of its kind
     content: Mapping[int | str, Any] = field(default_factory=dict)  # further descriptions of answers, by status
@@ -75,14 +67,16 @@ class Endpoint:
 
     def describe_to(self, app: FastAPI) -> None:
         """Add the route to an application, with its description."""
-        statuses = set(self.statuses)
-        if not self.open:
-            statuses |= {401, 503} | ({400, 422} if self.query else set())
-        if self.method == "POST":
-            statuses |= {400, 408, 413, 415, 422}
+        post = self.method == "POST"
+        asked: dict[str, Any] = {"request": Request}
+        if self.form is not None and post and self.request is None:
+            asked["body"] = Annotated[self.form, Body()]
+        elif self.form is not None:
+            asked["query"] = Annotated[query_of(self.form), Query()]
+        statuses = {*self.statuses, *(() if self.open else (401, 503)), *((400, 422) if self.form else ())}
+        statuses |= {408, 413, 415} if post else set()
         responses: dict[int | str, dict[str, Any]] = {200: {}, **self.content}
-        for status in sorted(statuses):
-            responses[status] = {"description": _WHY[status], "content": _PROBLEM}
+        responses |= {code: {"description": _WHY[code], "content": _PROBLEM} for code in sorted(statuses)}
         for code, response in responses.items():
             headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if code == 503 else {})}
             responses[code] = {**response, "headers": headers}
@@ -90,12 +84,8 @@ class Endpoint:
         async def answer(request: Request, **_: Any) -> Response:
             return await self.answer(request)
 
-        keyword = inspect.Parameter.KEYWORD_ONLY
-        kinds: dict[str, Any] = {"request": Request}
-        kinds |= {"query": Annotated[self.query, Query()]} if self.query else {}
-        kinds |= {"body": Annotated[self.body, Body()]} if self.body else {}
         answer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [inspect.Parameter(name, keyword, annotation=kind) for name, kind in kinds.items()]
+            [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=asked[name]) for name in asked]
         )
         app.add_api_route(
             self.path, answer, methods=[self.method], summary=self.summary, operation_id=self.answer.__name__,
@@ -107,10 +97,7 @@ class Endpoint:
 
 
 class Routes:
-    """Finds the endpoint of a path and a method, and answers; other paths go to ``others``.
-
-    Paths have no parameters, so a look-up finds them.
-    """
+    """Finds the endpoint of a path, which has no parameters, and of a method; other paths go to ``others``."""
 
     def __init__(self, endpoints: Iterable[Endpoint], others: ASGIApp) -> None:
         self._others = others
@@ -129,47 +116,58 @@ class Routes:
         answer = methods.get(scope["method"])
         if answer is None:
             allowed = ", ".join(sorted(methods))
-            detail = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
-            raise HTTPException(405, detail, headers={"Allow": allowed})
+            told = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
+            raise HTTPException(405, told, {"Allow": allowed})
         response = await answer(Request(scope, receive, send))
         await response(scope, receive, send)
 
 
 def path_of(scope: Scope) -> str:
     """The path within this application: without the prefix of a proxy."""
-    path: str = scope["path"]
-    root: str = scope.get("root_path", "")
-    return path.removeprefix(root) if root else path
+    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
 
 
 # --- requests -------------------------------------------------------------------------------------------
 
 
+class Asking(NamedTuple):
+    """What a request asks: the table, the options, the case, and what it is."""
+
+    table: LoadedTable
+    form: Any
+    case: dict[str, Any]
+    asked: Asked
+
+    @classmethod
+    async def of(cls, request: Request, model: type[Options], wanted: str = "", one: bool = False) -> "Asking":
+        """Read and check a request; the option ``wanted`` names the input that is asked for."""
+        given = await given_in_body(request) if request.method == "POST" else given_in_query(request)
+        name = given.get(wanted, model.model_fields[wanted].default) if wanted else None
+        found = read_form(model, given, [name] if name in NAMES else [], one=one)
+        return cls(request.app.state.tables.pick(found[0].tolerance), *found)
+
+
 async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
-    media_type_of(headers, _JSON_ONLY)
+    if headers.get(b"content-type") != _JSON.encode() or b"content-encoding" in headers:
+        media_type_of(headers, {_JSON: _JSON})
     limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):
         refuse([FieldFault((), "must be a JSON object", found)])
-    if request.scope["query_string"]:
-        pairs = parse_qsl(request.scope["query_string"].decode("latin-1"), keep_blank_values=True)
-        refuse([FieldFault((name,), "belongs in the body", value, parameter=True) for name, value in pairs[:100]])
+    if query := request.scope["query_string"]:
+        pairs = _pairs(query)[:100]
+        refuse([FieldFault((name,), "belongs in the body", value, parameter=True) for name, value in pairs])
     return found
 
 
 def given_in_query(request: Request) -> dict[str, Any]:
     """The members of a query, as a body has them: numbers as numbers, ``std_mu0`` within ``std``."""
-    text = request.scope["query_string"].decode("latin-1")
-    try:
-        pairs = parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
-    except (ValueError, UnicodeDecodeError) as error:
-        raise RequestError(Kind.MALFORMED_BODY, f"the query cannot be read: {error}") from None
     found: dict[str, Any] = {}
     names: list[str] = []
     twice: dict[str, None] = {}
-    for name, value in pairs:
+    for name, value in _pairs(request.scope["query_string"]):
         place, inner = (found.setdefault("std", {}), name[4:]) if name in _STD else (found, name)
         if name == "include":
             names.append(value)
@@ -182,11 +180,20 @@ def given_in_query(request: Request) -> dict[str, Any]:
     if twice:
         refuse([FieldFault((name,), "is given more than once", parameter=True) for name in twice])
     if names:
-        found["include"] = split_names(names)
+        found["include"] = [part.strip() for name in names for part in name.split(",")]
     return found
 
 
-_STD = frozenset(f"std_{name}" for name in (*INPUTS, AMPLITUDE))
+def _pairs(query: bytes) -> list[tuple[str, str]]:
+    """Names and values of a query."""
+    text = query.decode("latin-1")
+    if not query.translate(None, _PLAIN) and query.count(b"&") < 100:  # what urllib would take longer to find
+        pairs = (pair.partition("=") for pair in text.split("&") if pair)
+        return [(name, value) for name, _, value in pairs]
+    try:
+        return parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=1000)
+    except (ValueError, UnicodeDecodeError) as error:
+        raise RequestError(Kind.MALFORMED_BODY, f"the query cannot be read: {error}") from None
 
 
 def _number(text: str) -> Any:
@@ -203,7 +210,7 @@ def _number(text: str) -> Any:
 # --- responses ------------------------------------------------------------------------------------------
 
 
-def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = JSON) -> Response:
+def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> Response:
     """A complete answer."""
     return Response(content, headers=headers, media_type=media_type)
 
@@ -218,10 +225,11 @@ class _File(FileResponse):
     """A file, or a part of it; a range outside the file is answered with problem details."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        size = self.headers["content-length"]
+
         async def send_checked(message: Message) -> None:
             if message.get("status") == 416:
-                size = self.headers["content-length"]
-                raise HTTPException(416, f"the file has {size} bytes", headers={"Content-Range": f"bytes */{size}"})
+                raise HTTPException(416, f"the file has {size} bytes", {"Content-Range": f"bytes */{size}"})
             if message.get("status") == 400:
                 raise HTTPException(400, "Range must be such as bytes=0-99, first <= last")
             await send(message)
@@ -230,14 +238,9 @@ class _File(FileResponse):
 
 
 def file_answer(request: Request, path: Path, headers: Mapping[str, str], **options: Any) -> Response:
-    """A file, the part of it that Range requests, or 304 if the client has it already.
+    """A file, the part of it that Range requests, or 304 if the client has it already; OSError if it is gone.
 
     The ETag is that of the headers, or is made from the size and the modification time.
-
-    Raises
-    ------
-    OSError
-        The file is gone.
     """
     answer = _File(path, headers=headers, stat_result=path.stat(), **options)
     etag = answer.headers["etag"]

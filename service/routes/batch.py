@@ -12,10 +12,12 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
+from mumacro.errors import MumacroError
+
 from ..answers import answer_case, cost_of
 from ..case import Columns
 from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
-from ..options import OPTIONS, Options, OptionsQuery, options_of, read_form
+from ..options import Options, options_of, read_form
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..wire import Batch, Form, forms
 from ..wire.json import decode, dump
@@ -23,7 +25,6 @@ from . import Endpoint, given_in_query
 
 __all__ = ["ENDPOINTS"]
 
-PATH = "/v1/mu-macro/batch"
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
@@ -35,9 +36,8 @@ class _Answer(Response):
     background = None
 
     def __init__(self, request: Request) -> None:
-        self._request = request
+        self._request, self._state = request, request.app.state
         self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
-        self._state = request.app.state
         self._work: Work = request.app.state.work
         self._limit: int = self._state.settings.max_body_bytes
         self._most: int = self._state.settings.max_batch
@@ -48,11 +48,14 @@ class _Answer(Response):
         del scope
         try:
             async with self._work.deadline():
-                self._query = self._options_of_query()
-                known = {
-                    name: form.media_type for form in forms().values() for name in (form.media_type, *form.aliases)
-                }
-                form = forms()[media_type_of(self._given, known)]
+                self._query = given_in_query(self._request)
+                _, rest, faults = options_of(Options, self._query, parameter=True)
+                told = "is no option; inputs belong in the body"
+                if faults := [*faults, *(FieldFault((name,), told, parameter=True) for name in rest)]:
+                    refuse(faults)
+                found = forms()
+                known = {name: form.media_type for form in found.values() for name in (form.media_type, *form.aliases)}
+                form = found[media_type_of(self._given, known)]
                 await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
             if self._placed:
@@ -68,28 +71,20 @@ class _Answer(Response):
             self._place()
         return await self._work.batches.run(work, cost)
 
-    def _options_of_query(self) -> dict[str, Any]:
-        given = given_in_query(self._request)
-        _, rest, faults = options_of(Options, given, OptionsQuery.model_fields, parameter=True)
-        faults += [FieldFault((name,), "is no option; inputs belong in the body", parameter=True) for name in rest]
-        if faults:
-            refuse(faults)
-        return given
-
     def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
         """The batch with the options of query and body together."""
-        self._only_once(given)
-        options, _, faults = options_of(Options, {**self._query, **given}, OPTIONS)
+        options, _, faults = options_of(Options, self._both(given))
         if options is None:
             refuse(faults)
         options.check(columns.asked)
         table = self._state.tables.pick(options.tolerance, "tolerance" in self._query)
         return Batch(table, columns, options.names(), options.deviations(), count=self._state.metrics.cases)
 
-    def _only_once(self, given: Mapping[str, Any]) -> None:
-        twice = [name for name in given if name in self._query]
-        if twice:
+    def _both(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """What the query and the body give, each name once."""
+        if twice := [name for name in given if name in self._query]:
             refuse([FieldFault.of(name, "is given in the query and in the body", given[name]) for name in twice])
+        return {**given, **self._query}
 
     # --- bodies that are read whole -------------------------------------------------------------------
 
@@ -161,7 +156,7 @@ class _Answer(Response):
                 yield from form.write(self._batch(columns, given))
             else:
                 yield self._case(decode(line))
-        except RequestError as error:
+        except MumacroError as error:
             scope = {**self._request.scope, "path": f"{self._request.scope['path']}#line={number}"}
             yield dump(document_of(error, scope))
         yield b"\n"
@@ -170,8 +165,7 @@ class _Answer(Response):
         """The answer to one case of a stream, where a null is a gap."""
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
-        self._only_once(given)
-        options, case, asked = read_form(Options, {**given, **self._query}, null_is_rigid=False)
+        options, case, asked = read_form(Options, self._both(given), null_is_rigid=False)
         table = self._state.tables.pick(options.tolerance)
         values, source = answer_case(table.surrogate, case, options.names(), options.deviations(), asked)
         self._state.metrics.case(table, source)
@@ -212,14 +206,11 @@ async def post_mu_macro_batch(request: Request) -> Response:
     return _Answer(request)
 
 
-_ANSWER = {
-    "description": "The answers, in the form of the request",
-    "content": {form.media_type: form.answer for form in forms().values()},
-}
+_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in forms().values()} for part in ("body", "answer"))
 ENDPOINTS = [
     Endpoint(
-        PATH, "POST", post_mu_macro_batch, "Macroscopic friction of many cases", query=OptionsQuery,
-        request={"required": True, "content": {form.media_type: form.body for form in forms().values()}},
-        content={200: _ANSWER},
+        "/v1/mu-macro/batch", "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,
+        request={"required": True, "content": _BODIES},
+        content={200: {"description": "The answers, in the form of the request", "content": _ANSWERS}},
     )
 ]  # fmt: skip

@@ -1,23 +1,18 @@
 """One case: ``GET`` and ``POST /v1/mu-macro``, and ``GET /v1/mu-macro.txt`` for spreadsheets."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from pydantic import Field, create_model
 from starlette.requests import Request
 from starlette.responses import Response
 
-from mumacro import Surrogate
-from mumacro.interval import ENDS, middle
 from mumacro.validity import digits, k_effect, model_rows
 
 from ..answers import answer_case, cost_of
-from ..case import Asked
-from ..models import CaseAnswer
-from ..options import MODEL, CaseQuery, CaseRequest, Options, read_form
+from ..models import CaseAnswer, model
+from ..options import MODEL, CaseRequest, Options, bounded
 from ..problems import FieldFault, refuse
 from ..wire.json import dump
-from . import Endpoint, given_in_body, given_in_query, reply
+from . import Asking, Endpoint, reply
 
 __all__ = ["ENDPOINTS"]
 
@@ -25,84 +20,65 @@ PATH = "/v1/mu-macro"
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 
 
-async def _answered(request: Request, given: Mapping[str, Any]) -> dict[str, Any]:
-    options, case, asked = read_form(Options, given, one=True)
-    state = request.app.state
-    table = state.tables.pick(options.tolerance)
-    include, std = options.names(), options.deviations()
-    model = MODEL in (options.include or ())
+class TextOptions(Options):
+    """What is asked for one value as text."""
+
+    value: str = bounded("a name in the answer", "Such as mu_macro, regime or power.saved", "mu_macro")
+
+
+async def _answered(request: Request, asking: type[Options] = Options) -> tuple[Any, dict[str, Any]]:
+    """The options and the answer."""
+    table, form, case, asked = await Asking.of(request, asking, one=True)
+    include, state, told = form.names(), request.app.state, MODEL in (form.include or ())
 
     def answer() -> tuple[dict[str, Any], int]:
-        values, source = answer_case(table.surrogate, case, include, std, asked)
-        return {**values, **_about_model(table.surrogate, case, asked)} if model else values, source
+        values, source = answer_case(table.surrogate, case, include, form.deviations(), asked)
+        if told:  # rows of docs/validity.md, and the digits that k supports
+            words, surrogate = asked.kind.names, table.surrogate
+            values["model"] = model_rows(surrogate, case, **words)
+            values["digits"] = digits(k_effect(surrogate, case, **words))
+        return values, source
 
-    large = model or cost_of(include, asked) > _LARGE
+    large = told or cost_of(include, asked) > _LARGE
     values, source = await state.work.question(answer) if large else answer()
     state.metrics.case(table, source)
-    return {**values, **table.signature}
-
-
-def _about_model(surrogate: Surrogate, case: dict[str, Any], asked: Asked) -> dict[str, Any]:
-    """Rows of docs/validity.md, and the digits that k supports."""
-    names: Any = asked.kind.names
-    if not asked.interval:
-        effect = k_effect(surrogate, case, **names)
-        return {"model": model_rows(surrogate, case, **names), "digits": digits(effect)}
-    found = surrogate.evaluate(**case, **names)
-    ends = {name: case[name] for name in ENDS}
-    at_middle = {name: value for name, value in case.items() if name not in ENDS} | {
-        "k": float(middle(ends, "raise")[2])
-    }
-    rows = [row for row in model_rows(surrogate, at_middle, **names) if row["row"] != "k is known"]
-    spread = 0.5 * (found.mu_macro_high - found.mu_macro_low)
-    return {"model": rows, "digits": digits(spread / found.mu_macro if spread else 0.0)}
+    return form, {**values, **table.signature}
 
 
 async def post_mu_macro(request: Request) -> Response:
     """Answer one case given as a JSON object; ``include`` adds quantities to the default answer."""
-    return reply(dump(await _answered(request, await given_in_body(request))))
+    return reply(dump((await _answered(request))[1]))
 
 
 async def get_mu_macro(request: Request) -> Response:
     """Answer one case given as a query.  The answer can be cached."""
-    answer = await _answered(request, given_in_query(request))
-    return reply(dump(answer), request.app.state.settings.cache_fields)
+    return reply(dump((await _answered(request))[1]), request.app.state.settings.cache_fields)
 
 
 async def get_mu_macro_text(request: Request) -> Response:
     """Answer one case with one value as text: ``mu_macro``, or the one that ``value`` names."""
-    given = given_in_query(request)
-    name = str(given.pop("value", "mu_macro"))
-    answer = await _answered(request, given)
+    form, answer = await _answered(request, TextOptions)
     found: Any = answer
-    for step in name.split("."):
+    for step in form.value.split("."):
         found = found.get(step) if isinstance(found, dict) else None
     if found is None or isinstance(found, dict):
-        reason = f"is not in the answer; there are: {', '.join(answer)}; more with include"
-        refuse([FieldFault.of("value", reason, name)])
+        told = f"is not in the answer; there are: {', '.join(answer)}; more with include"
+        refuse([FieldFault.of("value", told, form.value)])
     text = found.encode() if isinstance(found, str) else dump(found)
     return reply(text, request.app.state.settings.cache_fields, "text/plain; charset=utf-8")
 
 
-_CACHED = {
-    "headers": {
-        "Cache-Control": {"description": "How long, and by whom, it may be cached", "schema": {"type": "string"}}
-    }
-}
-_value: Any = (str, Field("mu_macro", description="Name in the answer, such as mu_macro, regime or power.saved"))
-ValueQuery: Any = create_model("ValueQuery", __base__=CaseQuery, value=_value)
+_KEPT = {"description": "How long, and by whom, it may be cached", "schema": {"type": "string"}}
+_CACHED = {"headers": {"Cache-Control": _KEPT}}
+_TEXT = {"content": {"text/plain": {"schema": {"type": "string"}}}, **_CACHED}
+TextRequest = model("TextRequest", "One case and the value that is wanted.", TextOptions, CaseRequest)
 ENDPOINTS = [
     Endpoint(
-        PATH, "GET", get_mu_macro, "Macroscopic friction of one case",
-        query=CaseQuery, model=CaseAnswer, content={200: _CACHED},
+        PATH, "GET", get_mu_macro, "Macroscopic friction of one case", CaseRequest, CaseAnswer, content={200: _CACHED}
     ),
+    Endpoint(PATH, "POST", post_mu_macro, "Macroscopic friction of one case, as JSON", CaseRequest, CaseAnswer),
     Endpoint(
-        PATH, "POST", post_mu_macro, "Macroscopic friction of one case, as JSON",
-        body=CaseRequest, model=CaseAnswer,
-    ),
-    Endpoint(
-        f"{PATH}.txt", "GET", get_mu_macro_text,
-        "One value of one case, for spreadsheets (WEBSERVICE)", query=ValueQuery,
-        content={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, **_CACHED}},
+        f"{PATH}.txt", "GET", get_mu_macro_text, "One value of one case, for spreadsheets (WEBSERVICE)", TextRequest,
+        content={200: _TEXT},
     ),
 ]  # fmt: skip

@@ -18,11 +18,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(FOLDER.iterdir()) if path.suffix in _TYPES}
 _FRESH = {"Cache-Control": "no-cache"}
-
-
-async def _page(request: Request) -> Response:
-    headers = {"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer", **_FRESH}
-    return file_answer(request, FOLDER / "index.html", headers, media_type="text/html")
+_SECURE = {"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer", **_FRESH}
 
 
 def asset(path: Path, media_type: str, url: str, headers: dict[str, str]) -> Endpoint:
@@ -53,7 +49,7 @@ async def _map(request: Request) -> Response:
 
 
 ENDPOINTS = [
-    Endpoint("/", "GET", _page, open=True),
+    asset(FOLDER / "index.html", "text/html", "/", _SECURE),
     Endpoint("/static/page/names.json", "GET", _names, open=True),
     Endpoint("/static/page/map.json", "GET", _map),
     *(asset(FOLDER / name, kind, f"/static/page/{name}", _FRESH) for name, kind in ASSETS.items()),

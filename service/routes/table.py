@@ -2,15 +2,15 @@
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.errors import TableError
 
 from .. import __version__
-from ..models import TableAnswer
-from ..options import Positive, bounded, query_of
+from ..models import Strict, TableAnswer, model
+from ..options import Positive, bounded
 from ..problems import faults_of, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
@@ -19,22 +19,15 @@ from . import Endpoint, file_answer, given_in_query, reply
 __all__ = ["ENDPOINTS"]
 
 
-class TableChoice(BaseModel):
-    """Choice of a table; without a tolerance, the tightest."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-    tolerance: Positive | None = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
-
-
-TableQuery: Any = query_of("TableQuery", TableChoice)
+_tolerance = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
+Table = model("Table", "Choice of a table; the tightest by default.", Strict, tolerance=(Positive | None, _tolerance))
 
 
 def _chosen(request: Request) -> LoadedTable:
     try:
-        choice = TableChoice.model_validate(given_in_query(request))
+        choice = Table.model_validate(given_in_query(request))
     except ValidationError as error:
-        refuse(faults_of(error, TableChoice, TableChoice.model_fields))
+        refuse(faults_of(error, Table, Table.model_fields))
     table: LoadedTable = request.app.state.tables.pick(choice.tolerance)
     return table
 
@@ -43,21 +36,14 @@ async def get_table(request: Request) -> Response:
     """Describe the default table, or the one chosen by ``tolerance``; list all that are loaded."""
     table = _chosen(request)
     surrogate = table.surrogate
-    answer = {
-        "id": surrogate.id,
-        "tolerance": surrogate.tolerance,
-        "checksum": surrogate.checksum,
+    answer = {name: getattr(surrogate, name) for name in TableAnswer.model_fields if hasattr(surrogate, name)}
+    others = {
         "file": surrogate.path.name,
         "size_bytes": table.size_bytes,
-        "max_abs_error": surrogate.max_abs_error,
-        "max_rel_error": surrogate.max_rel_error,
-        "attributes": surrogate.attributes,
-        "blocks": surrogate.blocks,
         "loaded": [other.label for other in request.app.state.tables.loaded],
         "service_version": __version__,
-        **table.signature,
     }
-    return reply(dump(answer))
+    return reply(dump({**answer, **others, **table.signature}))
 
 
 async def get_table_file(request: Request) -> Response:
@@ -74,13 +60,9 @@ async def get_table_file(request: Request) -> Response:
 
 _FILE: dict[str, Any] = {"application/x-netcdf": {"schema": {"type": "string", "format": "binary"}}}
 ENDPOINTS = [
+    Endpoint("/v1/table", "GET", get_table, "Properties of a table", Table, TableAnswer, tag="table"),
     Endpoint(
-        "/v1/table", "GET", get_table, "Properties of a table",
-        query=TableQuery, model=TableAnswer, tag="table",
-    ),
-    Endpoint(
-        "/v1/table.nc", "GET", get_table_file, "The table as a netCDF-4 file",
-        query=TableQuery, statuses=(416,), tag="table",
+        "/v1/table.nc", "GET", get_table_file, "The table as a netCDF-4 file", Table, statuses=(416,), tag="table",
         content={
             200: {"description": "The file", "content": _FILE},
             206: {"description": "The part of it that Range requests", "content": _FILE},

@@ -1,23 +1,36 @@
-"""Wire forms of batches: text -> columns, answers -> text.  One file each; :data:`FORMS` has all that are installed.
+"""Wire forms of batches: text -> columns, answers -> text.  One file each; ``forms`` names all that are installed.
 
 Answers are evaluated and written in slices, so that memory stays small and other threads run between them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from mumacro.contact import Kind as ContactKind
+
 from ..answers import Codes, Part, answer_columns, parts_of
-from ..case import MAX_ERRORS, Columns
+from ..case import MAX_ERRORS, Columns, asked_of, faults_in, names_of, stranger
+from ..problems import FieldFault, refuse
 from ..tables import LoadedTable
 
-__all__ = ["FORMS", "Batch", "Form", "forms"]
+__all__ = ["Batch", "Form", "check_names", "forms", "text_form"]
 
-#: name of a column -> what it holds, for a slice of the cases
-Found = Mapping[str, Any]
+
+def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]) -> None:
+    """Refuse columns that such cases lack, do not have, or have twice; ``more`` are other reasons, by name."""
+    asked = asked_of(names, kind)
+    known = names_of(asked)
+    faults = [FieldFault.of(name, stranger(name, asked, known)) for name in dict.fromkeys(names) if name not in known]
+    faults += [FieldFault.of(name, "is given more than once") for name in known if names.count(name) > 1]
+    faults += [FieldFault.of(name, reason) for name, reason in more.items() if name in known]
+    faults += faults_in(names, asked=asked)
+    if faults:
+        refuse(faults)
 
 
 @dataclass
@@ -37,32 +50,26 @@ class Batch:
         """The columns of the answers."""
         return parts_of(self.include, self.columns.asked)
 
-    def slices(self, step: int) -> Iterator[tuple[int, Found, Codes]]:
-        """First case, columns by path, and source codes of ``step`` cases after another; a bad case has NaN and -1.
+    def slices(self, step: int) -> Iterator[tuple[dict[str, Any], Codes, list[str | None]]]:
+        """Columns by path, source codes and faults of ``step`` cases after another; a bad case has NaN and -1.
 
         At least one slice, which is empty if there is no case.
         """
         size = self.columns.size
         for start in range(0, max(size, 1), step):
-            stop = min(start + step, size)
-            six = self.columns.part(start, stop)
-            found, source = answer_columns(
-                self.table.surrogate, six, stop - start, self.include, self.std, self.columns.asked
-            )
+            n = min(step, size - start)
+            six = self.columns.part(start, start + n)
+            found, source = answer_columns(self.table.surrogate, six, n, self.include, self.std, self.columns.asked)
             self.count(self.table, source)
+            faults: list[str | None] = [None] * n
             for index in np.flatnonzero(source < 0).tolist():
                 self.n_errors += 1
+                faults[index] = "bad case"
                 if len(self.errors) < MAX_ERRORS:
                     name, reason = self.columns.reason(start + index)
                     self.errors.append({"index": start + index, "field": name, "reason": reason})
-            yield start, found, source
-
-    def texts(self, start: int, source: Codes) -> list[str | None]:
-        """What is wrong with each case of the slice that was taken last; for forms with a column of errors."""
-        if not self.n_errors:
-            return [None] * source.size
-        told = {error["index"] - start: f"{error['field'] or 'case'}: {error['reason']}" for error in self.errors}
-        return [told.get(i, "bad case") if code < 0 else None for i, code in enumerate(source.tolist())]
+                    faults[index] = f"{name or 'case'}: {reason}"
+            yield found, source, faults
 
     @property
     def end(self) -> dict[str, Any]:
@@ -84,18 +91,19 @@ class Form(NamedTuple):
     streams: bool = False
 
 
-FORMS: dict[str, Form] = {}
+def text_form(description: str, **more: Any) -> dict[str, Any]:
+    """The description of a body or an answer that is no JSON."""
+    return {"schema": {"type": "string", "description": description, **more}}
 
 
+@cache
 def forms() -> dict[str, Form]:
-    """All forms by media type; loaded at the first call, Arrow only where pyarrow is installed."""
-    if not FORMS:
-        from . import csv, json
+    """All forms by media type; Arrow only where pyarrow is installed."""
+    from . import csv, json
 
-        made = [*json.FORMS, csv.FORM]
-        if find_spec("pyarrow"):
-            from . import arrow
+    made = [*json.FORMS, csv.FORM]
+    if find_spec("pyarrow"):
+        from . import arrow
 
-            made.append(arrow.FORM)
-        FORMS.update({form.media_type: form for form in made})
-    return FORMS
+        made.append(arrow.FORM)
+    return {form.media_type: form for form in made}

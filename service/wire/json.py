@@ -10,8 +10,9 @@ import math
 import re
 import secrets
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from functools import cache
 from itertools import chain
 from operator import attrgetter
 from typing import Any, Literal
@@ -36,13 +37,10 @@ __all__ = ["FORMS", "decode", "dump", "read"]
 
 NAMES = (*INPUTS, *LIKE, "k_range", *OPTIONS)
 _MEMBERS = 18  # of one object: the inputs and the options
-_READ = 256 * 1024  # bytes of rows, or of a list, that are read at a time
-_SHORT = 4096  # bytes of a list that json reads
+_READ = 256 * 1024  # bytes of rows that are read at a time
 _TOKEN = secrets.token_hex(16).encode()  # stands in place of a list; nobody else knows it
-_ROWS, _CELLS = 8192, 65536  # rows, and entries of a column, that are written at a time
-
-
-# --- reading ------------------------------------------------------------------------------------------
+_SHORT = 4096  # bytes of a list that json reads
+_ROWS = 8192  # cases that are written at a time
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -53,13 +51,12 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) < 4300 else float(digits)  # infinite, which is refused as a value
-
-
-_DECODER = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole)
-# Numbers are read by functions of Python, so that other threads run meanwhile.
-_PATIENT = json.JSONDecoder(object_pairs_hook=_unique, parse_int=_whole, parse_float=lambda digits: float(digits))
+# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300 digits.
+_DECODER = json.JSONDecoder(
+    object_pairs_hook=_unique,
+    parse_int=lambda digits: int(digits) if len(digits) < 4300 else float(digits),
+    parse_float=lambda digits: float(digits),
+)
 
 
 def decode(text: bytes | bytearray, large: bool = False) -> Any:
@@ -73,7 +70,7 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
             if type(quick) is dict and text.count(b":") == len(quick):
                 return quick
     try:
-        return (_PATIENT if large else _DECODER).decode(text.decode())
+        return _DECODER.decode(text.decode())
     except RecursionError:
         raise RequestError(Kind.MALFORMED_BODY, "the body is nested too deeply") from None
     except ValueError as error:
@@ -83,16 +80,13 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
 def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
     """The cases and the options of a body: columns or one case, or a list of rows."""
     _limit_values(text, max_batch)
-    if bytes(text[:4096]).lstrip()[:1] == b"[":
+    if _OPENS_LIST.match(text):
         kind = kind_in(query)
-        quick = None if kind.normal else _quick_rows(text, max_batch, kind)
-        return quick or _rows(decode(text, large=True), max_batch, kind), {}
+        return _quick_rows(text, max_batch, kind) or _rows(decode(text, large=True), max_batch, kind), {}
     given = _columns(text)
-    if given is None:
-        given = decode(text, large=True)
-        if not isinstance(given, dict):
-            refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
-    _, rest, faults = options_of(OptionsModel, given, NAMES)
+    if not isinstance(given, dict):
+        refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
+    _, rest, faults = options_of(OptionsModel, given)
     options = {name: given[name] for name in OPTIONS if given.get(name) is not None}
     kind = kind_in({**query, **options}) if not faults else SPRING
     return columns_of(rest, max_batch, NAMES, faults, kind), options
@@ -112,119 +106,78 @@ def _limit_values(text: bytearray, max_batch: int) -> None:
         raise RequestError(Kind.INVALID_VALUE, "the body has objects with more members than there are fields")
 
 
-def _columns(text: bytearray) -> dict[str, Any] | None:
-    """An object whose long lists of numbers became arrays; None where a list holds a list, and where this is no JSON.
-
-    Each long list is replaced by a text in what ``json`` reads, which finds names given twice and other faults.
-    """
-    kept, lists, at = list[bytes | bytearray](), list[Any](), 0
-    while (start := text.find(b"[", at)) >= 0:
-        end = text.find(b"]", start)
-        if end - start > _SHORT:
-            found = _numbers(text, start + 1, end)
-            if found is None:
-                return None
-            kept += [text[at:start], b'"%b%d"' % (_TOKEN, len(lists))]
-            lists.append(found)
-            at = end + 1
-        else:
-            kept.append(text[at : start + 1])
-            at = start + 1
-    given = decode(b"".join([*kept, text[at:]]))
-    if not isinstance(given, dict):
-        return None
-    token = _TOKEN.decode()
-    for name, value in given.items():
-        if isinstance(value, str) and value.startswith(token):
-            given[name] = lists[int(value[len(token) :])]
+def _columns(text: bytearray) -> Any:
+    """What ``json`` reads, with long lists of numbers as arrays: a text stands in place of each while it reads."""
+    parser, kept, lists, at = simdjson.Parser(), list[bytes | bytearray](), list[Any](), 0
+    while (start := text.find(b"[", at)) >= 0 and (end := text.find(b"]", start) + 1) > 0:
+        found = _numbers(parser, text[start:end]) if end - start > _SHORT else None
+        kept.append(text[at:end] if found is None else text[at:start] + b'"%b%d"' % (_TOKEN, len(lists)))
+        lists += [] if found is None else [found]
+        at = end
+    given = decode(b"".join([*kept, text[at:]]), large=True)
+    if isinstance(given, dict):
+        token = _TOKEN.decode()
+        for name, value in given.items():
+            if isinstance(value, str) and value.startswith(token):
+                given[name] = lists[int(value[len(token) :])]
     return given
 
 
-def _numbers(text: bytearray, start: int, end: int) -> Any:
-    """The list between two places, piece by piece: an array, or a list if it holds more than numbers; None: neither."""
-    parser, parts, at = simdjson.Parser(), [], start
-    while at <= end:
-        cut = text.find(b",", at + _READ, end) if end - at > _READ else -1
-        stop = end if cut < 0 else cut
-        try:
-            found: Any = parser.parse(b"[%b]" % bytes(text[at:stop]))
-            parts.append(np.frombuffer(found.as_buffer(of_type="d")))
-            del found
-        except (ValueError, TypeError, RuntimeError):  # a word, a null, no number at all; 1e400, which json reads
-            try:
-                values = decode(b"[%b]" % bytes(text[start:end]), large=True)
-            except RequestError:
-                return None
-            return None if any(isinstance(value, (list, dict)) for value in values) else values
-        at = stop + 1
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+def _numbers(parser: simdjson.Parser, text: bytearray) -> Any:
+    """A list of numbers as an array; None for anything else, such as 1e400, which json reads."""
+    with suppress(ValueError, TypeError, RuntimeError):
+        found: Any = parser.parse(text)
+        return np.frombuffer(found.as_buffer(of_type="d"))
+    return None
 
 
-class _Row(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    mu0: float
-    Fz: float
-    k: float | Literal["rigid"]
-    y0: float
-    v0: float
-    omega: float | None = None
-    f: float | None = None
-
-
-_decode_rows = msgspec.json.Decoder(list[_Row]).decode
+_OPENS_LIST = re.compile(rb"\s*\[")
 _BETWEEN = re.compile(rb"\}\s*,")
 
 
-def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns | None:
-    """Rows of numbers with the same six names; None for any other text.
+@cache
+def _row_of(names: tuple[str, ...]) -> tuple[Callable[[bytes], list[Any]], Callable[[Any], tuple[Any, ...]]]:
+    """How rows of numbers with these names are read, and their values taken."""
+    kinds: Any = [(name, float | Literal["rigid"] if name == "k" else float) for name in names]
+    row = msgspec.defstruct("Row", kinds, forbid_unknown_fields=True, gc=False)
+    return msgspec.json.Decoder(list[row]).decode, attrgetter(*names)  # type: ignore[valid-type]
 
-    The text is read piece by piece.  A piece that does not end between two objects is no JSON.
+
+def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns | None:
+    """Rows of numbers with the same names; None for any other text.
+
+    The text is read piece by piece.  A piece that does not end between two rows is no JSON.
     """
-    start, stop = text.find(b"[") + 1, text.rfind(b"]")
-    parts: list[np.ndarray[Any, Any]] = []
-    hertz: bool | None = None
-    size = 0
-    while start < stop:
-        cut = _BETWEEN.search(text, start + _READ, stop)
-        end = cut.start() + 1 if cut else stop
+    asked = asked_of((), kind)
+    hertz = b'"f"' in text[:_SHORT]
+    names = tuple("f" if hertz and name == "omega" else name for name in asked.fields)
+    decode_rows, values = _row_of(names)
+    parts: list[Any] = []
+    at = size = 0
+    while at < len(text):
+        cut = _BETWEEN.search(text, at + _READ)
+        piece = (b"[" if at else b"") + text[at : cut.start() + 1 if cut else None] + (b"]" if cut else b"")
         try:
-            rows = _decode_rows(b"[%b]" % bytes(text[start:end]))
+            rows = decode_rows(piece)
         except (msgspec.MsgspecError, ValueError, RecursionError):
             return None
-        colons = text.count(b":", start, end)
-        start = cut.end() if cut else stop
-        if not rows or colons != 6 * len(rows):  # a member twice, or null
+        if not rows or piece.count(b":") != len(names) * len(rows):  # a member twice
             return None
-        given_f = rows[0].f is not None
-        if hertz is not None and hertz != given_f:
-            return None
-        hertz = given_f
         size += len(rows)
         if size > max_batch:
             raise too_large(max_batch)
         try:
-            parts.append(_arrays(rows, "f" if given_f else "omega"))
-        except TypeError:  # omega in one row, f in another
-            return None
-    if not text[: text.find(b"[")].strip() == b"" == text[stop + 1 :].strip() or not parts:
-        return None
+            flat = array("d", chain.from_iterable(map(values, rows)))
+        except TypeError:
+            every = chain.from_iterable(map(values, rows))
+            flat = array("d", (math.inf if value == "rigid" else value for value in every))
+        parts.append(np.frombuffer(flat).reshape(len(rows), -1).T)
+        at = cut.end() if cut else len(text)
     six = np.concatenate(parts, axis=1)
     if hertz:
-        with np.errstate(over="ignore"):
-            six[4] *= RAD_PER_CYCLE
-    return Columns(size, list(six), hertz=bool(hertz), rows=True, asked=asked_of((), kind))
-
-
-def _arrays(rows: list[_Row], frequency: str) -> np.ndarray[Any, Any]:
-    """The six columns of rows, (6, n)."""
-    try:
-        flat = array("d", chain.from_iterable(map(attrgetter("mu0", "Fz", "k", "y0", frequency, "v0"), rows)))
-        return np.frombuffer(flat).reshape(len(rows), 6).T
-    except TypeError:
-        for row in rows:
-            if row.k == "rigid":
-                row.k = math.inf
-        flat = array("d", chain.from_iterable(map(attrgetter("mu0", "Fz", "k", "y0", frequency, "v0"), rows)))
-        return np.frombuffer(flat).reshape(len(rows), 6).T
+        with np.errstate(over="ignore"):  # infinite, which is refused
+            six[names.index("f")] *= RAD_PER_CYCLE
+    return Columns(size, list(six), hertz=hertz, rows=True, asked=asked)
 
 
 def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
@@ -250,9 +203,6 @@ def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
     return Columns(len(found), list(six), reasons, rows=True, asked=asked)
 
 
-# --- writing ------------------------------------------------------------------------------------------
-
-
 def dump(values: Any) -> bytes:
     """Write JSON; numbers that are not finite become null."""
     return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -264,26 +214,20 @@ def write(batch: Batch) -> Iterator[bytes]:
 
 
 def _write_columns(batch: Batch) -> Iterator[bytes]:
-    size = batch.columns.size
-    whole = {part: np.empty(size, np.int8 if part.names else np.float64) for part in batch.parts}
-    for start, found, source in batch.slices(_ROWS):
-        for part, column in whole.items():
-            column[start : start + source.size] = found[part.path]
-    form, parts = _form(batch, b"[\0]")
-    for opening, part in zip(form, parts, strict=False):
-        yield opening
-        for start in range(0, size, _CELLS):
-            text = _texts(part, whole[part][start : start + _CELLS])
-            yield b"," + text if start else text
+    slices = [found for found, _, _ in batch.slices(_ROWS)]
+    form = _form(batch.parts, b"[\0]")
+    for opening, part in zip(form, batch.parts, strict=False):
+        for found in slices:
+            yield opening + _texts(part, found[part.path])
+            opening = b","
     yield form[-1][:-1] + b"," + dump(batch.end)[1:]
 
 
 def _write_rows(batch: Batch) -> Iterator[bytes]:
-    form, parts = _form(batch, b"\0")
-    row = b"%b".join(text.replace(b"%", b"%%") for text in form)
+    row = b"%b".join(text.replace(b"%", b"%%") for text in _form(batch.parts, b"\0"))
     opening = b'{"results":['
-    for _, found, source in batch.slices(_ROWS):
-        columns = [_texts(part, found[part.path]).split(b",") for part in parts]
+    for found, source, _ in batch.slices(_ROWS):
+        columns = [_texts(part, found[part.path]).split(b",") for part in batch.parts]
         made = [row % cells for cells in zip(*columns, strict=True)] if source.size else []
         for i in np.flatnonzero(source < 0).tolist():
             made[i] = b"null"
@@ -292,13 +236,10 @@ def _write_rows(batch: Batch) -> Iterator[bytes]:
     yield b"]," + dump(batch.end)[1:]
 
 
-def _form(batch: Batch, place: bytes) -> tuple[list[bytes], list[Part]]:
-    """What stands around the values of an answer, and their columns in order; each ``place`` has a zero for a value."""
-    parts = {part.path: part for part in batch.parts}
-    shape = nested({path: path for path in parts})
-    order = [path for inner in shape.values() for path in (inner.values() if isinstance(inner, dict) else [inner])]
-    text = dump(nested(dict.fromkeys(order, "\0"))).replace(b'"\\u0000"', place)
-    return text.split(b"\0"), [parts[path] for path in order]
+def _form(parts: list[Part], place: bytes) -> list[bytes]:
+    """What stands around the values of an answer; each ``place`` has a zero for a value."""
+    text = dump(nested({part.path: "\0" for part in parts}))
+    return text.replace(b'"\\u0000"', place).split(b"\0")
 
 
 def _texts(part: Part, column: Any) -> bytes:
@@ -307,38 +248,32 @@ def _texts(part: Part, column: Any) -> bytes:
         # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
         texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)])
         return bytes(texts.take(column).tobytes().translate(None, b"\0")[:-1])
-    return dump(column if part.kind is float else part.values(column))[1:-1]
+    return dump(column)[1:-1]
 
 
-def _refs(*names: str) -> list[dict[str, Any]]:
-    return [{"$ref": f"#/components/schemas/{name}"} for name in names]
+def _described(kind: str, *names: str, **more: Any) -> dict[str, Any]:
+    """The description of a text that is one of these models, or a list of one, whose name ends with ``[]``."""
+    found: list[dict[str, Any]] = [{"$ref": f"#/components/schemas/{name.removesuffix('[]')}"} for name in names]
+    lists = (
+        {"type": "array", "items": one} if name[-1] == "]" else one for name, one in zip(names, found, strict=True)
+    )
+    return {"schema": {kind: list(lists), **more}}
 
 
-_LIST = {"type": "array", "items": _refs("Case")[0]}
+_MANY = {"example": {**example, "v0": [0.01, 0.1]}}
 FORMS = (
     Form(
-        "application/json",
-        (),
-        read,
-        write,
-        body={"schema": {"oneOf": [*_refs("CaseColumns"), _LIST]}, "example": {**example, "v0": [0.01, 0.1]}},
-        answer={"schema": {"oneOf": _refs("ColumnsAnswer", "RowsAnswer")}},
+        "application/json", (), read, write,
+        body=_described("oneOf", "CaseColumns", "Case[]") | _MANY,
+        answer=_described("oneOf", "ColumnsAnswer", "RowsAnswer"),
     ),
     Form(
-        "application/x-ndjson",
-        ("application/ndjson", "application/jsonl", "application/x-jsonlines"),
-        read,
-        write,
-        body={
-            "schema": {"anyOf": [*_refs("CaseColumns", "Case"), _LIST], "description": "One of these per line"},
-            "example": {**example, "v0": [0.01, 0.1]},
-        },
-        answer={
-            "schema": {
-                "anyOf": _refs("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem"),
-                "description": "One of these per line, in the order of the lines",
-            }
-        },
+        "application/x-ndjson", ("application/ndjson", "application/jsonl", "application/x-jsonlines"), read, write,
+        body=_described("anyOf", "CaseColumns", "Case", "Case[]", description="One of these per line") | _MANY,
+        answer=_described(
+            "anyOf", "ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem",
+            description="One of these per line, in the order of the lines",
+        ),
         streams=True,
     ),
-)
+)  # fmt: skip

@@ -1,0 +1,256 @@
+"""Questions about a range of one input: its friction law, ``/v1/law`` and ``/v1/law.csv``, and ``/v1/solve-for``."""
+
+import csv
+import io
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+from starlette.requests import Request
+from starlette.responses import Response
+
+from mumacro.contact import SPRING
+from mumacro.inputs import field_of, unit_of
+from mumacro.inverse import Solution, solve_for
+from mumacro.law import APPROXIMATIONS, BORDERS, Law, approximations, border_speeds, friction_law, sweep_values
+
+from ..answers import DEFAULT, REGIME_NAMES, Part, answer_columns, nested, parts_of
+from ..models import Answered, default, grouped, included, many, model, optional, told
+from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes, relation
+from ..wire.json import dump
+from . import Asking, Endpoint, in_thread, reply
+
+__all__ = ["ENDPOINTS"]
+
+# --- friction law --------------------------------------------------------------------------------------
+
+MAX_POINTS = 10_001
+# JSON has one kind of number: 55.0 is an integer there, and in a JSON Schema.
+_whole = BeforeValidator(lambda value: int(value) if isinstance(value, float) and value.is_integer() else value)
+_Points = Annotated[int, Field(ge=2, le=MAX_POINTS), _whole]
+_APPROXIMATIONS, _SPEEDS = "approximations", "border_speeds"
+#: the columns that belong to a law beside those of its cases
+_STATIC = Part("mu_static", "-", "Static limit (v0 -> 0) of each case")
+_MORE = (
+    *(Part(f"{_APPROXIMATIONS}.{name}", "-", f"{text}; null: outside that") for name, text in APPROXIMATIONS.items()),
+    *(Part(f"{_SPEEDS}.{name}", "m/s", f"{text}; null: outside that") for name, text in BORDERS.items()),
+)
+_more: Any = model("_LawInclude", "", include=includes(_APPROXIMATIONS, "those of the paper beside the exact values"))
+
+
+class LawOptions(_more, Options):  # type: ignore[misc]
+    """What is asked beside the five other inputs."""
+
+    along: Name = bounded(f"one of {', '.join(NAMES)}", "The swept input", "v0")
+    start: NotNegative = bounded("finite and >= 0", "First value [SI]; > 0 on a logarithmic scale", examples=[1e-4])
+    stop: Positive = bounded("finite and > 0", "Last value [SI], > start", examples=[10.0])
+    points: _Points = bounded(f"a whole number from 2 to {MAX_POINTS}", "Number of values", 201)
+    scale: Literal["log", "linear"] = bounded("log or linear", "Spacing of the values", "log")
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Self:
+        if _APPROXIMATIONS in (self.include or ()) and self.kind != SPRING:
+            raise relation("include", "has approximations, which are those of one spring that oscillates across")
+        if self.scale == "log" and self.start == 0.0:
+            raise relation("start", "must be > 0 on a logarithmic scale; for a range from 0 set scale to linear")
+        if not self.stop > self.start:
+            raise relation("stop", f"must be > start, which is {self.start:g}")
+        return self
+
+
+async def post_law(request: Request) -> Response:
+    """Return the law in columns, with its static limit and its border."""
+    found = await Asking.of(request, LawOptions, "along")
+    return await in_thread(request, lambda: reply(_as_json(found)))
+
+
+async def get_law_csv(request: Request) -> Response:
+    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their units."""
+    found = await Asking.of(request, LawOptions, "along")
+    name = f'attachment; filename="friction-law-{found.form.along}.csv"'
+    headers = {"Content-Disposition": name, "Cache-Control": "no-cache"}
+    kind = "text/csv; charset=utf-8; header=present"
+    return await in_thread(request, lambda: reply(_as_csv(found), headers, kind))
+
+
+def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
+    """The library's law and all columns beside the swept input."""
+    (table, form, case, asked), (along, per) = found, field_of(found.form.along)
+    values = sweep_values(along, form.start * per, form.stop * per, form.points, form.scale)
+    law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
+    six = [values if name == along else np.array([case[name]]) for name in asked.fields]
+    answer, _ = answer_columns(table.surrogate, six, values.size, form.names(), form.deviations(), asked)
+    answer[_STATIC.path], parts = law.mu_static, [*parts_of(form.names(), asked), _STATIC]
+    if _APPROXIMATIONS in (form.include or ()):
+        for group, made in ((_APPROXIMATIONS, approximations), (_SPEEDS, border_speeds)):
+            answer |= {f"{group}.{name}": column for name, column in made(table.surrogate, law).items()}
+        parts += _MORE
+    return law, {part: part.values(answer[part.path]) for part in parts}
+
+
+def _as_json(found: Asking) -> bytes:
+    law, columns = _law(found)
+    along, per = found.form.along, field_of(found.form.along)[1]
+    swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
+    border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
+    answer = nested({part.path: column for part, column in columns.items()})
+    return dump({**swept, **answer, "border": border, **found.table.signature})
+
+
+def _as_csv(found: Asking) -> bytes:
+    """The columns in order, texts last, with the path as their name."""
+    law, columns = _law(found)
+    per = field_of(found.form.along)[1]
+    heads = {f"{found.form.along} [{unit_of(found.form.along)}]": (law.values / per).tolist()}
+    for part in sorted(columns, key=lambda part: bool(part.names)):
+        name = part.path.removeprefix(f"{_APPROXIMATIONS}.").replace(f"{_SPEEDS}.", "border_")
+        shown = ["" if value != value else value for value in columns[part]]
+        heads[name if part.names else f"{name} [{part.unit}]"] = shown
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(heads)
+    writer.writerows(zip(*heads.values(), strict=True))
+    return text.getvalue().encode()
+
+
+# --- inverse -------------------------------------------------------------------------------------------
+
+MAX_TARGETS = 10_000
+_NO_LIMIT = 1e300
+_Targets = Annotated[list[NotNegative], Field(min_length=1, max_length=MAX_TARGETS)]
+_Quantity = Literal["mu_macro", "mu_ratio"]
+_listed = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
+
+
+class SolveForOptions(Options):
+    """What is asked beside the five known inputs."""
+
+    unknown: Name = bounded(f"one of {', '.join(NAMES)}", "The input to solve for")
+    target: Annotated[_Targets, _listed] = bounded(
+        f"a number, finite and >= 0, or a list of 1 to {MAX_TARGETS} of them", "Wanted value [-]"
+    )
+    quantity: _Quantity = bounded(
+        "mu_macro or mu_ratio", "What the target is; mu_ratio = mu_macro/mu0 (0.5 halves the friction)", "mu_macro"
+    )
+    range: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = bounded(
+        "two numbers, finite and >= 0, ascending", "Where to search [SI]; left out: wherever it changes mu_macro", None
+    )
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Self:
+        if self.quantity == "mu_ratio" and self.unknown == "mu0":
+            raise relation("quantity", "must be mu_macro where mu0 is the unknown")
+        return self
+
+
+async def post_solve_for(request: Request) -> Response:
+    """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
+    found = await Asking.of(request, SolveForOptions, "unknown")
+    return await in_thread(request, lambda: reply(dump(_solved(found))))
+
+
+def _solved(found: Asking) -> dict[str, Any]:
+    (table, form, case, asked), (name, per) = found, field_of(found.form.unknown)
+    unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
+    within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
+    if asked.interval:  # which is refused, by the name that the user gave
+        case = {**case, "k_range": (case["k_low"], case["k_high"])}
+    solution = solve_for(table.surrogate, name, [x * unit for x in form.target], case, within, **asked.kind.names)
+    reach, more = solution.reach, iter(_included(found, name, solution))
+    results: list[dict[str, Any]] = []
+    for target, roots in zip(form.target, solution.roots, strict=True):
+        in_unit = ({key: getattr(root, key) / per for key in ("value", "low", "high")} for root in roots)
+        shown = [{**root._asdict(), **ends, **next(more)} for root, ends in zip(roots, in_unit, strict=True)]
+        results.append(
+            {"target": target, "roots": shown} | ({} if roots else {"reason": _reason(form, target, solution, unit)})
+        )
+    return {
+        "unknown": form.unknown,
+        "unit": unit_of(form.unknown),
+        "quantity": form.quantity,
+        "range": [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per],
+        "reachable": {
+            "min": reach.mu_min / unit, "max": reach.mu_max / unit,
+            "min_included": reach.min_included, "max_included": reach.max_included,
+        },
+        "results": results,
+        **table.signature,
+    }  # fmt: skip
+
+
+def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:
+    """The included quantities of every root, in order."""
+    (table, form, case, asked), include = found, found.form.names()
+    values = np.array([root.value for roots in solution.roots for root in roots])
+    if not include or not values.size:
+        return [{}] * values.size
+    six = [values if name == unknown else np.array([case[name]]) for name in asked.fields]
+    answer, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations(), asked)
+    paths = [part.path for part in parts_of(include, asked)[len(DEFAULT) :]]
+    rows = zip(*(answer[path].tolist() for path in paths), strict=True)
+    return [nested(dict(zip(paths, row, strict=True))) for row in rows]
+
+
+def _reason(form: SolveForOptions, target: float, solution: Solution, unit: float) -> str:
+    reach = solution.reach
+    low, high = reach.mu_min / unit, reach.mu_max / unit
+    if solution.constant:
+        return f"{form.unknown} has no influence here: {form.quantity} is {low!r} for every value in the range"
+    left, right = "[" if reach.min_included else "(", "]" if reach.max_included else ")"
+    return f"{target!r} is not in the reachable range {left}{low!r}, {high!r}{right}"
+
+
+# --- models --------------------------------------------------------------------------------------------
+
+_EXAMPLE = {**example, "along": "v0", "start": 1e-4, "stop": 10.0, "points": 5}
+del _EXAMPLE["v0"]
+LawRequest = model("LawRequest", "mu_macro over a range of one input.", LawOptions, Five, example=_EXAMPLE)
+BorderMark = model(
+    "BorderMark", "Where continuous sliding begins or ends.", value=told(float, "The swept input [SI]"),
+    mu_macro=told(float, "[-]"),
+)  # fmt: skip
+LawAnswer = model(
+    "LawAnswer", "A friction law in columns.", Answered,
+    along=Name, unit=str, values=told(list[float], "The swept input [SI]"),
+    **default(True), **included(True), **grouped(_MORE, True, "Beside the exact values"),
+    mu_static=told(list[float], _STATIC.described), border=told(many(BorderMark), "Up to two points inside the range"),
+)  # fmt: skip
+_CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "string"}}}}
+_INVERSE = {**example, "unknown": "y0", "target": 0.15}
+del _INVERSE["y0"]
+SolveForRequest = model(
+    "SolveForRequest", "Which value of one input gives a wanted mu_macro.", SolveForOptions, Five, example=_INVERSE,
+    target=told(NotNegative | _Targets, f"Wanted value [-], finite and >= 0: one, or a list of up to {MAX_TARGETS}"),
+)  # fmt: skip
+Root = model(
+    "Root", "One value of the unknown, and the answer there.", value=told(float, "The unknown [SI]"),
+    low=told(float, "From low ..."),
+    high=told(float, "... to high, mu_macro is the target within the table's error bound"),
+    mu_macro=told(float, "Value of the table there [-]"), regime=Literal[tuple(dict.fromkeys(REGIME_NAMES))],
+    **included(False),
+)  # fmt: skip
+TargetAnswer = model(
+    "TargetAnswer", "All values that give one target.", target=float,
+    roots=told(many(Root), "Ascending; more than one where mu_macro is not monotonic (k, Fz, mu0)"),
+    reason=optional(str, "Why there is no root"),
+)  # fmt: skip
+Reachable = model(
+    "Reachable", "Range of mu_macro for all values of the unknown in its range.", min=float, max=float,
+    min_included=told(bool, "false: approached, never reached"), max_included=bool,
+)  # fmt: skip
+SolveForAnswer = model(
+    "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=Name, unit=str, quantity=_Quantity,
+    range=told(list[float | None], "The searched range [SI]; null: without limit"), reachable=Reachable,
+    results=told(many(TargetAnswer), "One per target, in order"),
+)  # fmt: skip
+ENDPOINTS = [
+    Endpoint("/v1/law", "POST", post_law, "mu_macro over a range of one input", LawRequest, LawAnswer),
+    Endpoint(
+        "/v1/law.csv", "GET", get_law_csv, "mu_macro over a range of one input, as a table", LawRequest,
+        content={200: _CSV},
+    ),
+    Endpoint(
+        "/v1/solve-for", "POST", post_solve_for, "The value of one input that gives a wanted mu_macro",
+        SolveForRequest, SolveForAnswer,
+    ),
+]  # fmt: skip
