@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.integrate import quad
 
 from mumacro import Surrogate, batch, contact
 from mumacro.contact import put_rules, rules
+from tests.cases import Array, opened
 from tests.naive import march_ball
 
 KINDS = {"spring": None, "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
@@ -68,27 +69,112 @@ def costs() -> None:
     print(f"(0.05, 0.4): ball, one call {1e6 * ball:.1f} us; quad {1e3 * adaptive:.2f} ms; 300 springs {marched:.2f} s")
 
 
-def errors() -> None:
-    """Every rule against one of the same kind with many nodes, as the kernel uses both: the largest of mu~'s errors."""
-    v, y = points(4000, 2)
-    rng = np.random.default_rng(3)
-    near = 1.5 * (1.0 + 10.0 ** rng.uniform(-6, 0, v.size) * rng.choice([-0.99, 1.0], v.size))
-    steep = 0.33516779066085 * y * (1.0 + 10.0 ** rng.uniform(-9, -1, v.size) * rng.choice([-1.0, 1.0], v.size))
-    v, y = np.concatenate([v, 10.0 ** rng.uniform(-8, 0, v.size), steep]), np.concatenate([y, near, y])
-    s, tightest = Surrogate.open(1e-12), rules(1e-12)
+# --- the errors of the rules --------------------------------------------------------------------------------
 
-    def with_piece(piece: int, points_of_piece: np.ndarray, stated: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        s._data.put_rules([(points_of_piece, stated) if i == piece else rule for i, rule in enumerate(tightest)])
-        return s.ratio_with_bound(v, y, contact="ball")[:2]
+RULES, MANY, HUGE = 5, 160, 1e6  # pieces; nodes of what counts as exact; a constant beside which rounding is nothing
+CLOSE, ABOVE, ALONG_SLOPE = (
+    2,
+    3,
+    6,
+)  # pieces: without a relative error, of oscillation along, too; the place of its slopes
+NAMES = ("mu_ratio", "power", "stick_fraction", "slope along v~", "slope along y~")
 
-    for piece, (own, none) in enumerate(tightest):
-        exact, slack = with_piece(piece, contact.points(piece, 2 * len(own)), 0.0 * none)
-        for tolerance in contact._RULES:
-            value, bound = with_piece(piece, *rules(tolerance)[piece])
-            error, stated = np.abs(value - exact), rules(tolerance)[piece][1][0, 0]
-            i = int(error.argmax())
-            print(f"piece {piece}, {tolerance:g}: {error[i]:.1e} at ({v[i]:.4g}, {y[i]:.7g}), stated {stated:.1e}, "
-                  f"error / bound {np.max(error / (bound + slack)):.2f}")  # fmt: skip
+
+def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
+    """Log-uniform over all of the legal range, and where rules err most: borders, corners, the steepest ray."""
+    rng = np.random.default_rng(seed)
+
+    def decades(low: float, high: float) -> Array:
+        return 10.0 ** rng.uniform(low, high, count)
+
+    def beside(low: float, high: float) -> Array:
+        return 1.0 + decades(low, high) * rng.choice([-0.99, 1.0], count)
+
+    y = decades(-12, 6)
+    pairs = [(y * decades(-25, 0), y)]
+    if along:
+        y = decades(-300, 279)
+        x = np.where(rng.random(count) < 0.5, decades(-12, -0.01), 1.0 - decades(-12, -0.01))
+        first = 1.5 / (np.sqrt((1.0 - x) * (1.0 + x)) - x * np.arccos(x)) * beside(-12, 0)  # reverse slip begins
+        pairs += [(y * decades(-25, 0), y), (x * first, first), (first * (1.0 - decades(-15, 0)), first)]
+        pairs += [(near * decades(-25, 0), near) for near in (beside(-15, 0), 1.5 * beside(-15, 0))]
+    else:
+        border = opened(1e-12).v_tilde_crit
+        small, wide, high = decades(-6, 0.5), decades(-6, 6), decades(-1, 6)
+        pairs += [(decades(-25, 6), decades(-12, 6)), (decades(-300, 279), decades(-300, 279))]
+        pairs += [(small * small * decades(-5, 2), small), (decades(-25, 0.3), 1.5 * beside(-15, 0))]
+        pairs += [
+            (0.33516779066085 * wide * beside(-12, -0.5), wide),
+            (1.5 * border(high / 1.5) * beside(-12, -0.5), high),
+        ]
+    return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))  # type: ignore[return-value]
+
+
+def asked(s: Surrogate, v: Array, y: Array, direction: str, put: list[tuple[Array, Array]]) -> list[Array]:
+    """Rows (values, bounds) of :data:`NAMES` for a ball with these rules."""
+    s._data.put_rules(put)
+    kind = {"contact": "ball", "direction": direction}
+    found = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
+    answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
+    with np.errstate(all="ignore"):
+        return found + [
+            np.array([answer.gradient[n] * x, answer.gradient_bound[n] * x]) for n, x in (("v0", v), ("y0", y))
+        ]
+
+
+def largest(error: Array, scale: Array) -> float:
+    """The largest finite error / scale, of scales that are no underflow and not infinite."""
+    with np.errstate(all="ignore"):
+        share = np.where((scale > 1e-290) & (scale < 1e200), error / scale, 0.0)
+    return float(np.nanmax(np.where(np.isfinite(share), share, 0.0)))
+
+
+def errors(count: int = 15_000) -> None:
+    """Every rule against one with :data:`MANY` nodes, alone in the kernel: what ``mumacro.contact._RULES`` states.
+
+    The kernel's own scales: the bound of a rule whose constant is huge.  Tables without errors leave the bounds that
+    rounding has; what these cover is no error of a rule.
+    """
+    s, none = Surrogate.open(1e-12), np.zeros((2, 8))
+    for code, (polynomials, of_values, of_slopes) in list(s._data.quantities.items()):
+        s._data.put(code, polynomials, 0.0 * of_values, 0.0 * of_slopes)
+    absolute = np.array([np.full(8, HUGE), np.full(8, 1e300)])
+    absolute[1, ALONG_SLOPE] = 0.0  # there both are added, elsewhere the smaller counts
+    alone: list[tuple[Array, Array]] = [(np.zeros((0, 2)), none)] * RULES
+    points_of = {direction: hard_points(count, direction == "along") for direction in ("across", "along")}
+    whole = [np.abs(pair[0]) for pair in asked(s, *points_of["across"], "across", rules(1e-12))]
+
+    def by(direction: str, piece: int, nodes: int, constants: Array) -> list[Array]:
+        alone[piece] = (contact.points(piece, nodes), constants)
+        found = asked(s, *points_of[direction], direction, alone)
+        alone[piece] = (np.zeros((0, 2)), none)
+        return found
+
+    def compared(direction: str, piece: int, nodes: int) -> Iterator[tuple[Array, Array, Array]]:
+        """The errors, and the scales of the absolute and of the relative constant, of :data:`NAMES`."""
+        exact, plain = by(direction, piece, MANY, none), by(direction, piece, nodes, none)
+        scales = (by(direction, piece, nodes, constants) for constants in (absolute, absolute[::-1]))
+        for i, (true, rule, *high) in enumerate(zip(exact, plain, *scales, strict=True)):
+            rounding = 4e-16 * whole[i] if direction == "across" else 4e-15 * np.maximum(np.abs(true[0]), 1.0)
+            error = np.maximum(np.abs(true[0] - rule[0]) - true[1] - rule[1] - rounding, 0.0)
+            yield error, *((bound[1] - rule[1]) / HUGE for bound in high)
+
+    for tolerance, pieces in contact._RULES.items():
+        print(f"    {tolerance!r}: (")
+        for piece, (nodes, *_) in enumerate(pieces):
+            constants = np.array([[largest(error, scale) for scale in both]
+                                  for error, *both in compared("across", piece, nodes)]).T.tolist()  # fmt: skip
+            if piece == CLOSE:
+                constants[1] = []
+            if piece == ABOVE:
+                (mu, *of_mu), _, (stick, of_stick, _), (v, of_v, shares), (y, *_) = compared("along", piece, nodes)
+                relative = largest(v, shares)
+                left = largest(np.maximum(y - 1.5 * relative * shares, 0.0), of_v)
+                constants[0] += [largest(mu, of_mu[0]), left, largest(stick, of_stick)]
+                constants[1] += [largest(mu, of_mu[1]), relative, 0.0]
+            rows = ("(" + ", ".join(f"{1.5 * x:.2g}" for x in row) + ")" for row in constants)
+            print(f"        ({nodes}, {', '.join(rows)}),")
+        print("    ),")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ import mpmath
 import numpy as np
 import pytest
 
+from benchmarks.contacts import NAMES as BALL_NAMES
+from benchmarks.contacts import asked, hard_points
 from builder.measure import fast_from
 from builder.quantities import solver_noise
 from builder.sweep import Sweep
@@ -95,20 +97,28 @@ def test_a_bound_may_not_be_halved_and_is_never_missed(operation: str, coarse: f
     assert median <= widest
 
 
-@pytest.mark.parametrize(
-    ("name", "tolerance"),
-    [("mu_ratio", 1e-4), ("mu_ratio", 1e-7), ("power", 1e-4), ("power", 1e-7), ("stick_fraction", 1e-4)],
-)
-def test_the_rules_of_a_ball_err_as_much_as_they_state(name: str, tolerance: float) -> None:
-    """On the cells of the finest table, in the range in which the rules were measured."""
-    coarse = Surrogate.open(1e-12)
-    coarse._data.put_rules(rules(tolerance))
-
-    def ask(s: Surrogate, v: Array, y: Array) -> Any:
-        return s.quantity(name, np.clip(v, 1e-6, 1e4), np.clip(y, 1e-4, 1e4), contact="ball")[:2]
-
-    worst, _ = shares(ask, coarse, 4000)
-    assert 0.3 < worst <= 1.0
+@pytest.mark.parametrize("direction", ["across", "along"])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
+def test_a_ball_is_never_beyond_its_bounds_and_its_rules_err_as_much_as_they_state(
+    tolerance: float, direction: str
+) -> None:
+    """Over all of the legal range, on a coarse table, and with its rules on the cells of the finest table."""
+    v, y = hard_points(3000, direction == "along", seed=11)
+    truths, found = asked(opened(1e-12), v, y, direction, rules(1e-12)), {}
+    for s in (opened(tolerance), Surrogate.open(1e-12)):
+        rows = zip(BALL_NAMES, asked(s, v, y, direction, rules(tolerance)), truths, strict=True)
+        for name, (value, bound), (truth, left) in rows:
+            error, slope = np.abs(value - truth), name.startswith("slope")
+            assert slope or not np.isnan(value).any()
+            assert np.all((error <= (bound + left) * (1.0 + 1e-12)) | (slope & ~np.isfinite(error))), name
+            share = np.where(bound > 1e-290, (error - left) / np.maximum(bound, 1e-290), 0.0)
+            found[name] = float(np.nanmax(share))
+    wanted = BALL_NAMES if direction == "across" else ("mu_ratio", "stick_fraction")
+    assert min(found[name] for name in wanted) > (0.5 if tolerance > 1e-10 else 0.3)
+    plain = (v > 1e-3) & (v < 1e2) & (y > 1e-2) & (y < 1e2)
+    rows = asked(opened(tolerance), v[plain], y[plain], direction, rules(tolerance))
+    error = np.abs(rows[0][0] - truths[0][0][plain])
+    assert direction == "along" or tolerance < 1e-4 or np.median(rows[0][1][error > 0] / error[error > 0]) < 100.0
 
 
 @pytest.mark.parametrize("name", ["v0", "y0", "mu0"])

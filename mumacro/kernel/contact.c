@@ -18,9 +18,11 @@ enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y, MU_ERROR_ALONG, MU_ERROR_ALONG_SL
 #define MU_STEEPEST_Y 1.29079076185
 #define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
 
-/* The springs that the rules take: v~, y~, s and share of the load of each; pieces from first[k] to first[k + 1]. */
+/* The springs that the rules take: v~, y~, s and share of the load of each; pieces from first[k] to first[k + 1], and
+ * between the values edge[k] and edge[k + 1] of 1 - xi. */
 typedef struct {
     int n, first[MU_RULES + 1];
+    double edge[MU_RULES + 1];
     double v[MU_CHUNK], y[MU_CHUNK], s[MU_CHUNK], share[MU_CHUNK];
 } mu_springs;
 
@@ -52,7 +54,7 @@ MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s
 
 /* The springs of one piece, between two values of 1 - xi. */
 static void mu_take_piece(const mumacro_rule *rule, double from, double to, double v, double y, mu_springs *out) {
-    const double length = from - to, least = mu_max(v, y) / 1e300;
+    const double length = from - to, least = mu_max(mu_max(v, y), 1.0) / 1e300;
     for (int64_t i = 0; length > 0.0 && i < rule->nodes && out->n < MU_CHUNK; ++i) {
         const double rest = to + length * rule->points[2 * i], s = mu_max(rest * (2.0 - rest), least);
         const int n = out->n++;
@@ -65,7 +67,10 @@ static void mu_take_piece(const mumacro_rule *rule, double from, double to, doub
 
 static void mu_springs_of(const mumacro_data *data, double v, double y, mu_springs *out) {
     const double corner = mu_outside(y / MU_MIDDLE);
-    double edge[MU_RULES + 1] = {1.0, corner, corner, corner, corner, 0.0};
+    double *edge = out->edge;
+    for (int k = 1; k < MU_RULES; ++k) edge[k] = corner;
+    edge[0] = 1.0;
+    edge[MU_RULES] = 0.0;
     out->n = 0;
     if (v < MU_STEEPEST * y) {
         double entry, leave;
@@ -84,11 +89,27 @@ static void mu_springs_of(const mumacro_data *data, double v, double y, mu_sprin
     out->first[MU_RULES] = out->n;
 }
 
-/* What quadrature may leave out of a piece whose springs carry `load`: of the integral of a share of the load, or of
- * another quantity (share 0) whose absolute value has the integral `sum`. */
-static double mu_left_out(const mumacro_rule *rule, int error, double sum, double load, int share) {
-    const double least = share ? mu_min(sum, fabs(load - sum) + 1e-13) : sum;
-    return mu_min(rule->errors[0][error], rule->errors[1][error] * least);
+/* What a rule may leave out: its error of `scale`, or that of `least`, a measure of what it integrates, where one holds
+ * at any v~ and y~.  That is not so from y~ = 1 on: mu~ falls within (v~/y~)^(2/3) of it, more steeply than any rule
+ * follows. */
+static double mu_left_out(const mumacro_data *data, int piece, int error, double scale, double least, double y) {
+    const mumacro_rule *rule = &data->rules[piece];
+    const double most = rule->errors[0][error] * scale;
+    if (piece == MU_CLOSE || (piece == MU_ABOVE && !(y > 1.1 * MU_MIDDLE))) return most;
+    return mu_min(most, rule->errors[1][error] * least);
+}
+
+/* The smaller of what a piece carries and what it lacks of its load. */
+static double mu_least_share(double sum, double load) {
+    return mu_min(sum, fabs(load - sum) + 4.0 * MU_ROUNDING * load);
+}
+
+/* The slope along y~ is not a share of the load: beside y~ = 1 it grows like the load per length of the piece, squared,
+ * and over its xi, down to the root of y~'s last digit. */
+static double mu_slope_scale(const mu_springs *c, int piece, double load) {
+    const double from = c->edge[piece], to = c->edge[piece + 1], density = load / (from - to);
+    if (!(from > to) || (piece != MU_BELOW && piece != MU_CLOSE)) return load;
+    return density * density / mu_max(1.0 - 0.5 * (from + to), 1e-8);
 }
 
 /* The static limit, y~ < 1.5: sqrt(1 + e) (E - e K) with e = y~/1.5 and elliptic integrals of the parameter
@@ -148,11 +169,13 @@ static mu_answer mu_ball_answer(const mumacro_data *data, int quantity, double v
             errors += share * bound[i];
         }
         out.value += sum;
-        out.bound += errors + mu_left_out(&data->rules[k], quantity, sum, load, quantity != MU_POWER);
+        out.bound += errors + mu_left_out(data, k, quantity, load, quantity == MU_POWER ? sum : mu_least_share(sum, load), y);
     }
     out.bound += MU_ROUNDING * out.value;
-    if (quantity == MU_STICK && fabs(v - MU_STEEPEST * y) < 0.01 * v) /* whether a spring sticks at all is not known */
-        out.bound += 4.0 * mu_border_error(data);
+    if (quantity == MU_STICK) { /* whether a spring sticks at all is not known next to the border */
+        const double off = mu_border_error(data), crit = mu_ball_border(data, y);
+        if (fabs(v - MU_STEEPEST * y) < 0.01 * v || fabs(v - crit) < 2.0 * off * v) out.bound += 4.0 * off;
+    }
     out.value = mu_min(out.value, MU_QUANTITY[quantity].most);
     return out;
 }
@@ -199,20 +222,20 @@ static mu_slopes mu_ball_slopes(const mumacro_data *data, double v, double y) {
     mu_slopes_of_points(data, MU_MU_RATIO, c.n, c.v, c.y, rows, MU_CHUNK);
     out.bound = MU_ROUNDING;
     for (int k = 0; k < MU_RULES; ++k) {
-        double load = 0.0, along_v = 0.0, along_y = 0.0;
+        double load = 0.0, sum = 0.0, along_y = 0.0;
         for (int i = c.first[k]; i < c.first[k + 1]; ++i) {
             const double share = c.share[i];
             load += share;
-            out.value += share * rows[i];
+            sum += share * rows[i];
             out.along_v += share * rows[MU_CHUNK + i];
             out.along_y += share * rows[2 * MU_CHUNK + i];
             out.bound_v += share * rows[3 * MU_CHUNK + i];
             out.bound_y += share * rows[4 * MU_CHUNK + i];
-            along_v += share * fabs(rows[MU_CHUNK + i]);
             along_y += share * fabs(rows[2 * MU_CHUNK + i]);
         }
-        out.bound_v += mu_left_out(&data->rules[k], MU_ERROR_V, along_v, load, 0);
-        out.bound_y += mu_left_out(&data->rules[k], MU_ERROR_Y, along_y, load, 0);
+        out.value += sum;
+        out.bound_v += mu_left_out(data, k, MU_ERROR_V, load, mu_least_share(sum, load), y);
+        out.bound_y += mu_left_out(data, k, MU_ERROR_Y, mu_slope_scale(&c, k, load), along_y, y);
     }
     return out;
 }
@@ -233,18 +256,21 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
     mu_driven out = {mu_line_at(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0};
     const mu_line *line = &out.line;
     const double near = 2.0 * MU_ROUNDING, size = 1.0 + fabs(line->along_v) + fabs(line->along_y);
-    double gap, off, root, jump;
+    double gap, turn, m, off, root, jump;
     mu_turning at;
     if (line->source < 0 || line->source == MU_NO_OSCILLATION || v > y * (1.0 + near)) return out;
     gap = mu_max((y - v) / y, near);
     at = mu_turning_of(mu_min(v, y * (1.0 - near)), y);
     /* nearer than that the deficit is at most y~ c^4 / 9 pi times 81/16, or 2 c / pi */
     out.bound = gap > near ? MU_LINE_ROUNDING * size : mu_min(4.0 * y * near * near, sqrt(near));
-    off = MU_ROUNDING * (2.0 + 2.0 * y * at.sine + 2.0 * v * at.c);
-    root = direction == MU_ALONG && y * at.travel > 2.0 - off ? off / sqrt(mu_max(y * at.travel - 2.0, off)) : 0.0;
-    jump = direction == MU_ALONG && fabs(y * at.travel - 2.0) < off ? v + y : 0.0;
-    out.bound_v = 4.0 * MU_ROUNDING * size / gap + jump * at.c + v * root;
-    out.bound_y = 4.0 * MU_ROUNDING * size / gap + jump * at.sine + (v + 1.0) * root;
+    /* reverse slip begins at 2/y~ = D/y~, both known to `off` of the latter; m follows like a root */
+    turn = at.travel - 2.0 / y;
+    off = MU_ROUNDING * (2.0 / y + 2.0 * at.sine + 2.0 * at.x * at.c);
+    m = MU_PI * line->stick;
+    root = direction == MU_ALONG && turn > -off ? 2.0 * m / at.c * off / sqrt(at.travel * mu_max(turn, off)) : 0.0;
+    jump = direction == MU_ALONG && fabs(turn) < off ? v + y : 0.0;
+    out.bound_v = 4.0 * MU_ROUNDING * size / gap + jump * at.c + v * m * root;
+    out.bound_y = 4.0 * MU_ROUNDING * size / gap + jump * at.sine + (v * m + 1.0) * root;
     out.power_bound = v * out.bound + 4.0 * MU_ROUNDING * (line->power + v + 1.0);
     out.stick_bound = 4.0 * MU_ROUNDING / gap + root;
     return out;
@@ -255,7 +281,8 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     mu_driven out = mu_drive_spring(MU_ALONG, v, y);
     mu_turning at;
     mu_springs c;
-    double reversed, still, load, slopes = 0.0, h, deficit;
+    double reversed, still, load, h, deficit, rest = 0.0, slopes = 0.0;
+    const double (*errors)[8] = data->rules[MU_ABOVE].errors;
     if (out.line.source < 0 || out.line.source == MU_NO_OSCILLATION || !(v < y) || !(y < MU_HUGE)) return out;
     at = mu_turning_of(v, y);
     reversed = mu_outside(0.5 * at.travel * y / MU_MIDDLE);
@@ -277,18 +304,19 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
         out.line.along_v += c.share[i] * line.along_v;
         out.line.along_y += c.share[i] * line.along_y;
         out.line.stick += c.share[i] * line.stick;
-        out.line.power += c.share[i] * mu_max(y * at.travel - 2.0 * MU_MIDDLE * c.s[i], 0.0) / MU_PI;
         slopes += c.share[i] * (fabs(line.along_v) + fabs(line.along_y));
+        rest += c.share[i];
+        out.line.power += c.share[i] * mu_max(y * at.travel - 2.0 * MU_MIDDLE * c.s[i], 0.0) / MU_PI;
     }
     out.line.mu = mu_min(mu_max(out.line.mu, 0.0), 1.0);
     out.line.power += v * (1.0 - out.line.mu);
     out.line.source = v == 0.0 ? MU_STATIC_LIMIT : MU_ALONG_REVERSES;
-    out.bound += mu_left_out(&data->rules[MU_ABOVE], MU_ERROR_ALONG, out.line.mu, 1.0 - load, 0);
-    slopes = mu_left_out(&data->rules[MU_ABOVE], MU_ERROR_ALONG_SLOPE, slopes, 1.0 - load, 0);
+    out.bound += mu_min(errors[0][MU_ERROR_ALONG] * rest, errors[1][MU_ERROR_ALONG] * out.line.mu);
+    slopes = errors[0][MU_ERROR_ALONG_SLOPE] * rest + errors[1][MU_ERROR_ALONG_SLOPE] * slopes;
     out.bound_v += slopes;
     out.bound_y += slopes;
     out.power_bound += v * out.bound + MU_ROUNDING * y;
-    out.stick_bound += data->rules[MU_ABOVE].errors[0][MU_ERROR_ALONG_STICK];
+    out.stick_bound += errors[0][MU_ERROR_ALONG_STICK] * rest;
     return out;
 }
 

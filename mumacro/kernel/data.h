@@ -13,9 +13,10 @@ typedef struct {
 } mumacro_cells;
 
 /* Quadrature over one piece of a ball: points (nodes, 2), the share of the piece beyond a node, and its weight;
- * the largest errors found, absolute and relative to the smaller of the integral and what it lacks of the piece's load:
- * of mu~, power, stick fraction, of both slopes; for oscillation along the sliding direction of mu~, of slopes, of
- * the stick fraction. */
+ * the largest errors, times the load of the piece, and times the smaller of mu~'s integral and what it lacks of that
+ * load, of which the smaller counts: of mu~, power (relative to power), stick fraction, slopes along v~ and along y~
+ * (absolute: times mu_slope_scale; relative to its absolute value); for oscillation along the sliding direction of mu~
+ * (relative to it), of slopes (the sum of both, relative to their absolute values), of the stick fraction (absolute). */
 typedef struct {
     int64_t nodes;
     const double *points;

@@ -137,7 +137,7 @@ static mu_reverse mu_reverse_at(const mu_turning *at, double m) {
     if (!(arc.sine > 0.0 && cosine <= 1.0)) return out;
     root = sqrt((1.0 - cosine) * (1.0 + cosine));
     apart = at->x * more * (at->x + cosine) / (at->sine + root); /* sin c - sin(c - p) */
-    turn = at->x - arc.cosine * cosine;
+    turn = at->x * (arc.versed - arc.cosine * more);
     out.p = mu_arcsine(mu_min(at->x * (more * at->sine + apart), 1.0));
     out.bent = arc.bent / arc.sine;
     out.left = apart + arc.versed * root - out.p * at->x;
@@ -151,12 +151,13 @@ static mu_reverse mu_reverse_of(const mu_turning *at, double a) {
     for (int i = 0; i < 100; ++i) {
         const mu_reverse found = mu_reverse_at(at, m);
         const double off = found.left - 2.0 / a;
-        double next = m - off / found.slope;
+        double next = m - off / found.slope, step;
         if (off > 0.0 || !(found.slope > 0.0)) high = m;
         else low = m;
-        if (!(next > low && next < high)) next = 0.5 * (low + high);
-        if (fabs(next - m) <= 1e-10 * m) break;
+        if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+        step = fabs(next - m);
         m = next;
+        if (step <= 1e-10 * m) break;
     }
     return mu_reverse_at(at, m);
 }
@@ -182,7 +183,8 @@ static mu_line mu_line_of_reverse(const mu_turning *at, double v, double a, cons
     const double sweep = 2.0 / MU_PI * (at->b + p); /* of rigid contact, for p = 0 */
     double layers; /* what stick adds */
     mu_line out;
-    if (at->x < 0.5) layers = a * (at->x * (both - 2.0 * found->bent) - 2.0 * p * at->sine);
+    if (a > 1e100) layers = 0.0; /* to rounding, while m^3 underflows */
+    else if (at->x < 0.5) layers = a * (at->x * (both - 2.0 * found->bent) - 2.0 * p * at->sine);
     else layers = mu_way_in_stick(at, a, m - p, -1.0) - mu_way_in_stick(at, a, m + p, 1.0);
     out.mu = mu_min(mu_max(sweep + layers / (2.0 * MU_PI), 0.0), 1.0);
     out.along_v = v * both / (2.0 * MU_PI);
