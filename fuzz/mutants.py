@@ -70,7 +70,7 @@ FAULTS = [Fault(*row) for row in (
     (C + "dimensional.c", "== HUGE_VAL) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT", "== HUGE_VAL) return mu_case_of(1.0, 0.0, MU_STATIC_LIMIT", "tests/test_dimensional.py -k precision"),
     (C + "dimensional.c", "if (!(in->y0 >= 0.0 &&", "if (!(in->y0 >= -1.0 &&", "tests/test_dimensional.py -k illegal"),
     (C + "arithmetic.c", "return mu_scale(above / below, i + j - k - l - m)", "return mu_scale(above / below, i + j - k - l + m)", "tests/test_dimensional.py -k groups"),
-    (C + "closed_forms.c", "if (r < 0.2) {", "if (r < 2.0) {", "tests/test_extremes.py tests/test_surrogate.py -k power"),
+    (C + "closed_forms.c", "if (r < 0.2) {", "if (r < 2.0) {", "tests/test_committed_tables.py -k fresh_solves -m ''"),
     (C + "closed_forms.c", "out.first = k * q;", "out.first = k * q * (1.0 + 1e-13);", "tests/test_dimensional.py tests/test_tight_bounds.py -k 'rigid or six_inputs'"),
     (C + "charts.c", "for (int i = 0; i < 3; ++i) {\n        const double slope = 3.0", "for (int i = 0; i < 1; ++i) {\n        const double slope = 3.0", "tests/test_charts.py tests/test_bounds.py -k 'place or corner or inverse'"),
     (C + "charts.c", "root = sqrt(y), rho = v / at.crit", "root = y, rho = v / at.crit", "tests/test_border.py tests/test_passes.py tests/test_charts.py"),
