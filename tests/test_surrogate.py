@@ -117,6 +117,13 @@ def test_companions_at_the_ends_of_the_quadrant(
     assert 0.0 < off < bound if bound else off == 0.0
 
 
+def test_creep_at_large_amplitude_has_no_step_where_its_formula_changes(table: Surrogate) -> None:
+    y = np.geomspace(1e6, 1e60, 20)
+    below, above = (table.mu_ratio(1e-100 * y * side, y) / side for side in (1.0 - 1e-12, 1.0 + 1e-12))
+    assert np.all(below > 0.0)
+    assert below == close(above, rel=1e-11)
+
+
 def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: Surrogate) -> None:
     rng = np.random.default_rng(8)
     v, y = log_uniform(rng, 1e-100, 1e100, 50_000), log_uniform(rng, 1e-100, 1e100, 50_000)
