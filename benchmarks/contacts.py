@@ -72,11 +72,8 @@ def costs() -> None:
 # --- the errors of the rules --------------------------------------------------------------------------------
 
 RULES, MANY, HUGE = 5, 160, 1e6  # pieces; nodes of what counts as exact; a constant beside which rounding is nothing
-CLOSE, ABOVE, ALONG_SLOPE = (
-    2,
-    3,
-    6,
-)  # pieces: without a relative error, of oscillation along, too; the place of its slopes
+CLOSE, ABOVE = 2, 3  # CLOSE has no relative error; ABOVE has constants of oscillation along, too
+ALONG_SLOPE = 6  # the place of the slopes of oscillation along
 NAMES = ("mu_ratio", "power", "stick_fraction", "slope along v~", "slope along y~")
 
 
@@ -88,7 +85,7 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
         return 10.0 ** rng.uniform(low, high, count)
 
     def beside(low: float, high: float) -> Array:
-        return 1.0 + decades(low, high) * rng.choice([-0.99, 1.0], count)
+        return np.asarray(1.0 + decades(low, high) * rng.choice([-0.99, 1.0], count))
 
     y = decades(-12, 6)
     pairs = [(y * decades(-25, 0), y)]
@@ -113,7 +110,7 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
 def asked(s: Surrogate, v: Array, y: Array, direction: str, put: list[tuple[Array, Array]]) -> list[Array]:
     """Rows (values, bounds) of :data:`NAMES` for a ball with these rules."""
     s._data.put_rules(put)
-    kind = {"contact": "ball", "direction": direction}
+    kind: Any = {"contact": "ball", "direction": direction}
     found = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
     answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
     with np.errstate(all="ignore"):
