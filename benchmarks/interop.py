@@ -5,16 +5,15 @@ PyTorch is measured where it is installed.  Times in brackets are of the release
 
 from __future__ import annotations
 
-from benchmarks.measuring import main, markdown, quantity  # isort: split
+from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
+import functools
 import importlib.util
 import subprocess
 import sys
 import tempfile
-import timeit
 from collections.abc import Callable
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import casadi
@@ -36,10 +35,14 @@ long long ratio_n_in(void) { return 2; }
 Way = tuple[Callable[..., Any], Callable[..., Any], Callable[[float], Any]]
 
 
-def best(call: Callable[[], Any], number: int) -> float:
-    """Least processor time of a call [s] in nine rounds."""
-    call()
-    return min(timeit.repeat(call, number=number, repeat=9, timer=process_time)) / number
+def repeated(number: int, call: Callable[..., Any], *arguments: Any) -> Callable[[], None]:
+    """The call that many times."""
+
+    def run() -> None:
+        for _ in range(number):
+            call(*arguments)
+
+    return run
 
 
 def loop(step: Callable[[Any], Any], start: Any) -> Any:
@@ -65,8 +68,9 @@ def in_torch(table: mumacro.Surrogate) -> Way:
     from mumacro.torch import Friction
 
     ratio = Friction(table).mu_ratio
-    half = torch.tensor(0.5, dtype=torch.float64)
-    return ratio, torch.as_tensor, lambda c: loop(lambda x: ratio(x, half), torch.tensor(c, dtype=torch.float64))
+    made = functools.partial(torch.as_tensor, dtype=torch.float64)
+    half = made(0.5)
+    return ratio, made, lambda c: loop(lambda x: ratio(x, half), made(c))
 
 
 def in_casadi(table: mumacro.Surrogate) -> Way:
@@ -95,15 +99,20 @@ def interop(quick: bool) -> str:
         "CasADi": in_casadi(table),
         "scipy.special.ellipk": (lambda v, _: ellipk(v), lambda x: x, lambda c: loop(ellipk, c)),
     }
-    rows = []
-    for name, (call, made, steps) in ways.items():
-        one, many, all_points = ([made(x[:size] if size else float(x[0])) for x in (v, y)] for size in (0, 1000, n))
-        figures = [best(lambda: call(*one), 200) * 1e6, best(lambda: call(*many), 20) * 1e6]  # noqa: B023
-        figures += [best(lambda: call(*all_points), 1) / n * 1e9, best(lambda: steps(0.1), 1) * 1e3]  # noqa: B023
-        before = (BEFORE.get((name, i)) for i in range(4))
-        told = (quantity(x) + (f" ({old})" if old else "") for x, old in zip(figures, before, strict=True))
-        rows.append([name, *told])
-    return markdown(["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"], rows)
+    rows = {name: [name] for name in ways}
+    for i, (points, number, unit) in enumerate([(0, 2000, 1e6), (1000, 200, 1e6), (n, 1, 1e9 / n), (None, 1, 1e3)]):
+        work = {}
+        for name, (call, made, steps) in ways.items():
+            if points is None:
+                work[name] = repeated(number, steps, 0.1)
+            else:
+                work[name] = repeated(number, call, *(made(x[:points] if points else float(x[0])) for x in (v, y)))
+        for name, seconds in best_of(15, work, "processor").best.items():
+            before = BEFORE.get((name, i))
+            rows[name].append(quantity(seconds / number * unit) + (f" ({before})" if before else ""))
+    return markdown(
+        ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"], list(rows.values())
+    )
 
 
 if __name__ == "__main__":

@@ -119,6 +119,8 @@ def _in_batch(info: Any, dims: Any, x: Any, table: int, code: int, order: int) -
 
 torch.library.define("mumacro::derivatives", "(Tensor x, int table, int code, int order) -> Tensor")
 torch.library.impl("mumacro::derivatives", "CompositeExplicitAutograd")(_on_host)
+# _derivatives has decided on autograd; asking again takes a third of a scalar call
+torch.library.impl("mumacro::derivatives", "Autograd")(torch.library.fallthrough_kernel)
 torch.library.register_fake("mumacro::derivatives")(_in_graph)
 torch.library.register_vmap("mumacro::derivatives", _in_batch)
 _OPERATOR = torch.ops.mumacro.derivatives.default
