@@ -6,6 +6,8 @@ import re
 import shutil
 import time
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 PATIENCE_S = 120  # a browser on a busy machine can be slow
 #: the case that the page starts with
@@ -18,7 +20,7 @@ RECORDED = """(path, options = {}) => {
 }"""
 
 
-def start(folder):
+def start(folder: Path) -> Any:
     """A separate browser that can connect to this machine only; its files are in the folder.
 
     Raises
@@ -51,10 +53,19 @@ def start(folder):
 class Opened:
     """Opens a state of the page by its address; loads a new document only if needed."""
 
-    def __init__(self, browser, url):
+    def __init__(self, browser: Any, url: Any) -> None:
         self.browser, self.url, self.shown = browser, url, None
 
-    def __call__(self, address="", width=1400, height=1000, url=None, path="", new=False, wait=True):
+    def __call__(
+        self,
+        address: str = "",
+        width: int = 1400,
+        height: int = 1000,
+        url: Any = None,
+        path: str = "",
+        new: bool = False,
+        wait: bool = True,
+    ) -> Any:
         wanted = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
         if new or wanted != self.shown or path:
@@ -76,7 +87,7 @@ class Opened:
         return page
 
     @contextmanager
-    def faked(self, function, address="", **size):
+    def faked(self, function: Any, address: str = "", **size: Any) -> Any:
         """The page with a function in the place of ``fetch`` from its first question on; ``real`` is the true one."""
         source = f"const real = window.fetch; window.fetch = {function};"
         added = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
@@ -90,20 +101,20 @@ class Opened:
 class Page:
     """The page as a user sees it."""
 
-    def __init__(self, browser, url):
+    def __init__(self, browser: Any, url: Any) -> None:
         self.browser, self.url = browser, url
 
     @staticmethod
-    def rounded(value, digits=4):
+    def rounded(value: Any, digits: int = 4) -> Any:
         """A number as the page shows it."""
         return float(f"{value:.{digits - 1}e}")
 
-    def run(self, script):
+    def run(self, script: Any) -> Any:
         return self.browser.execute_async_script(
             f"const done = arguments[arguments.length - 1]; (async () => {{ {script} }})().then(done);"
         )
 
-    def settle(self):
+    def settle(self) -> Any:
         """Wait until every request that follows from the state is answered, and what follows is drawn."""
         self.run(
             "while (document.getElementById('main')?.dataset.asking !== 'false')"
@@ -112,7 +123,7 @@ class Page:
         )
         return self
 
-    def until(self, found, told):
+    def until(self, found: Any, told: Any) -> Any:
         """What ``found()`` is as soon as it is true."""
         deadline = time.monotonic() + PATIENCE_S
         while not (value := found()):
@@ -120,38 +131,38 @@ class Page:
             time.sleep(0.03)
         return value
 
-    def find(self, selector):
+    def find(self, selector: str) -> Any:
         return self.browser.find_element("css selector", selector)
 
-    def count(self, selector):
+    def count(self, selector: str) -> Any:
         return len(self.browser.find_elements("css selector", selector))
 
-    def text(self, selector):
+    def text(self, selector: str) -> Any:
         return self.run(f"return document.querySelector({selector!r}).textContent;")
 
-    def texts(self, selector):
+    def texts(self, selector: str) -> Any:
         return self.run(f"return [...document.querySelectorAll({selector!r})].map((one) => one.textContent);")
 
-    def number(self, selector="#mu"):
+    def number(self, selector: str = "#mu") -> Any:
         return float(self.text(selector))
 
-    def shown(self):
+    def shown(self) -> Any:
         """Names and values beside the result."""
         return dict(zip(self.texts("dt"), self.texts("dd"), strict=True))
 
-    def value(self, selector):
+    def value(self, selector: str) -> Any:
         return self.find(selector).get_property("value")
 
-    def wait_for(self, selector, pattern):
+    def wait_for(self, selector: str, pattern: Any) -> Any:
         return self.until(
             lambda: re.search(pattern, self.text(selector)),
             lambda: f"{selector} is {self.text(selector)!r}, not {pattern}",
         )
 
-    def wait_until_shown(self, selector):
+    def wait_until_shown(self, selector: str) -> None:
         self.until(lambda: self.find(selector).is_displayed(), lambda: f"{selector} does not appear")
 
-    def type(self, selector, text, commit=True):
+    def type(self, selector: str, text: str, commit: bool = True) -> None:
         from selenium.webdriver import Keys
 
         field = self.find(selector)
@@ -159,47 +170,47 @@ class Page:
         if commit:
             self.press(selector, "ENTER")
 
-    def press(self, selector, *keys):
+    def press(self, selector: str, *keys: Any) -> None:
         from selenium.webdriver import Keys
 
         self.find(selector).send_keys(*(getattr(Keys, key) for key in keys))
         self.settle()
 
-    def choose(self, selector, value, event="change"):
+    def choose(self, selector: str, value: Any, event: str = "change") -> None:
         self.run(
             f"const field = document.querySelector({selector!r}); field.value = {value!r};"
             f"field.dispatchEvent(new Event('{event}', {{ bubbles: true }}));"
         )
         self.settle()
 
-    def click(self, selector):
+    def click(self, selector: str) -> None:
         self.run(f"document.querySelector({selector!r}).click();")
         self.settle()
 
-    def open_all(self):
+    def open_all(self) -> None:
         self.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
 
-    def is_old(self, selector="#main"):
+    def is_old(self, selector: str = "#main") -> Any:
         return "old" in self.find(selector).get_attribute("class").split()
 
-    def is_red(self, selector):
+    def is_red(self, selector: str) -> Any:
         """Whether a text has the colour of errors, in the light scheme."""
         return self.run(f"return getComputedStyle(document.querySelector({selector!r})).color;") == "rgb(179, 38, 30)"
 
-    def complaints(self):
+    def complaints(self) -> Any:
         log = self.browser.get_log("browser")
         return [entry["message"] for entry in log if entry["level"] in ("SEVERE", "WARNING")]
 
-    def asked(self, path):
+    def asked(self, path: Any) -> Any:
         """The last question to a path, of a page with :data:`RECORDED`."""
         return self.run(f"return window.asked.filter(([path]) => path === '{path}').at(-1)[1];")
 
-    def address(self):
+    def address(self) -> Any:
         """What the address line holds behind "#"; it follows the state with a delay."""
         self.run("await new Promise((next) => setTimeout(next, 250));")
         return self.browser.current_url.partition("#")[2]
 
-    def touched(self, selector, x, y, click=False):
+    def touched(self, selector: str, x: Any, y: Any, click: bool = False) -> None:
         """Move the pointer to a relative position in an element."""
         from selenium.webdriver import ActionChains
 
@@ -211,7 +222,7 @@ class Page:
         (actions.click() if click else actions).perform()
         self.settle()
 
-    def download(self, selector, folder, name):
+    def download(self, selector: str, folder: Path, name: str) -> Any:
         """The text of the file that is downloaded when an element is clicked."""
         behaviour = {"behavior": "allow", "downloadPath": str(folder)}
         self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
@@ -219,7 +230,7 @@ class Page:
         self.until((folder / name).exists, lambda: [path.name for path in folder.iterdir()])
         return (folder / name).read_text("utf-8")
 
-    def scheme(self, name):
+    def scheme(self, name: str) -> None:
         """Switch to the light or dark scheme, and wait until the page has taken it and every colour has changed."""
         media = {"features": [{"name": "prefers-color-scheme", "value": name}]}
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
@@ -231,7 +242,7 @@ class Page:
             "await Promise.allSettled(changes.map((one) => one.finished));"
         )
 
-    def offline(self, state):
+    def offline(self, state: Any) -> None:
         rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
         self.browser.execute_cdp_cmd("Network.enable", {})
         self.browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": state, **rates})

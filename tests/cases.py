@@ -12,6 +12,8 @@ from mumacro import Surrogate
 from mumacro.contact import kind_of
 
 Array = NDArray[np.float64]
+Case = dict[str, Any]  # inputs by name
+Capture = pytest.CaptureFixture[str]
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 UNIT = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "omega": 1.0}  # v~ = v0 and y~ = y0, to the last digit
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)

@@ -1,6 +1,5 @@
 """Shared by the tests: the committed tables, a service with its client, reference values, solvers, the builder."""
 
-import importlib
 import os
 import re
 import socket
@@ -9,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from numpy.typing import NDArray
 
 from builder.sweep import Sweep
 from mumacro import Surrogate
+from tests import browser as browsing
 from tests import serving as servers
 from tests.serving import Server
 
@@ -115,12 +114,11 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 @pytest.fixture(scope="session")
 def open_page(live_server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
     """Opens the page in a headless Chromium (tests/browser.py), if installed."""
-    module = importlib.import_module("browser")
     try:
-        browser = module.start(tmp_path_factory.mktemp("browser"))
+        browser = browsing.start(tmp_path_factory.mktemp("browser"))
     except LookupError as error:
         pytest.skip(str(error))
-    yield module.Opened(browser, live_server.url)
+    yield browsing.Opened(browser, live_server.url)
     browser.quit()
 
 
@@ -145,18 +143,6 @@ def sweep() -> Iterator[Sweep]:
     """Compiled solving of many points at once."""
     with Sweep(workers=2) as started:
         yield started
-
-
-@pytest.fixture(scope="session")
-def naive() -> ModuleType:
-    """The naive solver."""
-    return importlib.import_module("naive")
-
-
-@pytest.fixture(scope="session")
-def compilers() -> ModuleType:
-    """The compilers that are installed."""
-    return importlib.import_module("compilers")
 
 
 @pytest.fixture(scope="session")

@@ -5,10 +5,12 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from benchmarks import measuring, tables_readme
+from tests.cases import Capture
 
 ROOT = Path(__file__).resolve().parent.parent
 Row = dict[str, str]
@@ -35,7 +37,9 @@ def tables(text: str) -> list[list[Row]]:
 # --- results ------------------------------------------------------------------------------------------
 
 
-def test_a_result_is_stored_and_put_between_its_markers(tmp_path: Path, monkeypatch, capsys) -> None:
+def test_a_result_is_stored_and_put_between_its_markers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")
     monkeypatch.setattr(measuring, "PAGES", (page,))
@@ -78,7 +82,7 @@ def check(found: list[list[Row]]) -> None:
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_section_is_a_table_of_finite_numbers(section) -> None:
+def test_a_section_is_a_table_of_finite_numbers(section: Any) -> None:
     check(tables(section()))
 
 

@@ -8,10 +8,10 @@ import pytest
 from builder import steady
 from builder.steady import NOT_CONVERGED, border, solve
 from builder.sweep import Sweep
-from comparing import close
 from mumacro import InputError, Surrogate
 from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL
 from tests.cases import Array, tables
+from tests.comparing import close
 
 table = tables()
 

@@ -13,11 +13,12 @@ from scipy.stats import norm, qmc
 from builder.differences import differences
 from builder.sweep import Sweep
 from builder.verify import CASES, draw
-from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE
 from mumacro.inputs import FIELDS
+from tests import naive
 from tests.cases import CASE, UNIT, Array, log_uniform, opened, tables
+from tests.comparing import close
 
 table = tables()
 
@@ -261,7 +262,7 @@ def test_the_gradient_of_rigid_contact_and_at_rest_is_that_of_the_closed_form(fi
 
 @pytest.mark.slow
 @at_every_place
-def test_the_power_is_that_of_a_plain_time_integration(fine: Surrogate, naive: Any, case: dict[str, float]) -> None:
+def test_the_power_is_that_of_a_plain_time_integration(fine: Surrogate, case: dict[str, float]) -> None:
     answer = fine.evaluate(case)
     v, y, means = answer.v_tilde, answer.y_tilde, []
     for steps in (20_000, 40_000):

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from builder.assemble import ABS_TO_REL
-from comparing import close
 from mumacro import Surrogate
 from mumacro.table import read_table, write_table
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 

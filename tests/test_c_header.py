@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from mumacro import Surrogate, charts
 from mumacro.inputs import BOUNDS, FIELDS
 from mumacro.library import kernels
 from mumacro.table import read_table
+from tests import compilers
 
 pytestmark = pytest.mark.slow
 
@@ -68,7 +70,7 @@ LANGUAGES = {
 
 
 @pytest.fixture(scope="module")
-def folder(tables_dir, tmp_path_factory):
+def folder(tables_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """``one``: all in one header, ``three``: three files; each with a program of two files that include mumacro.h."""
     root = tmp_path_factory.mktemp("c")
     (root / "one").mkdir()
@@ -80,18 +82,18 @@ def folder(tables_dir, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def table(tables_dir):
+def table(tables_dir: Path) -> Any:
     return Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=1)
 
 
 @pytest.fixture(scope="module")
-def build(table, compilers, tmp_path_factory):
+def build(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The driver with the 1e-7 table as a shared library: a function of the compiler and its options."""
     root = tmp_path_factory.mktemp("drivers")
     write_c(table.table, root)
 
     @functools.cache
-    def compiled(name, *options):
+    def compiled(name: str, *options: Any) -> Any:
         out = root / f"driver{len(list(root.glob('*.so')))}.so"
         words = (*compilers.compiler(name), *options, "-shared", "-fPIC", f"-I{root}", DRIVER)
         compilers.run(*words, root / "mumacro.c", root / "mumacro_table.c", "-o", out, "-lm")
@@ -101,7 +103,7 @@ def build(table, compilers, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def flags(repository):
+def flags(repository: Path) -> Any:
     """The options with which the library's kernels are compiled, by level."""
     module = runpy.run_path(str(repository / "hatch_build.py"))
     found = module["levels"](module["own_platform"]())
@@ -109,12 +111,12 @@ def flags(repository):
 
 
 @pytest.fixture(scope="module")
-def best(build, flags):
+def best(build: Any, flags: Any) -> Any:
     """The driver at the level that the library has chosen on this processor."""
     return build("gcc", *flags[kernels[-1].level])
 
 
-def ask(function, n, columns, *arrays):
+def ask(function: Any, n: int, columns: Any, *arrays: Any) -> Any:
     """``function`` of the driver over contiguous arrays."""
     out = np.empty((n, columns) if columns > 1 else n)
     pointer = ctypes.POINTER(ctypes.c_double)
@@ -123,12 +125,12 @@ def ask(function, n, columns, *arrays):
     return out
 
 
-def same(found, expected):
+def same(found: Any, expected: Any) -> Any:
     """Whether two arrays hold the same numbers."""
     return np.array_equal(found, expected, equal_nan=True)
 
 
-def neighbours(x, most=3):
+def neighbours(x: Any, most: int = 3) -> Any:
     """``x`` and the numbers next to it on either side."""
     out = below = above = [np.asarray(x, dtype=np.float64)]
     for _ in range(most):
@@ -137,12 +139,12 @@ def neighbours(x, most=3):
     return np.concatenate(out)
 
 
-def drawn(table, n, seed):
+def drawn(table: Surrogate, n: int, seed: int) -> Any:
     """``n`` points of every kind, shape (2, kinds n)."""
     return np.concatenate([draw(case, n, table, seed) for case, _, _ in CASES], axis=1)
 
 
-def points(table, n, seed):
+def points(table: Surrogate, n: int, seed: int) -> Any:
     """Drawn points; both sides of every seam of blocks, cells, the border and the closed forms; and the extremes."""
     edges = [charts.Y_STICK_LO, 1.0, charts.Y_CONT, charts.Y_MID, charts.Y_HIGH, charts.Y_TAIL, 1e-150, 1e150]
     y = np.concatenate([neighbours(edges), np.geomspace(1e-8, 1e8, 60)])
@@ -163,7 +165,9 @@ def points(table, n, seed):
     ("form", "name", "lanes"),
     [*(("three", name, lanes) for name in LANGUAGES for lanes in LANES), *(("one", name, 2) for name in LANGUAGES)],
 )
-def test_compilers_give_no_warning(compilers, folder, tables_dir, form, name, lanes, tmp_path):
+def test_compilers_give_no_warning(
+    folder: Path, tables_dir: Path, form: Any, name: str, lanes: Any, tmp_path: Path
+) -> None:
     language = ("-x", "c++") if name.endswith("++") else ()
     sources = ["main.c", "other.c", *(["mumacro.c", "mumacro_table.c"] if form == "three" else [])]
     words = [*compilers.compiler(name), *language, LANGUAGES[name], "-O1", *STRICT, *LANES[lanes]]
@@ -179,7 +183,7 @@ def test_compilers_give_no_warning(compilers, folder, tables_dir, form, name, la
 
 @pytest.mark.parametrize("option", ["-ffast-math", "-ffinite-math-only", "-D_M_FP_FAST"])
 @pytest.mark.parametrize("name", ["gcc", "clang"])
-def test_arithmetic_without_infinities_is_refused(compilers, folder, name, option):
+def test_arithmetic_without_infinities_is_refused(folder: Path, name: str, option: Any) -> None:
     command = [*compilers.compiler(name), "-std=c99", "-O1", option, "-fsyntax-only"]
     for source in ("one/main.c", "three/mumacro.c"):
         done = subprocess.run([*command, folder / source], capture_output=True, text=True, check=False)
@@ -187,7 +191,7 @@ def test_arithmetic_without_infinities_is_refused(compilers, folder, name, optio
         assert "compile without -ffast-math" in done.stderr
 
 
-def test_numbers_are_exact_through_text(table):
+def test_numbers_are_exact_through_text(table: Surrogate) -> None:
     text = files(table.table)["mumacro_table.c"]
     arrays = dict(re.findall(r"static const double mumacro_table_(\w+)\[\d+\] = \{([^}]*)\}", text))
     data = table._with("power") and table._with("stick_fraction")
@@ -204,7 +208,7 @@ def test_numbers_are_exact_through_text(table):
         assert same(read[f"{name}_slope_errors"], slope_errors[3 * (left // 64) :])
 
 
-def test_names_of_the_declarations_are_the_kernels():
+def test_names_of_the_declarations_are_the_kernels() -> None:
     text = (KERNEL / "mumacro.h").read_text("ascii")
     for prefix, names in (("SOURCE_", charts.SOURCES), ("REGIME_", charts.REGIMES)):
         assert re.findall(rf"MUMACRO_{prefix}(\w+)", text) == [name.upper() for name in names]
@@ -215,12 +219,12 @@ def test_names_of_the_declarations_are_the_kernels():
     assert re.findall(r'"(\w+ must be .*?)"', code) == said
 
 
-def test_a_header_has_no_names_of_the_kernel_of_its_own(table):
+def test_a_header_has_no_names_of_the_kernel_of_its_own(table: Surrogate) -> None:
     text = re.sub(r'/\*.*?\*/|"[^"]*"', "", header_text(table.table), flags=re.DOTALL)
     assert set(re.findall(r"\b(?:mu|MU)_\w+", text)) == {"mu_macro", "mu_ratio"}  # members of structs
 
 
-def test_where_nothing_can_be_written_is_said(table, tmp_path):
+def test_where_nothing_can_be_written_is_said(table: Surrogate, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("before")
     (tmp_path / "folder.h").mkdir()
     with pytest.raises(OutputError, match="is a file"):
@@ -233,7 +237,7 @@ def test_where_nothing_can_be_written_is_said(table, tmp_path):
 
 
 @pytest.mark.parametrize(("out", "made"), [("mumacro.h", []), ("made", ["mumacro.c", "mumacro.h", "mumacro_table.c"])])
-def test_the_command_needs_no_extra(repository, tmp_path, out, made):
+def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, made: Any) -> None:
     program = (
         "import sys\nfor name in ('rich', 'scipy', 'netCDF4', 'xarray', 'numba'): sys.modules[name] = None\n"
         "from mumacro.__main__ import main\nsys.exit(main(['export', '--format', 'c', '--out', sys.argv[1]]))"
@@ -251,7 +255,7 @@ def test_the_command_needs_no_extra(repository, tmp_path, out, made):
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 @pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
-def test_every_level_gives_the_librarys_bits(build, flags, table, name, kernel):
+def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surrogate, name: str, kernel: Any) -> None:
     driver = build(name, *flags[kernel.level])
     v, y = points(table, 4000, 1)
     expected, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, dtype=np.int8)
@@ -272,7 +276,7 @@ def test_every_level_gives_the_librarys_bits(build, flags, table, name, kernel):
     assert same(ask(driver.borders, y.size, 1, y), kernel.border(table._data, y))
 
 
-def test_one_double_at_a_time_gives_the_same_bits(build, flags, table):
+def test_one_double_at_a_time_gives_the_same_bits(build: Any, flags: Any, table: Surrogate) -> None:
     """As MSVC compiles it; with and without fused operations."""
     v, y = points(table, 1500, 2)
     for level in (flags["base"], flags[kernels[-1].level]):
@@ -285,7 +289,7 @@ def test_one_double_at_a_time_gives_the_same_bits(build, flags, table):
     ("options", "apart"),
     [(("-O3", "-march=native"), 4), (("-O3", "-march=native", "-ffp-contract=fast"), 4), (("-O2",), 10)],
 )
-def test_other_options_move_the_last_digits_alone(build, table, options, apart):
+def test_other_options_move_the_last_digits_alone(build: Any, table: Surrogate, options: Any, apart: Any) -> None:
     """Off the border, where rounding does not decide the side; docs/c.md states the figures."""
     v, y = drawn(table, 15_000, 3)
     with np.errstate(all="ignore"):
@@ -296,7 +300,7 @@ def test_other_options_move_the_last_digits_alone(build, table, options, apart):
     assert (np.abs(found - mu)[away] / np.spacing(mu[away])).max() <= apart
 
 
-def cases(n):
+def cases(n: int) -> Any:
     """Cases of every kind, (6, n): ordinary, with zeros, rigid, extreme, illegal."""
     rng = np.random.default_rng(5)
     x = 10.0 ** rng.uniform([-2, -2, 3, -9, 0, -6], [0, 4, 9, -3, 6, 2], (n, 6))
@@ -305,12 +309,12 @@ def cases(n):
     return np.ascontiguousarray(np.where(drawn, rng.choice(special, (n, 6)), x).T)
 
 
-def bad(name, value):
+def bad(name: str, value: Any) -> Any:
     positive, finite = BOUNDS[name].endswith("> 0"), name != "k"
     return not (value > 0.0 if positive else value >= 0.0) or (finite and value == np.inf)
 
 
-def test_dimensional_cases_are_the_librarys(best, table):
+def test_dimensional_cases_are_the_librarys(best: Any, table: Surrogate) -> None:
     x = cases(20_000)
     answer = table.evaluate(dict(zip(FIELDS, x, strict=True)), gradient=True)
     found = ask(best.cases, x.shape[1], 21, x).T
@@ -327,7 +331,7 @@ def test_dimensional_cases_are_the_librarys(best, table):
     assert same(ask(best.case_arrays, x.shape[1], 2, x).reshape(2, -1), expected[:3:2])
 
 
-def test_cycles_are_the_librarys(best, table):
+def test_cycles_are_the_librarys(best: Any, table: Surrogate) -> None:
     x = cases(5000)
     found = ask(best.cycles, x.shape[1], 6, x).T
     with np.errstate(all="ignore"):
@@ -355,14 +359,14 @@ def test_cycles_are_the_librarys(best, table):
     assert np.all(np.isnan(found[:5, ~legal]))
 
 
-def test_only_the_documented_functions_of_the_library_are_called(compilers, folder, tmp_path):
+def test_only_the_documented_functions_of_the_library_are_called(folder: Path, tmp_path: Path) -> None:
     words = [*compilers.compiler("gcc"), "-std=c99", "-O0", "-c", "mumacro.c", "-o", tmp_path / "mumacro.o"]
     compilers.run(*words, cwd=folder / "three")
     symbols = compilers.run(*compilers.compiler("nm"), "--undefined-only", tmp_path / "mumacro.o").split()[1::2]
     assert set(symbols) - {"_GLOBAL_OFFSET_TABLE_"} <= {"sqrt", "fabs", "memcpy", "mumacro_table", "memset"}
 
 
-def test_webassembly_has_the_bits_of_the_lowest_level(table, tmp_path):
+def test_webassembly_has_the_bits_of_the_lowest_level(table: Surrogate, tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None or wasm.compiler() is None:
         pytest.skip("node, or a compiler for WebAssembly, is not installed")

@@ -2,15 +2,18 @@
 
 import re
 import shutil
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from builder.export import export_table
-from comparing import close
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
-from serving import CASE
+from tests import compilers
+from tests.comparing import close
+from tests.serving import CASE
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +22,7 @@ V0 = [1e-6, 1e-3, 0.01, 0.0711, 0.5, 20.0]
 
 
 @pytest.fixture(scope="module")
-def table(tables_dir):
+def table(tables_dir: Path) -> Any:
     return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
 
 
@@ -28,7 +31,7 @@ ABAQUS = ("-ffixed-line-length-none", "-Wall", "-Wno-unused-dummy-argument", "-W
 
 
 @pytest.fixture(scope="module")
-def folder(repository, table, compilers, tmp_path_factory):
+def folder(repository: Path, table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The examples with the smallest table in three files, compiled, and in the folder ``one`` in one header."""
     root = tmp_path_factory.mktemp("languages")
     for place in (root, root / "one"):
@@ -44,10 +47,10 @@ def folder(repository, table, compilers, tmp_path_factory):
 
 
 @pytest.fixture
-def fortran(compilers, folder):
+def fortran(folder: Path) -> Any:
     """Compiles a program with the module mumacro, and asks it: rows of numbers for lines of input."""
 
-    def program(name, *sources, options=ABAQUS):
+    def program(name: str, *sources: Any, options: Any = ABAQUS) -> Any:
         words = (*compilers.compiler("gfortran"), *options, "mumacro.f90", *sources, *OBJECTS, "-o", name, "-lm")
         compilers.run(*words, cwd=folder)
         return lambda *lines: numbers(
@@ -57,12 +60,12 @@ def fortran(compilers, folder):
     return program
 
 
-def numbers(text):
+def numbers(text: str) -> Any:
     rows = [[float(word) for word in line.split()] for line in text.strip().splitlines()]
     return np.array(rows, dtype=object if len({len(row) for row in rows}) > 1 else float)
 
 
-def test_fortran_has_the_same_answers(fortran, table):
+def test_fortran_has_the_same_answers(fortran: Any, table: Surrogate) -> None:
     ask = fortran("friction", "friction.f90", options=("-std=f2008", "-Wall", "-Wextra", "-pedantic", "-Werror"))
     found = ask(*({**CASE, "v0": v0}.values() for v0 in V0))
     answer = table.evaluate({**CASE, "v0": np.array(V0)}, gradient=True)
@@ -75,7 +78,7 @@ def test_fortran_has_the_same_answers(fortran, table):
     assert np.allclose(found[:, 9], table.stick_fraction(answer.v_tilde, answer.y_tilde), rtol=1e-9, atol=0.0)
 
 
-def test_octave_has_the_same_answers(compilers, folder, table):
+def test_octave_has_the_same_answers(folder: Path, table: Surrogate) -> None:
     octave = compilers.compiler("octave-cli")
     compilers.compiler("mkoctfile")
     text = compilers.run(*octave, "--norc", "friction.m", cwd=folder / "one")
@@ -98,7 +101,7 @@ def test_octave_has_the_same_answers(compilers, folder, table):
     assert identifiers == ["mumacro:usage", "mumacro:type", "mumacro:size", "mumacro:size"]
 
 
-def test_abaqus_gets_the_coefficient_and_its_derivatives(fortran, table):
+def test_abaqus_gets_the_coefficient_and_its_derivatives(fortran: Any, table: Surrogate) -> None:
     call = fortran("fric_coef", "fric_coef.f", "fric_coef_driver.f90")
     stiffness = 1e10  # the driver's properties: mu0 = 0.3, k per area, y0 = 2 um, omega = 1.3e5 rad/s
     cases = [(v0, p, a, w) for v0 in (1e-3, 0.02, 0.4) for p in (3e4, 1e5) for a, w in ((1.0, 1.0), (0.5, 2.0))]
@@ -120,11 +123,11 @@ def test_abaqus_gets_the_coefficient_and_its_derivatives(fortran, table):
     assert np.all(np.isfinite(corner))
 
 
-def test_abaqus_gets_the_shear_stress_its_derivatives_and_the_force_of_nodes(fortran, table):
+def test_abaqus_gets_the_shear_stress_its_derivatives_and_the_force_of_nodes(fortran: Any, table: Surrogate) -> None:
     call = fortran("fric", "fric.f", "vfric.f", "fric_driver.f90")
     case = {"mu0": 0.3, "Fz": 1e5, "k": 1e10, "y0": 2e-6, "omega": 1.3e5}
 
-    def stress(*line):
+    def stress(*line: Any) -> Any:
         return call(line)[0][:2]
 
     dt, gamma, step = 1e-3, np.array([3e-5, -4e-5]), 1e-4  # 0.05 m/s, above v_rest; 5e-4 m/s, below
@@ -156,7 +159,7 @@ def test_abaqus_gets_the_shear_stress_its_derivatives_and_the_force_of_nodes(for
     assert nodes == close([-free, 0.0, -0.01, 0.0, 0.0, 0.0], rel=1e-14)
 
 
-def test_modelicas_gradient_is_the_gradient(compilers, folder, table):
+def test_modelicas_gradient_is_the_gradient(folder: Path, table: Surrogate) -> None:
     program = (
         '#include <stdio.h>\n#include "mumacro_modelica.h"\nint main(void) { double g[6];\n'
         "mumacro_modelica_gradient(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01, g);\n"
@@ -173,14 +176,14 @@ def test_modelicas_gradient_is_the_gradient(compilers, folder, table):
     assert "mu = mumacro_mu_macro(mu0, Fz, k, y0, omega, v0)" in text
 
 
-def test_julia_has_the_same_answers(compilers, folder, table):
+def test_julia_has_the_same_answers(folder: Path, table: Surrogate) -> None:
     julia = compilers.compiler("julia")
     compilers.run(*compilers.compiler("gcc"), "-shared", *OBJECTS, "-o", "libmumacro.so", "-lm", cwd=folder)
     first, *_ = compilers.run(*julia, "--startup-file=no", "friction.jl", cwd=folder).split()
     assert float(first) == close(table.evaluate(CASE).mu_macro, rel=1e-14)
 
 
-def test_the_files_compile_to_one_library(compilers, folder):
+def test_the_files_compile_to_one_library(folder: Path) -> None:
     compilers.run(*compilers.compiler("gcc"), "-shared", *OBJECTS, "-o", "libm.so", "-lm", cwd=folder)
     table = compilers.run(*compilers.compiler("nm"), "-D", "--defined-only", "libm.so", cwd=folder)
     public = {line.split()[-1] for line in table.splitlines()}
@@ -189,7 +192,7 @@ def test_the_files_compile_to_one_library(compilers, folder):
     assert public == {*declared, "mumacro_table"}
 
 
-def test_modelicas_function_and_its_derivative_compile(repository, tmp_path):
+def test_modelicas_function_and_its_derivative_compile(repository: Path, tmp_path: Path) -> None:
     rumoca = pytest.importorskip("rumoca", reason="the Modelica compiler rumoca is not installed")
     source = shutil.copy(repository / "examples" / "c" / "Mumacro.mo", tmp_path)
     assert [str(found) for found in rumoca.validate(str(source), model="Mumacro.SlidingMass")] == []

@@ -7,12 +7,12 @@ import pytest
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from comparing import close
-from made_cells import Cells
 from mumacro import charts
 from mumacro.cells import WIDTH, cell_positions, cells_1d, cells_2d, chebyshev_coefficients, interpolation_matrix, nodes
 from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
 from mumacro.library import Kernel, kernels
+from tests.comparing import close
+from tests.made_cells import Cells
 
 Array = NDArray[np.float64]
 PLAIN = Axis("y", 0.0, 1.0)

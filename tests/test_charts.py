@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from comparing import close
 from mumacro import Surrogate, charts
 from mumacro.cells import nodes
 from mumacro.charts import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES, Axis
 from mumacro.library import Kernel, kernels
 from tests.cases import Array, tables
+from tests.comparing import close
 
 C_LOW, S_MID, CORNER = (NAMES.index(name) for name in ("continuous_low", "stick_slip_mid", "corner"))
 PARTS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.37, 0.5, 0.5 + 1e-9, 0.71, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9)

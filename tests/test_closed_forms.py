@@ -1,14 +1,15 @@
 """The closed-form limits against mpmath and against the exact solver."""
 
 import math
+from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 
 from builder.steady import border, solve
-from comparing import close
 from mumacro import closed_forms
+from tests.comparing import close
 
 LOW = (0.1, 0.3, 0.5, 0.7, 1.0)
 
@@ -107,7 +108,7 @@ def critical_of(y: float) -> float:
         (closed_forms.border_blend, {0.3: -1.932e-4, 1.0: -2.319e-3, 2.0: -5.263e-3, 10.0: 4.836e-3}),
     ],
 )
-def test_a_formula_of_the_border_is_off_by_what_was_measured(formula, deviations: dict[float, float]) -> None:
+def test_a_formula_of_the_border_is_off_by_what_was_measured(formula: Any, deviations: dict[float, float]) -> None:
     for y, deviation in deviations.items():
         assert float(formula(y)) / border(y)[0] - 1.0 == close(deviation, rel=2e-3)
 
@@ -161,7 +162,7 @@ def test_the_small_angle_average_is_the_bessel_function() -> None:
         (closed_forms.critical_next, (3.6e-8, 2.3e-5, 3.5e-4, 1.37e-3, 2.42e-3)),
     ],
 )  # fmt: skip
-def test_a_formula_for_continuous_sliding_is_off_by_what_was_measured(formula, deviations) -> None:
+def test_a_formula_for_continuous_sliding_is_off_by_what_was_measured(formula: Any, deviations: Any) -> None:
     for y, deviation in zip(LOW, deviations, strict=True):
         assert abs(float(formula(y)) / critical_of(y) - 1.0) == close(deviation, rel=0.1)
 

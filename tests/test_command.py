@@ -7,27 +7,30 @@ import math
 import shlex
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
 from mumacro import Surrogate, fit
 from mumacro.__main__ import COMMANDS, main
 from mumacro.geometries import GEOMETRIES, contact_of
 from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 from mumacro.validity import model_rows
+from tests.cases import Capture
+from tests.comparing import close
 
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 VALUES = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
 
 
 @pytest.fixture(scope="module")
-def tightest():
+def tightest() -> Any:
     return Surrogate.open()
 
 
-def said(capsys, code, *words):
+def said(capsys: Capture, code: Any, *words: Any) -> Any:
     """The output of ``mumacro WORDS``; from stderr, one line, if it fails."""
     assert main(words) == code
     found = capsys.readouterr()
@@ -39,7 +42,7 @@ def said(capsys, code, *words):
     return found.out
 
 
-def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightest):
+def test_one_case_is_answered_with_units_regime_bound_and_source(capsys: Capture, tightest: Surrogate) -> None:
     text = said(capsys, 0, CASE, "--digits", "15")
     expected = tightest.evaluate(**VALUES)
     row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
@@ -56,7 +59,9 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(capsys, tightes
     assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
 
 
-def test_json_has_every_bit_but_no_infinity_and_the_inputs_may_be_separate_arguments(capsys, tightest):
+def test_json_has_every_bit_but_no_infinity_and_the_inputs_may_be_separate_arguments(
+    capsys: Capture, tightest: Surrogate
+) -> None:
     expected = tightest.evaluate(**VALUES, gradient=True)
     for words in ((CASE, "--json", "--gradient"), (*CASE.split()[:3], "--json", *CASE.split()[3:], "--gradient")):
         answer = json.loads(said(capsys, 0, *words))
@@ -70,7 +75,7 @@ def test_json_has_every_bit_but_no_infinity_and_the_inputs_may_be_separate_argum
 
 
 @pytest.mark.parametrize("name", ["mumacro-1e-4.nc", "mumacro-1e-10.nc"])
-def test_a_table_is_picked_by_path_or_tolerance(capsys, tables_dir, name):
+def test_a_table_is_picked_by_path_or_tolerance(capsys: Capture, tables_dir: Path, name: str) -> None:
     tolerance = name.removeprefix("mumacro-").removesuffix(".nc")
     for which in (str(tables_dir / name), tolerance):
         assert json.loads(said(capsys, 0, CASE, "--json", "--table", which))["table"]["tolerance"] == float(tolerance)
@@ -99,18 +104,18 @@ def test_a_table_is_picked_by_path_or_tolerance(capsys, tables_dir, name):
         (CASE.replace("0.01", "1e999"), 2, "v0 must be finite and >= 0"),
     ],
 )
-def test_wrong_arguments_get_advice_in_one_line(capsys, words, code, parts):
+def test_wrong_arguments_get_advice_in_one_line(capsys: Capture, words: Any, code: Any, parts: Any) -> None:
     assert parts in said(capsys, code, words)
 
 
-def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys):
+def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys: Capture) -> None:
     message = said(capsys, 2, "mu0=-0.3 Fzz=10 k=soft v0=nan f=-1 fast")
     for part in ("mu0 must be finite and > 0", "did you mean Fz?", "k=soft", "v0 must be", "f must be", "'fast'"):
         assert message.count(part) == 1
     assert message.endswith("missing: y0 [m]")
 
 
-def test_a_unit_may_be_given_beside_the_number_or_apart(capsys, tightest):
+def test_a_unit_may_be_given_beside_the_number_or_apart(capsys: Capture, tightest: Surrogate) -> None:
     expected = tightest.evaluate(**VALUES).mu_macro
     for case in (
         "mu0=30% Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s",
@@ -125,7 +130,7 @@ def test_a_unit_may_be_given_beside_the_number_or_apart(capsys, tightest):
     assert "1 to 2 m/s" in said(capsys, 1, "solve-for", "v0", known, "--target", "0.1", "--between", "1", "200cm/s")
 
 
-def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_corrected(capsys):
+def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_corrected(capsys: Capture) -> None:
     lines = [line.split(": ", 1)[1].strip() for line in said(capsys, 0).splitlines()]
     assert len(lines) == 4
     for line in lines[:3]:
@@ -134,7 +139,7 @@ def test_no_words_show_three_examples_that_run_and_a_misspelt_command_is_correct
     assert "did you mean solve-for?" in said(capsys, 2, "solve_for", "y0")
 
 
-def test_a_table_that_cannot_be_read_or_does_not_exist(capsys, tmp_path):
+def test_a_table_that_cannot_be_read_or_does_not_exist(capsys: Capture, tmp_path: Path) -> None:
     (tmp_path / "text.nc").write_text("no table")
     assert "text.nc" in said(capsys, 1, CASE, "--table", str(tmp_path / "text.nc"))
     assert "no such file" in said(capsys, 1, CASE, "--table", str(tmp_path / "none.nc"))
@@ -143,7 +148,7 @@ def test_a_table_that_cannot_be_read_or_does_not_exist(capsys, tmp_path):
 
 
 @pytest.mark.parametrize("word", [*COMMANDS, ""])
-def test_every_command_explains_itself(capsys, word):
+def test_every_command_explains_itself(capsys: Capture, word: Any) -> None:
     if word == "serve":
         pytest.importorskip("uvicorn")
     with pytest.raises(SystemExit) as caught:
@@ -169,14 +174,14 @@ def test_every_command_explains_itself(capsys, word):
         ("solve-for",),
     ],
 )
-def test_wrong_options_are_reported_in_one_line(capsys, words):
+def test_wrong_options_are_reported_in_one_line(capsys: Capture, words: Any) -> None:
     with pytest.raises(SystemExit) as caught:
         main(words)
     assert caught.value.code == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-def test_a_law_runs_along_any_input_and_marks_the_border(capsys, tightest):
+def test_a_law_runs_along_any_input_and_marks_the_border(capsys: Capture, tightest: Surrogate) -> None:
     known = CASE.replace("v0=0.01", "")
     words = ("law", known, "--along", "v0", "1e-4", "1", "--points", "9")
     found = json.loads(said(capsys, 0, *words, "--json"))
@@ -193,7 +198,7 @@ def test_a_law_runs_along_any_input_and_marks_the_border(capsys, tightest):
     assert "border of continuous sliding at v0" in text
 
 
-def test_a_law_along_the_frequency_is_one_along_omega(capsys):
+def test_a_law_along_the_frequency_is_one_along_omega(capsys: Capture) -> None:
     known = CASE.replace("f=20690", "")
     over_f = json.loads(said(capsys, 0, "law", known, "--along", "f", "100", "1e5", "--json"))
     ends = (repr(math.tau * 100), repr(math.tau * 1e5))
@@ -205,7 +210,9 @@ def test_a_law_along_the_frequency_is_one_along_omega(capsys):
     assert "small_amplitude" in text
 
 
-def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(capsys, tightest):
+def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
+    capsys: Capture, tightest: Surrogate
+) -> None:
     case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-5, "omega": 1e5, "v0": 0.02}  # r = 100: mu_macro rises and falls along k
     words = "mu0=0.3 Fz=10N k=0.1..100 N/um y0=20um omega=1e5 v0=2cm/s"
     found = json.loads(said(capsys, 0, words, "--json"))
@@ -231,7 +238,7 @@ KINDS = {
 }  # fmt: skip
 
 
-def asked(name):
+def asked(name: str) -> Any:
     """The words and options of a case, and the keywords of the library."""
     words, kind, more = KINDS[name]
     inputs = {**VALUES, **more, **kind}
@@ -241,7 +248,9 @@ def asked(name):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(capsys, tightest, name):
+def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(
+    capsys: Capture, tightest: Surrogate, name: str
+) -> None:
     words, options, inputs = asked(name)
     expected = tightest.evaluate(**inputs, gradient=True)
     found = json.loads(said(capsys, 0, words, *options, "--json", "--gradient"))
@@ -258,7 +267,9 @@ def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(capsys, t
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_law_and_solve_for_know_contact_direction_and_range(capsys, tmp_path, tightest, name):
+def test_law_and_solve_for_know_contact_direction_and_range(
+    capsys: Capture, tmp_path: Path, tightest: Surrogate, name: str
+) -> None:
     words, options, inputs = asked(name)
     words = words.replace("v0=0.01", "")
     out = tmp_path / "law.csv"
@@ -297,7 +308,7 @@ def test_law_and_solve_for_know_contact_direction_and_range(capsys, tmp_path, ti
          "one spring"),
     ],
 )  # fmt: skip
-def test_what_does_not_belong_to_a_contact_or_direction_is_named(capsys, words, part):
+def test_what_does_not_belong_to_a_contact_or_direction_is_named(capsys: Capture, words: Any, part: Any) -> None:
     assert part in said(capsys, 2, *words)
 
 
@@ -305,7 +316,7 @@ def test_what_does_not_belong_to_a_contact_or_direction_is_named(capsys, words, 
 
 
 @pytest.fixture
-def measured(tmp_path, tightest):
+def measured(tmp_path: Path, tightest: Surrogate) -> Any:
     """Thirty points of a ball, with scatter, in a file; and the same in SI."""
     v0 = np.geomspace(1e-3, 1.0, 30)
     exact = tightest.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=v0, contact="ball").mu_macro
@@ -320,7 +331,9 @@ RIG = ("Fz=10N y0=2um", "f=20kHz")
 
 
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)])
-def test_fit_is_that_of_the_library(capsys, monkeypatch, measured, unknowns):
+def test_fit_is_that_of_the_library(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, measured: Any, unknowns: Any
+) -> None:
     pytest.importorskip("scipy")
     path, points = measured
     known = {name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns}
@@ -339,7 +352,9 @@ def test_fit_is_that_of_the_library(capsys, monkeypatch, measured, unknowns):
     assert "95 %" in text
 
 
-def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(capsys, tmp_path, measured):
+def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(
+    capsys: Capture, tmp_path: Path, measured: Any
+) -> None:
     pytest.importorskip("scipy")
     pytest.importorskip("matplotlib")
     path, points = measured
@@ -377,13 +392,15 @@ def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(capsys, tmp_pat
         ("v0,mu_macro\n1,nan\n2,0.2\n", RIG, 1, ["row 1: mu_macro is missing"]),
     ],
 )  # fmt: skip
-def test_points_that_cannot_be_fitted_are_refused_with_the_remedy(capsys, tmp_path, text, words, code, parts):
+def test_points_that_cannot_be_fitted_are_refused_with_the_remedy(
+    capsys: Capture, tmp_path: Path, text: str, words: Any, code: Any, parts: Any
+) -> None:
     (tmp_path / "points.csv").write_text(text)
     message = said(capsys, code, "fit", str(tmp_path / "points.csv"), *words)
     assert all(part in message for part in parts), message
 
 
-def test_points_of_a_german_file_are_read(capsys, tmp_path, measured):
+def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measured: Any) -> None:
     pytest.importorskip("scipy")
     path, _ = measured
     (tmp_path / "german.csv").write_text("\ufeff" + path.read_text().replace(",", ";").replace(".", ","), "utf-8")
@@ -402,7 +419,7 @@ PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s"
 
 
 @pytest.mark.parametrize("words", PICTURES.values(), ids=PICTURES)
-def test_results_go_into_pictures_and_csv(capsys, tmp_path, words):
+def test_results_go_into_pictures_and_csv(capsys: Capture, tmp_path: Path, words: Any) -> None:
     pytest.importorskip("matplotlib")
     for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
         out = tmp_path / f"out{ending}"
@@ -418,14 +435,16 @@ def test_results_go_into_pictures_and_csv(capsys, tmp_path, words):
     assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
 
 
-def test_without_matplotlib_a_picture_names_the_extra(capsys, tmp_path, monkeypatch):
+def test_without_matplotlib_a_picture_names_the_extra(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("figure", "pyplot"):
         monkeypatch.setitem(sys.modules, f"matplotlib.{name}", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert "pip install 'mumacro[plot]'" in said(capsys, 1, "map", "-o", str(tmp_path / "map.png"))
 
 
-def test_a_case_beyond_the_map_is_said_to_be_so(capsys, tmp_path):
+def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     out = str(tmp_path / "map.png")
     assert "outside" not in said(capsys, 0, "map", CASE, "-o", out)
@@ -433,7 +452,7 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys, tmp_path):
         assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)
 
 
-def test_objects_plot_themselves(tightest):
+def test_objects_plot_themselves(tightest: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
     from mumacro.law import friction_law
     from mumacro.plotting import plot_answer, plot_map
@@ -470,8 +489,8 @@ BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3"
     ],
 )  # fmt: skip
 def test_stiffness_from_materials_with_units_and_what_it_prints_goes_into_the_next_command(
-    capsys, words, geometry, given
-):
+    capsys: Capture, words: Any, geometry: Any, given: Any
+) -> None:
     found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
     expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
     assert (found["k"], found["contact"]) == (expected.k, expected.contact)
@@ -483,7 +502,7 @@ def test_stiffness_from_materials_with_units_and_what_it_prints_goes_into_the_ne
     assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
 
 
-def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys):
+def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture) -> None:
     message = said(capsys, 2, "stiffness", *BALL[:2], "5mN", "--Fz", "10V", *BALL[5:])
     assert "radius=5mN" in message
     assert "Fz=10V" in message
@@ -499,7 +518,7 @@ def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys):
 
 
 @pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])
-def test_solve_for_finds_what_gives_the_target(capsys, unknown):
+def test_solve_for_finds_what_gives_the_target(capsys: Capture, unknown: Any) -> None:
     known = " ".join(w for w in CASE.split() if not w.startswith("f=" if unknown in ("f", "omega") else f"{unknown}="))
     found = json.loads(said(capsys, 0, "solve-for", unknown, known, "--target", "0.24", "--json"))
     assert found["roots"]
@@ -509,7 +528,7 @@ def test_solve_for_finds_what_gives_the_target(capsys, unknown):
         assert root["low"] <= root[unknown] <= root["high"]
 
 
-def test_solve_for_reports_the_reachable_range(capsys):
+def test_solve_for_reports_the_reachable_range(capsys: Capture) -> None:
     known = CASE.replace("v0=0.01", "")
     message = said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
     assert "out of reach" in message
@@ -523,7 +542,7 @@ def test_solve_for_reports_the_reachable_range(capsys):
     assert "v0 from 0.0001 to 0.001 m/s" in narrow
 
 
-def test_the_table_in_use_is_described(capsys, tightest):
+def test_the_table_in_use_is_described(capsys: Capture, tightest: Surrogate) -> None:
     found = json.loads(said(capsys, 0, "table", "--json"))
     assert found["path"] == str(tightest.path)
     assert found["checksum"] == tightest.checksum
@@ -533,7 +552,7 @@ def test_the_table_in_use_is_described(capsys, tightest):
     assert text.count(".nc") > len(found["bundled"])
 
 
-def test_export_is_that_of_the_builder(capsys, tmp_path, tables_dir):
+def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:
     out = tmp_path / "grid.csv"
     found = json.loads(said(capsys, 0, "export", "--format", "csv", "--out", str(out), "--table", "1e-4"))
     assert found["table"] == str(tables_dir / "mumacro-1e-4.nc")
@@ -541,7 +560,7 @@ def test_export_is_that_of_the_builder(capsys, tmp_path, tables_dir):
 
 
 @pytest.mark.slow
-def test_a_closed_output_pipe_is_no_error(repository):
+def test_a_closed_output_pipe_is_no_error(repository: Path) -> None:
     command = [sys.executable, "-m", "mumacro", "law", CASE.replace("v0=0.01", ""), "--along", "v0", "1e-4", "1"]
     process = subprocess.Popen(
         [*command, "--points", "20000"], cwd=repository, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -559,7 +578,7 @@ def test_a_closed_output_pipe_is_no_error(repository):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name):
+def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name: str) -> None:
     assert suggestion(name) == suggestion(f" {name.lower()} ") == name
     assert suggestion(name.upper()) == ("Fz" if name == "f" else name)  # F is a force
     assert scale_of(name, SI[name][0]) == (1.0, 1.0)
@@ -572,12 +591,12 @@ def test_every_input_is_known_by_its_name_in_any_case_and_in_its_si_unit(name):
      ("v0", "km/h", 36.0, 10.0), ("mu0", "%", 30.0, 0.3), ("omega", "rpm", 30.0, math.pi), ("omega", "Hz", 1.0, None),
      ("y0", "N", 1.0, None)],
 )  # fmt: skip
-def test_units_are_turned_into_si_and_powers_of_ten_exactly(name, unit, given, si):
+def test_units_are_turned_into_si_and_powers_of_ten_exactly(name: str, unit: str, given: Any, si: Any) -> None:
     scale = scale_of(name, unit)
     assert (scale and scale.si(given)) == (si and (si if unit != "rpm" else close(si, rel=1e-15)))
 
 
-def test_headings_and_numbers_are_read_as_they_are_written():
+def test_headings_and_numbers_are_read_as_they_are_written() -> None:
     given = {"k [N/mm]": ("k", "N/mm"), " v0(mm/s) ": ("v0", "mm/s"), "mu0": ("mu0", None), "a[0][1]": ("a[0]", "1")}
     assert {head: split_unit(head) for head in given} == given
     assert (read_number("y0", " 2e-6 "), read_number("k", "Rigid")) == (2e-6, math.inf)

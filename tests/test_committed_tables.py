@@ -19,12 +19,12 @@ from builder.rounding import STEPS, to_step
 from builder.steady import solve
 from builder.sweep import Sweep
 from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps
-from comparing import close
 from mumacro import Surrogate, TableError
 from mumacro.charts import CONTINUOUS, REGIME_OF_SOURCE, REGIMES, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from mumacro.inputs import FIELDS
 from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
 from mumacro.table import read_table
+from tests.comparing import close
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent

@@ -1,6 +1,7 @@
 """A ball: quadrature over springs against marched springs, adaptive quadrature, closed forms; bounds."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,10 +9,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from tests.cases import CASE, UNIT, opened
+from tests.comparing import close
 from tests.naive import march_ball
 
 BALL = {"contact": "ball"}
@@ -56,14 +57,14 @@ def by_quad(table: Surrogate, name: str, v: float, y: float) -> float:
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.05, 0.4), (0.3, 2.5), (1.2, 1.0)])
-def test_marched_springs(table, v, y):
+def test_marched_springs(table: Surrogate, v: Any, y: Any) -> None:
     coarse, fine = (march_ball(v, y, 300, steps) for steps in (1500, 3000))
     assert table.ratio_with_bound(v, y, **BALL)[0] == close(2.0 * fine - coarse, abs=2e-5)
     assert table.ratio_with_bound(0.05, 0.4, **BALL)[0] == close(0.94910928, abs=5e-9)
 
 
 @pytest.mark.parametrize("name", QUANTITY_NAMES)
-def test_adaptive_quadrature(table, name):
+def test_adaptive_quadrature(table: Surrogate, name: str) -> None:
     rng = np.random.default_rng(5)
     for _ in range(8 if name == "mu_ratio" else 3):
         v, y = 10.0 ** rng.uniform(-3, 1), 10.0 ** rng.uniform(-1.5, 1.5)
@@ -72,7 +73,7 @@ def test_adaptive_quadrature(table, name):
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
-def test_bounds_of_coarser_tables(table, tolerance):
+def test_bounds_of_coarser_tables(table: Surrogate, tolerance: Any) -> None:
     coarse, (v, y) = opened(tolerance), points(1000, 8)
     columns = [s.evaluate(**UNIT, v0=v, y0=y, **BALL, gradient=True) for s in (table, coarse)]
     for name in columns[0].gradient:
@@ -85,7 +86,7 @@ def test_bounds_of_coarser_tables(table, tolerance):
         assert name != "mu_ratio" or np.median(bound) < 2.0 * tolerance
 
 
-def test_static_limit(table):
+def test_static_limit(table: Surrogate) -> None:
     for y in (1e-9, 1e-3, 0.1, 0.7, 1.3, 1.499999):
         e = y / 1.5
         m = (1.0 - e) / (1.0 + e)
@@ -99,7 +100,7 @@ def test_static_limit(table):
     assert table.ratio_with_bound(0.0, [1.5, 1.6, 1e9], **BALL)[0].tolist() == [0.0, 0.0, 0.0]
 
 
-def test_border(table):
+def test_border(table: Surrogate) -> None:
     assert table.v_tilde_crit(1.0, **BALL) == close(0.33517, abs=5e-6)
     for y in (0.01, 1.0, 1.9, 1.94, 5.0, 1e3):
         s = np.geomspace(1e-6, 1.0, 20001)
@@ -110,7 +111,7 @@ def test_border(table):
         assert table.stick_fraction(crit * 1.001, y, **BALL) == 0.0 < table.stick_fraction(crit * 0.99, y, **BALL)
 
 
-def test_rigid_and_other_limits(table):
+def test_rigid_and_other_limits(table: Surrogate) -> None:
     for changes in ({"k": None}, {"k": 1e300}, {"y0": 0.0}, {"omega": 0.0}, {"v0": 0.0, "k": math.inf}):
         ball, spring = (table.evaluate(**{**CASE, **changes}, contact=contact) for contact in ("ball", "spring"))
         assert ball.mu_macro == close(spring.mu_macro, abs=1e-15)

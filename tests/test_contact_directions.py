@@ -1,6 +1,7 @@
 """Oscillation along the sliding direction and of the normal force: against a play operator, closed forms, limits."""
 
 import math
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -8,11 +9,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.closed_forms import master_curve_limit
 from tests.cases import CASE, UNIT, opened, without
+from tests.comparing import close
 from tests.test_tight_bounds import play
 
 ALONG, NORMAL = {"direction": "along"}, {"direction": "normal"}
@@ -23,7 +24,7 @@ def table() -> Surrogate:
     return opened(1e-4)  # closed forms need no table
 
 
-def test_the_play_operator_marched_by_events(table):
+def test_the_play_operator_marched_by_events(table: Surrogate) -> None:
     """At any amplitude, near the border and where reverse slip begins."""
     rng, n, seen = np.random.default_rng(1), 250, set()
     a = 10.0 ** rng.uniform(-2, 3, n)
@@ -40,7 +41,7 @@ def test_the_play_operator_marched_by_events(table):
     assert seen == {"along_stick_slip", "along_reverse_slip"}
 
 
-def test_any_amplitude_up_to_the_largest_number(table):
+def test_any_amplitude_up_to_the_largest_number(table: Surrogate) -> None:
     """There mu~ is that of rigid contact, and the contact sticks until it has moved through both limits."""
     y = 10.0 ** np.random.default_rng(4).uniform(40, 305, 20_000)
     x = 10.0 ** np.random.default_rng(5).uniform(-12, -0.01, y.size)
@@ -51,7 +52,7 @@ def test_any_amplitude_up_to_the_largest_number(table):
     assert np.isfinite(table.quantity("stick_fraction", 1.0, 1.7e308, **ALONG)[1])
 
 
-def test_creeping_speeds_keep_their_digits(table):
+def test_creeping_speeds_keep_their_digits(table: Surrogate) -> None:
     """With reverse slip mu~ is proportional to v~."""
     for a in (1.01, 1.5, 10.0, 1e4):
         slope = table.ratio_with_bound(1e-6, a, **ALONG)[0] / 1e-6
@@ -59,7 +60,7 @@ def test_creeping_speeds_keep_their_digits(table):
             assert table.ratio_with_bound(v, a, **ALONG)[0] / v == close(slope, rel=1e-6 * max(a / (a - 1.0), 1.0) ** 2)
 
 
-def test_static_and_continuous(table):
+def test_static_and_continuous(table: Surrogate) -> None:
     for a in (0.0, 0.3, 1.0, 2.0):
         assert table.ratio_with_bound(0.0, a, **ALONG)[0] == close(max(1.0 - a, 0.0), abs=1e-15)
         mu, bound, source = table.ratio_with_bound(a * (1 + 1e-9), a, **ALONG)
@@ -70,7 +71,7 @@ def test_static_and_continuous(table):
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 0.99, 1.0, 2.0])
-def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones(table, ratio):
+def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones(table: Surrogate, ratio: Any) -> None:
     case = {**CASE, "v0": ratio * CASE["y0"] * CASE["omega"]}
     rigid = table.evaluate(**{**case, "k": None}, **ALONG, gradient=True)
     assert rigid.mu_macro == close(0.3 * 2.0 / math.pi * math.asin(min(ratio, 1.0)), rel=1e-15)
@@ -82,7 +83,7 @@ def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones
         assert rigid.gradient["v0"] == close(expected, rel=1e-12)
 
 
-def test_normal_is_the_master_curve_and_a_marched_spring(table):
+def test_normal_is_the_master_curve_and_a_marched_spring(table: Surrogate) -> None:
     """u <- min(u + v d tau, 1 + z cos tau)."""
     rng = np.random.default_rng(2)
     z, v = rng.uniform(0.0, 0.999, 300), 10.0 ** rng.uniform(-8, 0.5, 300)
@@ -102,7 +103,7 @@ def test_normal_is_the_master_curve_and_a_marched_spring(table):
     assert table.ratio_with_bound(speed, share, **NORMAL)[0] == close(path.mean(), abs=2e-5)
 
 
-def test_where_reverse_slip_begins_the_slopes_jump_and_the_bound_says_so(table):
+def test_where_reverse_slip_begins_the_slopes_jump_and_the_bound_says_so(table: Surrogate) -> None:
     v = 0.5
     a = brentq(lambda a: 2.0 * (math.sqrt(a * a - v * v) - v * math.acos(v / a)) - 2.0, 1.0, 5.0, xtol=1e-15)
     below, at, above = (table.evaluate(**UNIT, y0=a * x, v0=v, **ALONG, gradient=True) for x in (1 - 1e-9, 1, 1 + 1e-9))
@@ -114,13 +115,13 @@ def test_where_reverse_slip_begins_the_slopes_jump_and_the_bound_says_so(table):
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-12])
-def test_a_ball_along_is_its_springs(tolerance):
+def test_a_ball_along_is_its_springs(tolerance: Any) -> None:
     s, rng = opened(tolerance), np.random.default_rng(8)
     for _ in range(12):
         a = 10.0 ** rng.uniform(-1, 1.5)
         v = a * rng.uniform(0.01, 1.0)
 
-        def share(xi, name, v=v, a=a):
+        def share(xi: Any, name: str, v: Any = v, a: Any = a) -> Any:
             load = 1.0 - xi * xi
             weight = 1.5 * load * (1.5 * load if name == "power" else 1.0)
             return weight * s.quantity(name, v / (1.5 * load), a / (1.5 * load), **ALONG)[0]

@@ -3,6 +3,8 @@
 import math
 import shutil
 import subprocess
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,7 +52,7 @@ def cases() -> list[tuple[int, int, tuple[float, ...]]]:
 
 @pytest.mark.parametrize("form", ["one", "three"])
 @pytest.mark.parametrize("language", ["gcc", "g++"])
-def test_the_bits_of_the_library(tables_dir, tmp_path, form, language):
+def test_the_bits_of_the_library(tables_dir: Path, tmp_path: Path, form: Any, language: Any) -> None:
     path = tables_dir / "mumacro-1e-4.nc"
     write_c(read_table(path), tmp_path / "mumacro.h" if form == "one" else tmp_path)
     (tmp_path / "main.c").write_text(MAIN, "ascii")

@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from comparing import close
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.contact import kind_of
 from tests.cases import CASE, PAIRS, as_kind, every_pair, opened, without
+from tests.comparing import close
 
 BALL, NORMAL = {"contact": "ball"}, {"direction": "normal"}
 every_other_pair = pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
@@ -24,7 +24,7 @@ def table() -> Surrogate:
 
 
 @every_other_pair
-def test_the_gradient_is_that_of_the_answers(table, pair):
+def test_the_gradient_is_that_of_the_answers(table: Surrogate, pair: Any) -> None:
     rng = np.random.default_rng(6)
     for _ in range(40):
         said, fields, case = as_kind({name: x * 10.0 ** rng.uniform(-0.7, 0.7) for name, x in CASE.items()}, pair)
@@ -45,7 +45,7 @@ def test_the_gradient_is_that_of_the_answers(table, pair):
 
 
 @every_pair
-def test_any_groups_have_an_answer_or_none(pair):
+def test_any_groups_have_an_answer_or_none(pair: Any) -> None:
     s, kind = opened(1e-4), kind_of(*pair)
     size = np.array([0.0, 5e-324, 1e-300, 1e-150, 1e-10, 0.5, 1.0, 1e10, 1e150, 1e281, 1.7e308])
     v, y = (a.ravel() for a in np.meshgrid(size, size))
@@ -59,7 +59,7 @@ def test_any_groups_have_an_answer_or_none(pair):
 
 
 @every_other_pair
-def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table, pair):
+def test_arrays_are_scalars_also_on_threads_and_from_a_pickle(table: Surrogate, pair: Any) -> None:
     said, _, case = as_kind(CASE, pair)
     v0 = np.geomspace(1e-6, 10.0, 400)
     many = table.evaluate(**{**case, "v0": v0}, **said, gradient=True)
@@ -94,7 +94,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("changed", "field", "said"), REFUSED)
-def test_what_does_not_belong_is_refused_by_name(table, changed, field, said):
+def test_what_does_not_belong_is_refused_by_name(table: Surrogate, changed: Any, field: str, said: Any) -> None:
     given = {**CASE, **changed}
     left_out = [name for name in ("k", "y0") if given[name] is None]
     with pytest.raises(InputError, match=said) as caught:
@@ -102,7 +102,7 @@ def test_what_does_not_belong_is_refused_by_name(table, changed, field, said):
     assert caught.value.field == field
 
 
-def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(table):
+def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(table: Surrogate) -> None:
     bad = table.evaluate(**{**CASE, "v0": [-1.0, 0.01]}, **BALL)
     assert bad.source_code.tolist() == [-1, SOURCES.index("ball_partial_slip")]
     lifted = table.evaluate(**without(CASE, "y0"), Fz_amplitude=[1.0, 10.0, 11.0], **NORMAL)
@@ -113,7 +113,7 @@ def test_an_illegal_case_of_an_array_is_alone_and_the_normal_force_has_no_power(
         table.ratio_with_bound(0.1, 1.0, **NORMAL)
 
 
-def test_labels_are_kept(table):
+def test_labels_are_kept(table: Surrogate) -> None:
     """Every contact and direction, and an interval, keep the labels and give the bits of arrays."""
     xr, v0 = pytest.importorskip("xarray"), np.array([0.01, 0.02, 0.05])
     plain = table.evaluate(**{**CASE, "v0": v0}, **BALL, gradient=True)
@@ -136,7 +136,7 @@ RAY = {"mu0": 1.0, "Fz": 1.0, "y0": 20.0, "omega": 1.0, "v0": 1.0}
 
 
 @every_pair
-def test_the_extremes_are_those_of_a_dense_sampling(table, pair):
+def test_the_extremes_are_those_of_a_dense_sampling(table: Surrogate, pair: Any) -> None:
     rng = np.random.default_rng(1)
     for _ in range(40 if pair == PAIRS[0] else 12):
         said, _, case = as_kind({**CASE, "v0": 10.0 ** rng.uniform(-3, 0), "y0": 10.0 ** rng.uniform(-7, -4)}, pair)
@@ -154,7 +154,7 @@ def test_the_extremes_are_those_of_a_dense_sampling(table, pair):
 
 
 @pytest.mark.parametrize("pair", PAIRS[:2], ids=" ".join)
-def test_extremes_inside(table, pair):
+def test_extremes_inside(table: Surrogate, pair: Any) -> None:
     """mu~ rises with k between a smallest and a largest value, so both ends of the interval lie between them."""
     kind, k = {"contact": pair[0]}, np.geomspace(1e-2, 1e4, 6001)
     slope = table.evaluate(k=k, **RAY, **kind, gradient=True).gradient["k"]
@@ -171,7 +171,7 @@ def test_extremes_inside(table, pair):
 
 
 @pytest.mark.parametrize("ratio", [9.725, 9.735, 9.75, 9.8])
-def test_turns_closer_than_samples(table, ratio):
+def test_turns_closer_than_samples(table: Surrogate, ratio: Any) -> None:
     """Where both turns have just begun, an interval that ends between them, or next to them."""
     ray = {**RAY, "y0": ratio}
     for end in np.exp(np.linspace(-0.5, -0.3, 21)):
@@ -181,7 +181,7 @@ def test_turns_closer_than_samples(table, ratio):
         assert found.mu_macro_high >= some.max() - found.error_bound
 
 
-def test_intervals_in_arrays_columns_and_of_one_point(table):
+def test_intervals_in_arrays_columns_and_of_one_point(table: Surrogate) -> None:
     case, low, high, v0 = without(CASE, "k"), [2e5, 8e5, 1e6, np.nan, -1.0], 1.2e6, np.array([[0.01], [0.1]])
     found = table.evaluate(k_range=(np.array(low), high), **{**case, "v0": v0}, gradient=True)
     assert found.mu_macro_low.shape == (2, 5)

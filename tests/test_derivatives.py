@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparing import close
 from mumacro import SOURCES, InputError, MumacroError, Surrogate
 from mumacro.inputs import FIELDS
+from tests.comparing import close
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 QUANTITIES = ("mu_ratio", "power", "stick_fraction")

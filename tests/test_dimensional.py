@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import ellipk, mpf, pi, workdps
 
-from comparing import close
 from mumacro import InputError, Surrogate
 from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, as_columns, check_inputs
-from tests.cases import CASE, log_uniform, opened, without
+from tests.cases import CASE, Case, log_uniform, opened, without
+from tests.comparing import close
 
 positive = st.floats(min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False)
 any_inputs = st.fixed_dictionaries(dict.fromkeys(FIELDS, positive))
@@ -131,7 +131,7 @@ def test_rigid_contact_is_what_ever_stiffer_springs_tend_to(table: Surrogate) ->
     ],
 )
 def test_groups_that_leave_double_precision_still_have_their_limit(
-    table: Surrogate, inputs: dict[str, Any], expected: float
+    table: Surrogate, inputs: Case, expected: float
 ) -> None:
     found = table.evaluate(**{**CASE, **inputs})
     assert abs(found.mu_ratio - expected) <= found.error_bound / CASE["mu0"] + 1e-15

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparing import close
 from mumacro import Surrogate, __version__
 from mumacro.law import APPROXIMATIONS, BORDERS, borders
+from tests.comparing import close
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -61,7 +61,7 @@ def test_the_readme_is_short_and_has_the_figures_of_the_page_on_accuracy() -> No
         assert re.search(rf"{method}\b.*\| +{figures[0]} \| +{figures[1]} \|", page), method
 
 
-def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate) -> None:
+def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Surrogate) -> None:
     page = (DOCS / "http.md").read_text("utf-8")
     seen = set()
     for column, given, errors in re.findall(r"^\| `(\w+)` \| .+ \| (.+) \| (.+ %.*) \|$", page, re.MULTILINE):
@@ -79,7 +79,7 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate) -> 
     assert seen == BORDERS.keys() - {"exact"}
 
 
-def test_the_deviations_of_the_border_are_those_of_the_page_on_validation(surrogate) -> None:
+def test_the_deviations_of_the_border_are_those_of_the_page_on_validation(surrogate: Surrogate) -> None:
     page = (DOCS / "validation.md").read_text("utf-8")
     head, *lines = re.search(r"^\| deviation \[%\] at .*?\n\n", page, re.MULTILINE | re.DOTALL)[0].splitlines()
     y = np.array([float(cell) for cell in head.split("|")[2:-1]])
@@ -95,7 +95,7 @@ def test_the_deviations_of_the_border_are_those_of_the_page_on_validation(surrog
             assert told == close(exact, rel=6e-3, abs=5e-5), title
 
 
-def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate) -> None:
+def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: Surrogate) -> None:
     page = (DOCS / "validity.md").read_text("utf-8")
     pattern = r"the ball has ([\d.]+), one spring with \$k\$ ([\d.]+), with .* ([\d.]+): the ball"
     ball, spring, softer = map(float, re.search(pattern, page).groups())
@@ -110,7 +110,7 @@ def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate) -
         assert float(difference) == close(apart, rel=0.15), ends
 
 
-def test_the_folds_along_k_are_those_on_the_page(surrogate) -> None:
+def test_the_folds_along_k_are_those_on_the_page(surrogate: Surrogate) -> None:
     page = (DOCS / "http.md").read_text("utf-8")
     pattern = r"above ([\d.]+) it has a minimum \(\$\\tilde\{y\}\$ from ([\d.]+) to ([\d.]+)\)"
     born, first, last = map(float, re.findall(pattern, page)[0])
@@ -127,7 +127,7 @@ def test_the_folds_along_k_are_those_on_the_page(surrogate) -> None:
     assert minimum(1e8) == close(first, abs=0.05)
 
 
-def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(surrogate) -> None:
+def test_the_largest_bounds_of_the_stick_fraction_are_those_on_the_page(surrogate: Surrogate) -> None:
     y = np.geomspace(1e-4, 1e8, 20_001)
     text = (DOCS / "accuracy.md").read_text("utf-8")
     told = re.findall(r"up to ([\d.e-]+) with the tightest table, ([\d.e-]+\d) with the coarsest", text)[0]
@@ -148,7 +148,7 @@ def test_every_test_that_the_threats_name_exists_and_every_line_names_one() -> N
     assert [line for line in lines[2:] if "::" not in line] == []
 
 
-def test_the_rest_reference_names_the_fields_within_fields(monkeypatch) -> None:
+def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.MonkeyPatch) -> None:
     from service.app import create_app
     from service.settings import Settings
 

@@ -1,18 +1,21 @@
 """The contact in the time domain: the table's mean, its properties, bounds."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
-from mumacro import Element, InputError
+from mumacro import Element, InputError, Surrogate
 from mumacro.closed_forms import master_curve_limit
+from tests.comparing import close
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
 
 
-def means(v, y, steps, periods, contact="spring", springs=None, load=None):
+def means(
+    v: Any, y: Any, steps: Any, periods: Any, contact: str = "spring", springs: Any = None, load: Any = None
+) -> Any:
     """Mean force along x over the last period, dimensionless, of many contacts at once."""
     contacts = Element(np.ones(v.shape), 1.0, 1.0, contact, springs)
     way = np.diff(np.sin(2.0 * math.pi * np.arange(steps + 1) / steps))
@@ -24,7 +27,7 @@ def means(v, y, steps, periods, contact="spring", springs=None, load=None):
     return total / steps
 
 
-def test_the_mean_is_the_tables_with_an_error_in_proportion_to_the_step(surrogate) -> None:
+def test_the_mean_is_the_tables_with_an_error_in_proportion_to_the_step(surrogate: Surrogate) -> None:
     """Border, corner, slow and fast, small and large amplitudes."""
     crit = surrogate.v_tilde_crit(np.array([0.1, 0.5, 1.0, 3.0]))
     v, y = (x.ravel() for x in np.meshgrid([0.05, 0.2, 1.0, 5.0], [0.1, 0.5, 0.999, 1.0, 1.001, 1.1, 3.0, 30.0]))
@@ -37,13 +40,13 @@ def test_the_mean_is_the_tables_with_an_error_in_proportion_to_the_step(surrogat
     assert np.all(np.abs(errors[0][large] / errors[1][large] - 2.0) < 0.25)
 
 
-def shares(n):
+def shares(n: int) -> Any:
     """The limits of the springs of a ball, of which the sum is 1: integrals of 3/2 (1 - xi^2)."""
     edges = np.arange(n + 1) / n
     return np.diff(1.5 * (edges - edges**3 / 3.0))
 
 
-def test_a_ball_is_its_springs(surrogate) -> None:
+def test_a_ball_is_its_springs(surrogate: Surrogate) -> None:
     v, y = (x.ravel() for x in np.meshgrid([0.05, 0.3, 2.0], [0.2, 0.4, 1.5, 6.0]))
     springs = shares(16)[:, None]
     expected = (springs * surrogate.mu_ratio(v / (16 * springs), y / (16 * springs))).sum(axis=0)
@@ -80,7 +83,7 @@ def test_an_open_contact_has_no_force_and_forgets() -> None:
 
 
 @pytest.mark.parametrize("contact", ["spring", "ball"])
-def test_the_play_operator_has_its_properties(contact) -> None:
+def test_the_play_operator_has_its_properties(contact: str) -> None:
     """No force beyond the limit; friction dissipates; turned motion turns the force; two states only approach."""
     rng = np.random.default_rng(3)
     first, second, turned = (Element(1.0, 1.0, 1.0, contact) for _ in range(3))
@@ -130,7 +133,7 @@ def test_states_are_read_set_copied_and_reset() -> None:
 
 
 @pytest.mark.parametrize("way", [1e308, 1.7e308, 1e-320, 5e-324])
-def test_extreme_steps_keep_the_limit(way) -> None:
+def test_extreme_steps_keep_the_limit(way: Any) -> None:
     for k in (1e-300, 1.0, 1e300):
         contact = Element(0.3, 10.0, k)
         for dx, dy in ((way, 0.0), (-way, way), (0.0, 0.0)):
@@ -161,6 +164,6 @@ def test_extreme_steps_keep_the_limit(way) -> None:
         (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]), "state must be finite"),
     ],
 )
-def test_bad_input_is_named_and_moves_nothing(call, said) -> None:
+def test_bad_input_is_named_and_moves_nothing(call: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         call()

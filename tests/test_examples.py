@@ -9,12 +9,15 @@ import shutil
 import subprocess
 import sys
 import urllib.request
+from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import escape
 
 import numpy as np
 import pytest
 
-from comparing import close
+from mumacro import Surrogate
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +29,7 @@ EXAMPLES = {
 }  # fmt: skip
 
 
-def run(repository, *command):
+def run(repository: Path, *command: Any) -> Any:
     environment = {**os.environ, "PYTHONPATH": str(repository), "OPENMDAO_REPORTS": "0"}
     done = subprocess.run(
         [str(word) for word in command], cwd=repository, env=environment, capture_output=True, text=True, check=False
@@ -35,7 +38,7 @@ def run(repository, *command):
     return done.stdout
 
 
-def need(name, *modules):
+def need(name: str, *modules: Any) -> None:
     """Skip unless a program, or Python packages, are installed."""
     if name is not None and shutil.which(name) is None:
         pytest.skip(f"{name} is not installed")
@@ -44,34 +47,34 @@ def need(name, *modules):
             pytest.skip(f"the Python package {module} is not installed")
 
 
-def number(pattern, text):
+def number(pattern: Any, text: str) -> Any:
     found = re.search(pattern, text)
     assert found, text
     return float(found[1])
 
 
-def test_every_example_is_listed_and_tested(repository):
+def test_every_example_is_listed_and_tested(repository: Path) -> None:
     there = {path.name for path in (repository / "examples").iterdir() if not path.name.startswith(("_", "."))}
     assert there == EXAMPLES
     readme = (repository / "examples" / "README.md").read_text("utf-8")
     assert all(f"`{name}" in readme for name in EXAMPLES - {"README.md"})
 
 
-def test_casadi_finds_the_least_power_that_openmdao_finds(repository):
+def test_casadi_finds_the_least_power_that_openmdao_finds(repository: Path) -> None:
     need("cc", "casadi")
     out = run(repository, sys.executable, repository / "examples" / "casadi_least_power.py")
     assert number(r"y0 = (\S+) um", out) == close(3.6842, rel=1e-4)
     assert number(r"power (\S+) mW", out) == close(47.085, rel=1e-4)
 
 
-def test_the_shaker_ends_the_stick_slip_of_a_mass_on_a_belt(repository):
+def test_the_shaker_ends_the_stick_slip_of_a_mass_on_a_belt(repository: Path) -> None:
     need(None, "mujoco")
     out = run(repository, sys.executable, repository / "examples" / "mass_on_belt.py")
     assert number(r"y0 = 0\.0 um: swings by (\S+) mm", out) == close(1.1, rel=0.02)  # as examples/c/mass_on_belt.c
     assert number(r"y0 = 4\.0 um: swings by (\S+) mm", out) < 1e-3
 
 
-def test_curl(repository, live_server, surrogate):
+def test_curl(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     need("curl")
     version = run(repository, "curl", "--version").split()[1]
     if tuple(map(int, version.split(".")[:2])) < (7, 82):
@@ -84,7 +87,7 @@ def test_curl(repository, live_server, surrogate):
     assert [float(row.split(",")[0]) for row in rows] == [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0]
 
 
-def test_python(repository, live_server, surrogate):
+def test_python(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     text = run(repository, sys.executable, "examples/client.py", live_server.url)
     assert number(r"mu_macro = ([\d.]+) \+-", text) == close(surrogate.evaluate(**CASE).mu_macro, abs=1e-6)
     for v0, mu in re.findall(r"v0 =\s+([\d.]+) m/s: mu_macro = ([\d.]+)", text):
@@ -94,7 +97,7 @@ def test_python(repository, live_server, surrogate):
         assert answer.mu_macro == close(float(target), abs=2e-5)
 
 
-def test_the_spreadsheets_addresses(repository, live_server, surrogate):
+def test_the_spreadsheets_addresses(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     text = (repository / "examples" / "spreadsheet.md").read_text("utf-8")
     addresses = re.findall(r"^ {4}(http://127\.0\.0\.1:8000/\S+)$", text, re.MULTILINE)
     joined = re.search(r'address = "([^"]+)" & y0', text)
@@ -113,7 +116,7 @@ def test_the_spreadsheets_addresses(repository, live_server, surrogate):
         assert column in ("v0 [m/s]", "mu_macro [-]")
 
 
-def test_libreoffice_calc(repository, live_server, surrogate, tmp_path):
+def test_libreoffice_calc(repository: Path, live_server: Any, surrogate: Surrogate, tmp_path: Path) -> None:
     """The formulas and the linked table of spreadsheet.md, entered into a sheet, and the values of its cells."""
     need("soffice")
     text = (repository / "examples" / "spreadsheet.md").read_text("utf-8")
@@ -137,11 +140,11 @@ def test_libreoffice_calc(repository, live_server, surrogate, tmp_path):
     assert [float(row[1]) for row in law] == close(expected, rel=1e-14)
 
 
-def in_calc(cells, link, below, folder):
+def in_calc(cells: Any, link: Any, below: Any, folder: Path) -> Any:
     """The sheet of LibreOffice Calc, as rows of text, with cells entered and a table linked below some rows."""
     profile, out = folder / "profile", folder / "shown.csv"
 
-    def quoted(text):
+    def quoted(text: str) -> Any:
         return '"' + text.replace('"', '""') + '"'
 
     typed = "\n".join(f"s.getCellRangeByName({quoted(at)}).FormulaLocal = {quoted(text)}" for at, text in cells.items())
@@ -176,7 +179,7 @@ def in_calc(cells, link, below, folder):
         return list(csv.reader(stream))
 
 
-def test_octave(repository, live_server, surrogate):
+def test_octave(repository: Path, live_server: Any, surrogate: Surrogate) -> None:
     need("octave-cli")
     text = run(repository, "octave-cli", "--norc", "examples/octave.m", live_server.url)
     assert number(r"mu_macro = ([\d.]+), stick_slip", text) == close(surrogate.evaluate(**CASE).mu_macro, abs=1e-6)
@@ -186,7 +189,7 @@ def test_octave(repository, live_server, surrogate):
     assert 0.02 < number(r"steepest near ([\d.]+) m/s", text) < 0.04
 
 
-def test_uncertainty(repository, bridge, surrogate):
+def test_uncertainty(repository: Path, bridge: Any, surrogate: Surrogate) -> None:
     need(None, "umbridge", "scipy")
     text = run(repository, sys.executable, "examples/uncertainty.py", bridge)
     sampled = number(r"points: mean [\d.]+, standard deviation ([\d.]+)", text)
@@ -198,7 +201,7 @@ def test_uncertainty(repository, bridge, surrogate):
     assert sampled == close(first_order, rel=0.02)
 
 
-def test_quasi_monte_carlo(repository, bridge, surrogate):
+def test_quasi_monte_carlo(repository: Path, bridge: Any, surrogate: Surrogate) -> None:
     need(None, "qmcpy", "umbridge")
     text = run(repository, sys.executable, "examples/quasi_monte_carlo.py", bridge)
     # the same inputs by plain sampling of the table itself
@@ -214,7 +217,7 @@ def test_quasi_monte_carlo(repository, bridge, surrogate):
     assert number(r"first order: standard deviation ([\d.]+)", text) == close(expected, abs=1e-5)
 
 
-def test_least_power(repository, tables_dir):
+def test_least_power(repository: Path, tables_dir: Path) -> None:
     need(None, "openmdao", "scipy")
     table = tables_dir / "mumacro-1e-10.nc"
     text = run(repository, sys.executable, "examples/least_power.py", table)

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,11 @@ from scipy.io import loadmat
 from builder.__main__ import main
 from builder.c import wasm
 from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table
-from comparing import close
+from mumacro import Surrogate
 from mumacro.errors import TableError
 from mumacro.table import read_table
+from tests.cases import Capture
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
@@ -27,12 +30,12 @@ AXES, PLANES = ("v_tilde", "y_tilde", "v_tilde_crit"), ("mu_ratio", "stick_fract
 
 
 @pytest.fixture(scope="module")
-def table():
+def table() -> Any:
     return read_table(PATH)
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
+def written(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Every format, once."""
     folder = tmp_path_factory.mktemp("export")
     for kind, (name, _) in FORMATS.items():
@@ -44,7 +47,7 @@ def written(tmp_path_factory):
 # --- the numbers, by the program of each format; and the attributes that it carries ---------------------
 
 
-def from_columns(columns, table):
+def from_columns(columns: Any, table: Surrogate) -> Any:
     """Columns of a row a node as matrices and axes."""
     full = {name: np.asarray(column, dtype=float).reshape(table.mu_ratio.shape) for name, column in columns.items()}
     assert list(full) == ["v_tilde", "y_tilde", *PLANES, "v_tilde_crit"]
@@ -53,27 +56,27 @@ def from_columns(columns, table):
     return full
 
 
-def from_csv(path, table):
+def from_csv(path: Any, table: Surrogate) -> Any:
     with path.open(newline="", encoding="ascii") as stream:
         header, *rows = csv.reader(stream)
     return from_columns(dict(zip(header, zip(*rows, strict=True), strict=True)), table), {}
 
 
-def from_mat(path, _table):
+def from_mat(path: Any, _table: Any) -> Any:
     found = loadmat(path)
     assert all(found[name].shape[1] == 1 for name in AXES)
     info = {name: found["info"][0, 0][name].ravel()[0] for name in ("tolerance", "content_sha256")}
     return {name: found[name].ravel() if name in AXES else found[name] for name in (*AXES, *PLANES)}, info
 
 
-def from_parquet(path, table):
+def from_parquet(path: Any, table: Surrogate) -> Any:
     parquet = pytest.importorskip("pyarrow.parquet")
     found = parquet.read_table(path)
     attributes = {key.decode(): value.decode() for key, value in found.schema.metadata.items()}
     return from_columns({name: found[name].to_numpy() for name in found.column_names}, table), attributes
 
 
-def matrices(path):
+def matrices(path: Any) -> Any:
     """The matrices of a Modelica text table, by the rules of ModelicaStandardTables: #1, headers, numbers, comments."""
     first, *parts = re.split(r"^double (\w+)\((\d+),(\d+)\)$", path.read_text("ascii"), flags=re.MULTILINE)
     assert first.startswith("#1\n")
@@ -84,7 +87,7 @@ def matrices(path):
     return found
 
 
-def from_modelica(path, _table):
+def from_modelica(path: Any, _table: Any) -> Any:
     read = matrices(path)
     assert tuple(read) == MODELICA_TABLES
     for name in PLANES:
@@ -102,7 +105,7 @@ def from_modelica(path, _table):
 
 
 @pytest.mark.parametrize("read", [from_csv, from_mat, from_parquet, from_modelica])
-def test_a_format_holds_the_grid_and_what_it_can_of_the_attributes(table, written, read):
+def test_a_format_holds_the_grid_and_what_it_can_of_the_attributes(table: Surrogate, written: Any, read: Any) -> None:
     kind = read.__name__.removeprefix("from_")
     found, attributes = read(written / FORMATS[kind][0].format("grid"), table)
     for name in (*AXES, *PLANES):
@@ -113,7 +116,7 @@ def test_a_format_holds_the_grid_and_what_it_can_of_the_attributes(table, writte
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_the_same_table_gives_the_same_bytes(written, tmp_path, kind):
+def test_the_same_table_gives_the_same_bytes(written: Any, tmp_path: Path, kind: Any) -> None:
     if kind == "wasm" and wasm.compiler() is None:
         with pytest.raises(wasm.WasmError, match="zig"):
             export_table(PATH, kind, tmp_path / "again")
@@ -123,7 +126,7 @@ def test_the_same_table_gives_the_same_bytes(written, tmp_path, kind):
     assert [entry.name for entry in tmp_path.iterdir()] == ["again.h"]
 
 
-def test_c_in_three_files_is_written_twice_alike(tmp_path):
+def test_c_in_three_files_is_written_twice_alike(tmp_path: Path) -> None:
     for folder in ("one", "two", "two"):
         export_table(PATH, "c", tmp_path / folder)
     one, two = ({file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "two"))
@@ -131,7 +134,9 @@ def test_c_in_three_files_is_written_twice_alike(tmp_path):
     assert one == two
 
 
-def test_octave_reads_the_mat_file(table, written, repository, surrogate, case):
+def test_octave_reads_the_mat_file(
+    table: Surrogate, written: Any, repository: Path, surrogate: Surrogate, case: dict[str, Any]
+) -> None:
     if shutil.which("octave-cli") is None:
         pytest.skip("octave-cli is not installed")
     command = ["octave-cli", "--norc", "examples/octave_mat.m", str(written / "grid.mat")]
@@ -145,7 +150,7 @@ def test_octave_reads_the_mat_file(table, written, repository, surrogate, case):
     assert shown == close(surrogate.v_tilde_crit(2.0 / 3.0) * 3e-6 * 1.3e5, rel=1e-4)
 
 
-def test_the_logarithmic_matrix_is_the_one_to_interpolate(written, surrogate):
+def test_the_logarithmic_matrix_is_the_one_to_interpolate(written: Any, surrogate: Surrogate) -> None:
     v, y = 10.0 ** np.random.default_rng(8).uniform(-2.9, 2.9, (2, 2000))
     error = {}
     for name, place in (("mu_ratio", (v, y)), ("mu_ratio_log10", (np.log10(v), np.log10(y)))):
@@ -158,7 +163,9 @@ def test_the_logarithmic_matrix_is_the_one_to_interpolate(written, surrogate):
 # --- the command, what is refused -----------------------------------------------------------------------
 
 
-def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(table, tmp_path, monkeypatch, capsys):
+def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
+    table: Surrogate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["export", str(PATH), "--format", "mat"]) == 0
     assert json.loads(capsys.readouterr().out) == {
@@ -172,7 +179,14 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
     [(["pyproject.toml", "--format", "csv"], 1, "pyproject.toml"), (["x.nc", "--format", "xls"], 2, "--format"),
      (["x.nc"], 2, "--format"), ([str(PATH), "--format", "csv", "--out", "."], 2, "--out")],
 )  # fmt: skip
-def test_what_the_command_cannot_export_is_reported_in_one_line(monkeypatch, tmp_path, capsys, arguments, code, said):
+def test_what_the_command_cannot_export_is_reported_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: Capture,
+    arguments: Any,
+    code: Any,
+    said: Any,
+) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)
     with pytest.raises(SystemExit) as end:
@@ -184,7 +198,7 @@ def test_what_the_command_cannot_export_is_reported_in_one_line(monkeypatch, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
 
-def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path, monkeypatch):
+def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     copy = Path(shutil.copy(PATH, tmp_path / "table.nc"))
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     for path, kind, out, error, said in (

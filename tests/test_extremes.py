@@ -12,9 +12,9 @@ from builder.model import OK
 from builder.sections import ANGLE_SECTION, COS_0, SIGMA_1, SIN_0, TIME_SECTION, section, stick_slip
 from builder.steady import RELATIVE_ERROR, solve, workspace
 from builder.sweep import Sweep
-from comparing import close
 from mumacro.closed_forms import outer, second_order
 from tests.cases import log_uniform, opened
+from tests.comparing import close
 
 
 @pytest.mark.parametrize(

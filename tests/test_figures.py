@@ -16,8 +16,8 @@ from builder.__main__ import main
 from builder.cycle import CASES, steady_cycle
 from builder.figures import FIGURES, Curve, FiguresError, Panel, draw_figures
 from builder.steady import border, solve
-from comparing import close
 from mumacro import Surrogate
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 AMPLITUDES = {  # of the figures whose lines are mu~ at these y~, over v~ times the scale

@@ -2,6 +2,7 @@
 
 import decimal
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ GAP = "is missing; write rigid or a number"
 BEYOND = "is beyond double range"
 
 
-def batch_of(**columns):
+def batch_of(**columns: Any) -> Any:
     return pa.RecordBatch.from_pydict({**{name: [value] for name, value in CASE.items()}, **columns})
 
 
@@ -32,7 +33,7 @@ DOUBLES = st.one_of(
 @pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(*[DOUBLES] * 6), min_size=1, max_size=40))
-def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows):
+def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any) -> None:
     surrogate = Surrogate.open()
     found, rejects = answer(pa.RecordBatch.from_pylist([dict(zip(NAMES, row, strict=True)) for row in rows]), surrogate)
     assert found.num_rows == len(rows)
@@ -61,7 +62,9 @@ def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows):
          pa.array([""]), pa.array([" "]), pa.array(["NaN"]), pa.array([None], pa.float64()), pa.nulls(1),
          pa.array([None], pa.string()), pa.array([math.nan]), pa.array([math.nan], pa.float32())))],
 )  # fmt: skip
-def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type_of_column(surrogate, cell, k):
+def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type_of_column(
+    surrogate: Surrogate, cell: Any, k: Any
+) -> None:
     found, rejects = answer(batch_of(k=cell), surrogate)
     if k == GAP:
         assert found.column("mu_macro").null_count == 1
@@ -82,7 +85,9 @@ def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type_of_column(surr
      ("mu0", "0x1", "must be a number without a unit: give a plain number"), ("Fz", "inf", "must be finite and > 0"),
      ("omega", "-1", "must be finite and >= 0")],
 )  # fmt: skip
-def test_a_bad_cell_is_named_with_its_value_and_reason(surrogate, column, cell, reason):
+def test_a_bad_cell_is_named_with_its_value_and_reason(
+    surrogate: Surrogate, column: Any, cell: Any, reason: Any
+) -> None:
     name = column.partition(" ")[0]
     batch = batch_of(**{column: [cell]})
     batch = batch.drop_columns(["omega"] if name == "f" else [name] if name != column else [])
@@ -105,7 +110,9 @@ LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
          ("0", None), ("9.99", None), ("10", ("Fz_amplitude", LIFTS)), ("-1", ("Fz_amplitude", LIFTS)),
          ("", ("Fz_amplitude", "is missing")), ("inf", ("Fz_amplitude", LIFTS))))],
 )  # fmt: skip
-def test_ends_of_k_and_amplitudes_of_the_force_are_refused_likewise(surrogate, left_out, columns, refused):
+def test_ends_of_k_and_amplitudes_of_the_force_are_refused_likewise(
+    surrogate: Surrogate, left_out: Any, columns: Any, refused: Any
+) -> None:
     batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(left_out)
     found, rejects = answer(batch, surrogate, direction="normal" if left_out == "y0" else "across")
     assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == ([refused] if refused else [])
@@ -114,7 +121,7 @@ def test_ends_of_k_and_amplitudes_of_the_force_are_refused_likewise(surrogate, l
         assert low < middle < high or (low == middle == high and "1" in columns.values())
 
 
-def test_units_in_brackets_are_converted_exactly(surrogate):
+def test_units_in_brackets_are_converted_exactly(surrogate: Surrogate) -> None:
     columns = {"mu0": [0.3], "Fz [kN]": [0.01], "k [N/mm]": [1000.0], "y0 (um)": [2.0], "f [kHz]": [20.69],
                "v0 [mm/s]": [10.0]}  # fmt: skip
     found, rejects = answer(pa.RecordBatch.from_pydict(columns), surrogate)
@@ -150,19 +157,21 @@ SIMILAR = "{!r} is similar: rename that column to {}"
           for name in ("K", "k [N/mm]", "k", "Stiffness", "k_N_per_mm")),
     ],
 )  # fmt: skip
-def test_a_misnamed_column_is_never_ignored(names, options, parts):
+def test_a_misnamed_column_is_never_ignored(names: Any, options: Any, parts: Any) -> None:
     with pytest.raises(FilesError) as caught:
         find_columns(names.split(","), **options)
     assert all(part in str(caught.value) for part in parts), caught.value
 
 
-def test_rigid_can_be_given_for_a_batch_without_k(surrogate):
+def test_rigid_can_be_given_for_a_batch_without_k(surrogate: Surrogate) -> None:
     found, _ = answer(batch_of(speed=["slow"]).drop_columns("k"), surrogate, rigid=True)
     assert found.column("speed").to_pylist() == ["slow"]
     assert found.column("source")[0].as_py() == "rigid"
 
 
-def test_a_column_that_holds_no_numbers_is_refused_by_name_and_one_without_rows_is_answered(surrogate):
+def test_a_column_that_holds_no_numbers_is_refused_by_name_and_one_without_rows_is_answered(
+    surrogate: Surrogate,
+) -> None:
     with pytest.raises(FilesError, match="the column v0 holds bool, not numbers"):
         answer(batch_of(v0=[True]), surrogate)
     found, rejects = answer(batch_of().slice(0, 0), surrogate)
@@ -170,7 +179,7 @@ def test_a_column_that_holds_no_numbers_is_refused_by_name_and_one_without_rows_
     assert tuple(found.schema.names[6:]) == ANSWERS
 
 
-def test_the_gradient_comes_with_the_answer(surrogate):
+def test_the_gradient_comes_with_the_answer(surrogate: Surrogate) -> None:
     rng = np.random.default_rng(0)
     columns = {name: value * rng.uniform(0.5, 2.0, 20) for name, value in CASE.items()}
     columns["k"][3], columns["v0"][5] = math.inf, -1.0

@@ -7,9 +7,14 @@ import io
 import json
 import math
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+
+from mumacro import Surrogate
+from tests.cases import Capture
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
@@ -25,7 +30,7 @@ KINDS = ("csv", "csv.gz", "ndjson", "jsonl.gz", "parquet")
 MISSING_K = "is missing; write rigid or a number"
 
 
-def cases(n, seed=1):
+def cases(n: int, seed: int = 1) -> Any:
     rng = np.random.default_rng(seed)
     low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
     columns = dict(zip(NAMES, (10.0 ** rng.uniform(low, high, (n, 6))).T, strict=True))
@@ -33,7 +38,7 @@ def cases(n, seed=1):
     return pa.table(columns)
 
 
-def write(given, path):
+def write(given: Any, path: Any) -> Any:
     """Cases in the format of the name; an infinite k is the word rigid, where the format has no infinity."""
     if path.suffix == ".parquet":
         pq.write_table(given, path, row_group_size=100)
@@ -51,7 +56,7 @@ def write(given, path):
     return path
 
 
-def read(path, sep=","):
+def read(path: Any, sep: str = ",") -> Any:
     """Rows of an output as dicts of Python values; cells of CSV as text."""
     if path.suffix == ".parquet":
         return pq.read_table(path).to_pylist()
@@ -62,13 +67,13 @@ def read(path, sep=","):
     return [json.loads(line, parse_constant=pytest.fail) for line in text.splitlines()]
 
 
-def rejects_of(path):
+def rejects_of(path: Any) -> Any:
     """Row, input and reason of each rejected row."""
     rows = read(path.with_name(path.name + ".rejects.csv"))
     return [(int(row["row"]), row["field"], row["reason"]) for row in rows]
 
 
-def ran(capsys, code, *words):
+def ran(capsys: Capture, code: Any, *words: Any) -> Any:
     """The last line of ``mumacro eval WORDS``; the only one if it fails."""
     assert main(["eval", *map(str, words)]) == code
     said = capsys.readouterr()
@@ -79,7 +84,9 @@ def ran(capsys, code, *words):
 
 @pytest.mark.parametrize("start", KINDS)
 @pytest.mark.parametrize("end", KINDS)
-def test_every_format_goes_into_every_other_with_the_same_bits_in_order(tmp_path, surrogate, monkeypatch, start, end):
+def test_every_format_goes_into_every_other_with_the_same_bits_in_order(
+    tmp_path: Path, surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch, start: Any, end: Any
+) -> None:
     monkeypatch.setattr(reading, "ROWS", 70)  # several blocks
     given = cases(300)
     source, out = write(given, tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
@@ -96,7 +103,7 @@ def test_every_format_goes_into_every_other_with_the_same_bits_in_order(tmp_path
         assert [row[name] for row in found] == getattr(expected, name).tolist()
 
 
-def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path, surrogate):
+def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path: Path, surrogate: Surrogate) -> None:
     others = {
         "i32": pa.array(range(300), pa.int32()), "f32": pa.array([0.1, math.nan, -math.inf] * 100, pa.float32()),
         "ns": pa.array([10**18 + i for i in range(300)], pa.timestamp("ns", "UTC")),
@@ -122,7 +129,7 @@ def test_columns_of_parquet_keep_their_types_and_are_valid_as_text(tmp_path, sur
     assert json.loads(rows[0]["list"]) == [1, 2]
 
 
-def test_text_comes_out_as_it_came_in(tmp_path, surrogate):
+def test_text_comes_out_as_it_came_in(tmp_path: Path, surrogate: Surrogate) -> None:
     lines = ['{"mu0":0.30,"Fz":10,"k":1000000,"y0":2e-6,"omega":130000,"v0":1E-2,"id":12345678901234567890, "b":[1] }',
              '{"v0":0.01,"mu0":0.3,"Fz":10,"k":"rigid","y0":2e-6,"omega":130000,"note":"\\u00b5 NaN"}']  # fmt: skip
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
@@ -147,7 +154,9 @@ GERMAN = 'name;mu0;Fz;k [N/mm];y0 [µm];f [kHz];v0\n"a;b";0,3;10;1,5e3;0,2;20;0,
 
 
 @pytest.mark.parametrize("text", [GERMAN, "\ufeff" + GERMAN.replace("\n", "\r\n")])
-def test_a_german_file_is_recognised_and_read_with_the_options_that_are_named(tmp_path, capsys, text):
+def test_a_german_file_is_recognised_and_read_with_the_options_that_are_named(
+    tmp_path: Path, capsys: Capture, text: str
+) -> None:
     (tmp_path / "cases.csv").write_bytes(text.encode())
     out, words = tmp_path / "out.csv", [tmp_path / "cases.csv", "-o", tmp_path / "out.csv"]
     assert "give --sep ';' --decimal ','" in ran(capsys, 1, *words)
@@ -165,7 +174,9 @@ def test_a_german_file_is_recognised_and_read_with_the_options_that_are_named(tm
 
 
 @pytest.mark.parametrize("kind", ["csv", "ndjson", "csv.gz", "parquet"])
-def test_standard_input_and_output(tmp_path, capfdbinary, monkeypatch, surrogate, kind):
+def test_standard_input_and_output(
+    tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, surrogate: Surrogate, kind: Any
+) -> None:
     bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
     source, wanted = write(bad, tmp_path / f"cases.{kind}"), tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv")
     rejects = evaluate_files([source], wanted, surrogate).rejects
@@ -180,12 +191,12 @@ def test_standard_input_and_output(tmp_path, capfdbinary, monkeypatch, surrogate
 # --- rejects ------------------------------------------------------------------------------------------
 
 
-def with_k(cell):
+def with_k(cell: Any) -> Any:
     return GOOD.replace("1e6", cell)
 
 
 @pytest.mark.parametrize("end", ["csv", "parquet", "ndjson"])
-def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(tmp_path, capsys, end):
+def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(tmp_path: Path, capsys: Capture, end: Any) -> None:
     rows = [GOOD, "-" + GOOD, "x" + GOOD, GOOD[:-4], GOOD[:-5], GOOD + ",7", with_k(""), with_k("Rigid"), "",
             with_k("inf"), with_k("nan"), with_k("1e400"), GOOD.replace("1.3e5", "inf"), GOOD]  # fmt: skip
     (tmp_path / "cases.csv").write_text("\n".join([HEADER, *rows]))
@@ -202,7 +213,9 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(tmp_path, capsys, 
 
 
 @pytest.mark.parametrize("end", ["ndjson", "parquet"])
-def test_bad_lines_of_ndjson_land_in_the_side_file(tmp_path, capsys, surrogate, end):
+def test_bad_lines_of_ndjson_land_in_the_side_file(
+    tmp_path: Path, capsys: Capture, surrogate: Surrogate, end: Any
+) -> None:
     without_k = {name: value for name, value in CASE.items() if name != "k"}
     lines = [json.dumps(line) if isinstance(line, dict) else line for line in (
         {**CASE, "tag": "a"}, "", {**CASE, "k": None}, "[1]", "{", "null", {**CASE, "v0": True},
@@ -228,13 +241,15 @@ def test_bad_lines_of_ndjson_land_in_the_side_file(tmp_path, capsys, surrogate, 
 
 
 @pytest.mark.parametrize("first", ["null", "1", '"a"', "[null]", "{} null"])
-def test_no_first_line_of_ndjson_ends_the_process(tmp_path, surrogate, first):
+def test_no_first_line_of_ndjson_ends_the_process(tmp_path: Path, surrogate: Surrogate, first: Any) -> None:
     (tmp_path / "cases.ndjson").write_text(f"{first}\n{json.dumps(CASE)}\n")
     summary = evaluate_files([tmp_path / "cases.ndjson"], tmp_path / "out.ndjson", surrogate)
     assert (summary.answered, summary.rejected) == (1, 1)
 
 
-def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(tmp_path, surrogate, monkeypatch):
+def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(
+    tmp_path: Path, surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(reading, "ROWS", 2)  # records that go on in the next block
     rows = [f'"a\nb",{GOOD}', f"c,{GOOD}", f'"d\n\n",{GOOD},1', f"e,-{GOOD}", f'"f\r\ng",{GOOD}'] * 3
     (tmp_path / "cases.csv").write_text(f"name,{HEADER}\n" + "\n".join(rows) + "\n", newline="")
@@ -248,7 +263,9 @@ def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(tmp_path, surroga
 
 @pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize(("rows", "bad"), [(1, '"b'), (1, '"b" c'), (150_000, '"b')])
-def test_a_quote_that_is_not_closed_names_its_row(tmp_path, capsys, end, rows, bad):
+def test_a_quote_that_is_not_closed_names_its_row(
+    tmp_path: Path, capsys: Capture, end: Any, rows: Any, bad: Any
+) -> None:
     text = f"name,{HEADER}\n" + f"a,{GOOD}\n" * rows + f"{bad},{GOOD}\n" + f"c,{GOOD}\n" * 50
     (tmp_path / "cases.csv").write_text(text)
     message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / f"out.{end}")
@@ -264,14 +281,16 @@ def test_a_quote_that_is_not_closed_names_its_row(tmp_path, capsys, end, rows, b
         ("mu0,Fz,y0,omega,v0\n", ["no column k", "'Fz'", "--rigid"]), (f"{HEADER}\r{GOOD}", ["line 1: is no header"]),
     ],
 )  # fmt: skip
-def test_a_file_that_holds_no_cases_is_refused_by_name(tmp_path, capsys, content, parts):
+def test_a_file_that_holds_no_cases_is_refused_by_name(
+    tmp_path: Path, capsys: Capture, content: Any, parts: Any
+) -> None:
     (tmp_path / "cases.csv").write_bytes(content.encode())
     message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv")
     assert all(part in message for part in [str(tmp_path / "cases.csv"), *parts])
     assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
 
 
-def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path, capsys):
+def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path: Path, capsys: Capture) -> None:
     good = write(cases(2000), tmp_path / "good.parquet")
     (tmp_path / "text.parquet").write_text("no parquet")
     (tmp_path / "cut.csv.gz").write_bytes(write(cases(5000), tmp_path / "whole.csv.gz").read_bytes()[:50_000])
@@ -290,7 +309,9 @@ def test_damaged_and_missing_files_are_reported_in_one_line(tmp_path, capsys):
     assert "several formats" in ran(capsys, 1, good, tmp_path / "latin.csv", "-o", tmp_path / "o.csv")
 
 
-def test_a_field_that_begins_late_in_ndjson_is_not_lost(tmp_path, capsys, monkeypatch):
+def test_a_field_that_begins_late_in_ndjson_is_not_lost(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(reading, "ROWS", 10)
     lines = [json.dumps({**CASE, **more}) for more in [{}] * 30 + [{"x": 1}]]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
@@ -300,13 +321,13 @@ def test_a_field_that_begins_late_in_ndjson_is_not_lost(tmp_path, capsys, monkey
 
 
 @pytest.mark.parametrize("kind", ["csv", "csv.gz", "parquet"])
-def test_a_file_without_rows_gives_a_file_without_rows(tmp_path, surrogate, kind):
+def test_a_file_without_rows_gives_a_file_without_rows(tmp_path: Path, surrogate: Surrogate, kind: Any) -> None:
     source = write(cases(1).slice(0, 0), tmp_path / f"cases.{kind}")
     assert evaluate_files([source], tmp_path / f"out.{kind}", surrogate).rows == 0
     assert read(tmp_path / f"out.{kind}") == []
 
 
-def test_folders_patterns_and_hive_names(tmp_path, surrogate):
+def test_folders_patterns_and_hive_names(tmp_path: Path, surrogate: Surrogate) -> None:
     for year in (2023, 2024):
         (tmp_path / "runs" / f"year={year}").mkdir(parents=True)
         for name in "ba":
@@ -344,7 +365,9 @@ KINDS = {
 @pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize("start", ["csv", "ndjson", "parquet"])
 @pytest.mark.parametrize("name", KINDS)
-def test_files_know_contact_direction_and_ends_of_k_as_the_library_does(tmp_path, capsys, surrogate, start, end, name):
+def test_files_know_contact_direction_and_ends_of_k_as_the_library_does(
+    tmp_path: Path, capsys: Capture, surrogate: Surrogate, start: Any, end: Any, name: str
+) -> None:
     kind, more = KINDS[name]
     rng = np.random.default_rng(3)
     given = {field: value * rng.uniform(0.9, 1.1, 40) for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()}

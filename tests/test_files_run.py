@@ -7,9 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+
+from mumacro import Surrogate
+from tests.cases import Capture
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
@@ -22,13 +27,13 @@ KINDS = ("csv", "csv.gz", "ndjson", "parquet")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def small_blocks():
+def small_blocks() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reading, "ROWS", 400)
         yield
 
 
-def table_of(n):
+def table_of(n: int) -> Any:
     rng = np.random.default_rng(1)
     low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
     values = 10.0 ** rng.uniform(low, high, (n, 6))
@@ -37,7 +42,7 @@ def table_of(n):
 
 
 @pytest.fixture(scope="module")
-def cases(tmp_path_factory, surrogate, small_blocks):  # noqa: ARG001
+def cases(tmp_path_factory: pytest.TempPathFactory, surrogate: Surrogate, small_blocks: Any) -> Any:  # noqa: ARG001
     """3,000 cases in every format, and the output of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("cases")
     pq.write_table(table_of(3000), folder / "cases.parquet", row_group_size=1000)
@@ -51,19 +56,19 @@ def cases(tmp_path_factory, surrogate, small_blocks):  # noqa: ARG001
     return folder
 
 
-def copied(cases, kind, folder):
+def copied(cases: Any, kind: Any, folder: Path) -> Any:
     """An input of this test's own."""
     return shutil.copy(cases / f"cases.{kind}", folder)
 
 
-def left(folder):
+def left(folder: Path) -> Any:
     return sorted(path.name for path in folder.iterdir())
 
 
-def stopped(source, out, surrogate, share=0.5, **options):
+def stopped(source: Any, out: Any, surrogate: Surrogate, share: float = 0.5, **options: Any) -> None:
     """A run that is interrupted when ``share`` of its input is read."""
 
-    def stop(done, _rows, _rejected):
+    def stop(done: Any, _rows: Any, _rejected: Any) -> None:
         if done > share:
             raise KeyboardInterrupt
 
@@ -71,7 +76,7 @@ def stopped(source, out, surrogate, share=0.5, **options):
         evaluate_files([source], out, surrogate, progress=stop, **options)
 
 
-def assert_whole(out, cases):
+def assert_whole(out: Any, cases: Any) -> None:
     """The bytes of the undisturbed run, and nothing left over."""
     kind = out.name.partition(".")[2]
     for ending in ("", ".rejects.csv"):
@@ -83,7 +88,9 @@ def assert_whole(out, cases):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("share", [-1.0, 0.4, 0.8])
-def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(tmp_path, surrogate, cases, kind, share):
+def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(
+    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, share: Any
+) -> None:
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
     stopped(source, out, surrogate, share)
     assert not out.exists()
@@ -96,7 +103,9 @@ def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(tmp_pa
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed", "gone", "longer"])
-def test_finished_pieces_that_are_cut_or_changed_are_done_again(tmp_path, surrogate, cases, kind, harm):
+def test_finished_pieces_that_are_cut_or_changed_are_done_again(
+    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, harm: Any
+) -> None:
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
     stopped(source, out, surrogate)
     part = tmp_path / f"out.{kind}.parts" / "log"
@@ -114,15 +123,17 @@ def test_finished_pieces_that_are_cut_or_changed_are_done_again(tmp_path, surrog
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(tmp_path, surrogate, cases, monkeypatch, kind):
+def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(
+    tmp_path: Path, surrogate: Surrogate, cases: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
+) -> None:
     """Before each file that is put into place or deleted; then the same command completes the run."""
     source, steps = copied(cases, kind, tmp_path), 0
     while True:
         out, count = tmp_path / str(steps) / f"out.{kind}", 0
         out.parent.mkdir()
 
-        def step(act, stop=steps):
-            def counted(*words, **options):
+        def step(act: Any, stop: Any = steps) -> Any:
+            def counted(*words: Any, **options: Any) -> Any:
                 nonlocal count
                 count += 1
                 if count > stop:
@@ -147,7 +158,9 @@ def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(tmp_path, surrog
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_command_given_again_after_its_end_finds_all_done(tmp_path, cases, capsys, kind):
+def test_the_command_given_again_after_its_end_finds_all_done(
+    tmp_path: Path, cases: Any, capsys: Capture, kind: Any
+) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     words = ["eval", str(source), "-o", str(out)]
     assert [main(words), main(words)] == [3, 3]
@@ -165,7 +178,7 @@ def test_the_command_given_again_after_its_end_finds_all_done(tmp_path, cases, c
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parquet", "csv"])
-def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path, repository, cases, kind):
+def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path: Path, repository: Path, cases: Any, kind: Any) -> None:
     source, out, log = tmp_path / "cases.csv", tmp_path / f"out.{kind}", tmp_path / f"out.{kind}.parts" / "log"
     header, *rows = (cases / "cases.csv").read_text().splitlines(keepends=True)
     source.write_text("".join([header, *(200 * rows)]))
@@ -192,12 +205,14 @@ def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path, repository, cases, k
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed"])
-def test_an_input_that_changes_during_the_run_is_not_reported_complete(tmp_path, surrogate, cases, kind, harm):
+def test_an_input_that_changes_during_the_run_is_not_reported_complete(
+    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, harm: Any
+) -> None:
     source, out = tmp_path / f"cases.{kind}", tmp_path / f"out.{kind}"
     copied(cases, kind, tmp_path)
     data, times = source.read_bytes(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
 
-    def change(*_):
+    def change(*_: Any) -> None:
         if harm == "cut":
             os.truncate(source, len(data) // 2)
         else:  # a digit; the size and the time stay
@@ -210,7 +225,9 @@ def test_an_input_that_changes_during_the_run_is_not_reported_complete(tmp_path,
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": "ball"}, {"direction": "along"}])
-def test_another_content_contact_or_direction_is_another_run(tmp_path, surrogate, cases, kind):
+def test_another_content_contact_or_direction_is_another_run(
+    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any
+) -> None:
     source, out = tmp_path / "cases.csv", tmp_path / "out.csv"
     copied(cases, "csv", tmp_path)
     stopped(source, out, surrogate, **kind)
@@ -232,7 +249,9 @@ def test_another_content_contact_or_direction_is_another_run(tmp_path, surrogate
 
 @pytest.mark.parametrize("name", ["out.csv", "out.csv.rejects.csv"])
 @pytest.mark.parametrize("given", ["", "link.csv"])
-def test_an_output_never_overwrites_an_input(tmp_path, capsys, cases, name, given):
+def test_an_output_never_overwrites_an_input(
+    tmp_path: Path, capsys: Capture, cases: Any, name: str, given: Any
+) -> None:
     shutil.copy(cases / "cases.csv", tmp_path / name)
     if given:
         (tmp_path / given).hardlink_to(tmp_path / name)
@@ -242,13 +261,13 @@ def test_an_output_never_overwrites_an_input(tmp_path, capsys, cases, name, give
 
 
 def test_files_that_are_not_of_a_run_are_kept_and_a_second_run_to_one_output_is_refused(
-    tmp_path, surrogate, cases, capsys
-):
+    tmp_path: Path, surrogate: Surrogate, cases: Any, capsys: Capture
+) -> None:
     source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", []
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
 
-    def other(*_):
+    def other(*_: Any) -> None:
         if not said:
             assert main(["eval", str(source), "-o", str(out), "--force"]) == 1
             said.append(capsys.readouterr().err)
@@ -260,7 +279,9 @@ def test_files_that_are_not_of_a_run_are_kept_and_a_second_run_to_one_output_is_
 
 @pytest.mark.skipif(os.name == "nt", reason="no limit of file sizes")
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_a_full_disk_is_reported_in_one_line_and_the_run_goes_on_later(tmp_path, surrogate, cases, repository, kind):
+def test_a_full_disk_is_reported_in_one_line_and_the_run_goes_on_later(
+    tmp_path: Path, surrogate: Surrogate, cases: Any, repository: Path, kind: Any
+) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     program = (
         "import resource, sys; from mumacro.files import reading; reading.ROWS = 400; "
@@ -278,8 +299,8 @@ def test_a_full_disk_is_reported_in_one_line_and_the_run_goes_on_later(tmp_path,
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_file(tmp_path, repository):
-    def peak(n):
+def test_memory_does_not_grow_with_the_file(tmp_path: Path, repository: Path) -> None:
+    def peak(n: int) -> Any:
         pq.write_table(table_of(n), tmp_path / "cases.parquet", row_group_size=100_000)
         program = (
             "import resource; from mumacro.__main__ import main; "

@@ -2,32 +2,33 @@
 
 import math
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
-from mumacro import InputError, fit
+from mumacro import InputError, Surrogate, fit
 from mumacro.contact import CONTACTS
+from tests.comparing import close
 
 RIG = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
 V0 = np.geomspace(1e-3, 1.0, 20)
 
 
 @pytest.fixture(autouse=True)
-def quiet():
+def quiet() -> Any:
     """Warnings are looked at in the result."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         yield
 
 
-def friction(surrogate, contact="spring", **inputs):
+def friction(surrogate: Surrogate, contact: str = "spring", **inputs: Any) -> Any:
     """mu_macro of a contact that is known."""
     return np.asarray(surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, contact=contact).mu_macro)
 
 
-def noisy(surrogate, spread, seed=0, **inputs):
+def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> Any:
     """Points with noise, and their standard deviations."""
     mu = friction(surrogate, **inputs)
     return mu + np.random.default_rng(seed).normal(scale=spread, size=mu.shape)
@@ -37,7 +38,9 @@ def noisy(surrogate, spread, seed=0, **inputs):
 @pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
 @pytest.mark.parametrize("contact", CONTACTS)
-def test_inputs_are_recovered_within_their_covariance(surrogate, contact, unknowns, given) -> None:
+def test_inputs_are_recovered_within_their_covariance(
+    surrogate: Surrogate, contact: str, unknowns: Any, given: Any
+) -> None:
     """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for itself."""
     from scipy.stats import binom, chi2
     from scipy.stats import f as fisher
@@ -64,7 +67,7 @@ def test_inputs_are_recovered_within_their_covariance(surrogate, contact, unknow
 
 @pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize("k", [2e5, 1e6, 1e7])
-def test_points_without_noise_give_the_inputs(surrogate, contact, k) -> None:
+def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: str, k: Any) -> None:
     mu = friction(surrogate, contact, v0=V0, k=k)
     found = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
     assert found.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
@@ -73,7 +76,7 @@ def test_points_without_noise_give_the_inputs(surrogate, contact, k) -> None:
     assert fit({"v0": V0, "mu_macro": mu}, "mu0", contact=contact, k=k, **RIG).values["mu0"] == close(0.3, rel=1e-9)
 
 
-def test_every_input_may_vary(surrogate) -> None:
+def test_every_input_may_vary(surrogate: Surrogate) -> None:
     rng = np.random.default_rng(1)
     columns = {
         "v0": rng.uniform(1e-3, 1.0, 30), "Fz": rng.uniform(5.0, 20.0, 30), "y0": rng.uniform(0.0, 5e-6, 30),
@@ -87,7 +90,7 @@ def test_every_input_may_vary(surrogate) -> None:
     assert fit(frame).values == {"k": close(1e6, rel=1e-6), "mu0": close(0.3, rel=1e-7)}
 
 
-def test_weights_are_the_standard_deviations(surrogate) -> None:
+def test_weights_are_the_standard_deviations(surrogate: Surrogate) -> None:
     mu, std = noisy(surrogate, 1e-4, v0=V0), np.full(20, 1e-4)
     mu[3], std[3] = 0.9, 1e6
     found = fit({"v0": V0, "mu_macro": mu, "std": std}, **RIG)
@@ -99,7 +102,7 @@ def test_weights_are_the_standard_deviations(surrogate) -> None:
     )
 
 
-def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate) -> None:
+def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate: Surrogate) -> None:
     found = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
     mu, off = found.predict(v0=0.05)
     both = np.linalg.cholesky(found.covariance)
@@ -112,8 +115,8 @@ def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate) -> N
 # --- what points do not tell --------------------------------------------------------------------------------
 
 
-def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate) -> None:
-    def measured(k, spread=3e-3):
+def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate: Surrogate) -> None:
+    def measured(k: Any, spread: float = 3e-3) -> Any:
         return fit({"v0": V0, "mu_macro": noisy(surrogate, spread, v0=V0, k=k), "std": spread}, **RIG)
 
     with pytest.warns(UserWarning, match="only a lower bound"):
@@ -131,7 +134,7 @@ def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate
         assert any(said in text for text in found.warnings)
 
 
-def test_all_solutions_are_found(surrogate) -> None:
+def test_all_solutions_are_found(surrogate: Surrogate) -> None:
     """mu_macro is not monotone in k: three stiffnesses give this friction."""
     v0 = 2e-6 * 0.57 / 10.9 * 2.0 * math.pi * 20e3
     k = np.geomspace(1e4, 1e10, 100_000)
@@ -148,7 +151,7 @@ def test_all_solutions_are_found(surrogate) -> None:
     assert len(fit({"v0": [v0], "mu_macro": [target], "std": 0.02}, "k", mu0=0.3, **RIG).solutions) == 1
 
 
-def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate) -> None:
+def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate: Surrogate) -> None:
     v0 = np.array([0.002, 0.1])
     found = fit({"v0": v0, "mu_macro": friction(surrogate, v0=v0)}, **RIG)
     assert found.values["k"] == close(1e6, rel=1e-6)
@@ -162,7 +165,7 @@ def test_as_many_points_as_unknowns_have_no_error_without_std(surrogate) -> None
 @pytest.mark.parametrize(
     ("k", "mu0", "scale"), [(1e-3, 0.3, 1e-9), (1e15, 0.3, 1e9), (1e6, 1e-3, 1.0), (1e6, 30.0, 1.0)]
 )
-def test_units_and_sizes_do_not_matter(surrogate, k, mu0, scale) -> None:
+def test_units_and_sizes_do_not_matter(surrogate: Surrogate, k: Any, mu0: Any, scale: Any) -> None:
     """Stiffness over force, and amplitude over l0, are what counts."""
     rig = {"Fz": 10.0 * scale, "y0": 2.0 * mu0 * 10.0 * scale / k, "f": 20e3}
     v0 = rig["y0"] * 1.3e5 * np.geomspace(0.01, 3.0, 20)
@@ -171,7 +174,7 @@ def test_units_and_sizes_do_not_matter(surrogate, k, mu0, scale) -> None:
 
 
 @pytest.mark.parametrize("along", ["v0", "y0"])
-def test_the_picture_has_points_fit_and_band(surrogate, along) -> None:
+def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     x = {"v0": np.append(0.0, V0), "y0": np.geomspace(1e-7, 1e-5, 21)}[along]
@@ -224,7 +227,7 @@ POINTS = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
         ({"v0": [0.1, 0.2], "mu_macro": ["0.2", "0.3"]}, RIG, "mu_macro must be a real number"),
     ],
 )  # fmt: skip
-def test_bad_input_is_named_with_the_remedy(data, given, said) -> None:
+def test_bad_input_is_named_with_the_remedy(data: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         fit(data, **given)
 

@@ -5,15 +5,18 @@ import os
 import shutil
 import subprocess
 import zipfile
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from builder.export import export_table
-from comparing import close
 from mumacro import Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.inputs import FIELDS
+from tests import compilers
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
@@ -22,12 +25,12 @@ FORMATS = {"fmu": 2, "fmu3": 3}
 
 
 @pytest.fixture(scope="module")
-def table(tables_dir):
+def table(tables_dir: Path) -> Any:
     return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
 
 
 @pytest.fixture(scope="module")
-def units(table, tmp_path_factory):
+def units(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Both units by format."""
     root = tmp_path_factory.mktemp("fmu")
     for kind in FORMATS:
@@ -36,12 +39,12 @@ def units(table, tmp_path_factory):
 
 
 @pytest.fixture(params=FORMATS)
-def unit(request, units):
+def unit(request: pytest.FixtureRequest, units: Any) -> Any:
     return units[request.param]
 
 
 @pytest.fixture
-def fmpy(compilers):
+def fmpy() -> Any:
     """FMPy, and a compiler that has built the unit's binary."""
     compilers.compiler("gcc")
     pytest.importorskip("fmpy.validation", reason="fmpy is not installed")
@@ -50,7 +53,7 @@ def fmpy(compilers):
     return fmpy
 
 
-def test_the_sources_compile_without_a_warning(unit, compilers, tmp_path):
+def test_the_sources_compile_without_a_warning(unit: str, tmp_path: Path) -> None:
     with zipfile.ZipFile(unit) as archive:
         archive.extractall(tmp_path)
         names = archive.namelist()
@@ -63,14 +66,14 @@ def test_the_sources_compile_without_a_warning(unit, compilers, tmp_path):
 
 
 @pytest.mark.usefixtures("fmpy")
-def test_fmpy_finds_no_fault(unit):
+def test_fmpy_finds_no_fault(unit: str) -> None:
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(unit)) == []
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_a_simulation_follows_its_inputs(unit, fmpy, table, kind):
+def test_a_simulation_follows_its_inputs(unit: str, fmpy: Any, table: Surrogate, kind: Any) -> None:
     time = np.linspace(0.0, 1.0, 41)
     v0 = 10.0 ** (-4.0 + 5.0 * time)
     given = np.array(list(zip(time, v0, strict=True)), dtype=[("time", float), ("v0", float)])
@@ -91,7 +94,7 @@ def test_a_simulation_follows_its_inputs(unit, fmpy, table, kind):
 class Loaded:
     """A unit of either standard, loaded and initialised with parameters; variables by name."""
 
-    def __init__(self, fmpy, unit, folder, **parameters):
+    def __init__(self, fmpy: Any, unit: str, folder: Path, **parameters: Any) -> None:
         description = fmpy.read_model_description(str(unit))
         folder = fmpy.extract(str(unit), str(folder))
         self.unit = unit = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
@@ -109,22 +112,22 @@ class Loaded:
         unit.enterInitializationMode()
         unit.exitInitializationMode()
 
-    def put(self, **values):
+    def put(self, **values: Any) -> None:
         """Set numbers, or with whole ones enumerations."""
         for name, value in values.items():
             self._set[isinstance(value, int)]([self.at[name]], [value])
 
-    def get(self, *names, whole=False):
+    def get(self, *names: Any, whole: bool = False) -> Any:
         """Numbers, or the values of enumerations."""
         return self._get[whole]([self.at[name] for name in names])
 
-    def slope(self, output, **seeds):
+    def slope(self, output: Any, **seeds: Any) -> Any:
         """The derivative of an output along a direction of the inputs."""
         known = [self.at[name] for name in seeds]
         return self.unit.getDirectionalDerivative([self.at[output]], known, list(seeds.values()))[0]
 
 
-def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
+def test_directional_derivatives_are_the_gradient(unit: str, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     assert made.outputs == [made.at[name] for name in ("mu_macro", "mu_ratio", "force")]
     for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}, {**CASE, "v0": -0.01}):
@@ -151,7 +154,9 @@ def test_directional_derivatives_are_the_gradient(unit, fmpy, table, tmp_path):
 @pytest.mark.parametrize(
     ("contact", "direction"), [("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
 )
-def test_contacts_and_directions(unit, fmpy, table, tmp_path, contact, direction):
+def test_contacts_and_directions(
+    unit: str, fmpy: Any, table: Surrogate, tmp_path: Path, contact: str, direction: Any
+) -> None:
     kind = {"contact": CONTACTS.index(contact), "direction": DIRECTIONS.index(direction)}
     case = {name: value for name, value in CASE.items() if direction != "normal" or name != "y0"}
     case |= {"Fz_amplitude": 4.0} if direction == "normal" else {}
@@ -176,11 +181,11 @@ def test_contacts_and_directions(unit, fmpy, table, tmp_path, contact, direction
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": 1}, {"direction": 1}, {"direction": 2}])
-def test_the_force_passes_through_zero_with_its_derivatives(unit, fmpy, tmp_path, kind):
+def test_the_force_passes_through_zero_with_its_derivatives(unit: str, fmpy: Any, tmp_path: Path, kind: Any) -> None:
     made = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
     made.put(Fz_amplitude=4.0)
 
-    def force(**moved):
+    def force(**moved: Any) -> Any:
         made.put(**moved)
         return made.get("force")[0]
 
@@ -200,7 +205,9 @@ def test_the_force_passes_through_zero_with_its_derivatives(unit, fmpy, tmp_path
     assert made.get("v_rest") == [1e-3]
 
 
-def test_states_are_kept_and_illegal_inputs_are_discarded(unit, fmpy, table, tmp_path):
+def test_states_are_kept_and_illegal_inputs_are_discarded(
+    unit: str, fmpy: Any, table: Surrogate, tmp_path: Path
+) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     expected = table.evaluate(CASE).mu_macro
     assert made.get("mu_macro") == [close(expected, rel=1e-13)]
@@ -221,7 +228,7 @@ def test_states_are_kept_and_illegal_inputs_are_discarded(unit, fmpy, table, tmp
     assert made.get("k", "v_rest") == [1e6, 1e-4]
 
 
-def test_another_units_token_is_refused(unit, fmpy, tmp_path):
+def test_another_units_token_is_refused(unit: str, fmpy: Any, tmp_path: Path) -> None:
     description = fmpy.read_model_description(str(unit))
     folder = fmpy.extract(str(unit), str(tmp_path))
     description.guid = description.instantiationToken = "another"
@@ -229,7 +236,7 @@ def test_another_units_token_is_refused(unit, fmpy, tmp_path):
         fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
 
 
-def test_zig_makes_linux_and_windows(table, tmp_path, compilers, repository):
+def test_zig_makes_linux_and_windows(table: Surrogate, tmp_path: Path, repository: Path) -> None:
     zig = compilers.compiler("zig cc")
     export_table(table.path, "fmu3", tmp_path / "both.fmu")
     with zipfile.ZipFile(tmp_path / "both.fmu") as archive:

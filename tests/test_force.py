@@ -2,14 +2,18 @@
 
 import ctypes
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from builder.c.source import write_c
-from comparing import close
 from mumacro import Element, Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
+from tests import compilers
+from tests.cases import Case
+from tests.comparing import close
 
 REST = 1e-4
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
@@ -20,13 +24,13 @@ NUMBER, WHOLE, ARRAY = ctypes.c_double, ctypes.c_int, ctypes.POINTER(ctypes.c_do
 
 
 @pytest.fixture(scope="module")
-def table(tables_dir) -> Surrogate:
+def table(tables_dir: Path) -> Surrogate:
     """A table that is quick to compile."""
     return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
 
 
 @pytest.fixture(scope="module")
-def sources(table, tmp_path_factory):
+def sources(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The exported C sources."""
     folder = tmp_path_factory.mktemp("force")
     write_c(table.table, folder)
@@ -34,7 +38,7 @@ def sources(table, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def library(sources, compilers):
+def library(sources: Any) -> Any:
     """The exported functions in a shared library."""
     options = ("-O1", "-std=c99", *compilers.STRICT, "-shared", "-fPIC")
     made = sources / "force.so"
@@ -47,13 +51,13 @@ def library(sources, compilers):
     return found
 
 
-def force(library, v, rest=REST, **case):
+def force(library: Any, v: Any, rest: Any = REST, **case: Any) -> Any:
     """The force at each velocity."""
     given = {**CASE, **case}
     return np.array([library.mumacro_force(float(x), rest, *given.values()) for x in np.atleast_1d(v)])
 
 
-def with_slopes(library, pair, v, rest, case):
+def with_slopes(library: Any, pair: Any, v: Any, rest: Any, case: Case) -> Any:
     """What mumacro_evaluate_force returns, the force, and its derivatives by mu0, Fz, k, y0, omega, v0."""
     value, slopes = NUMBER(7.0), (NUMBER * 6)(*[7.0] * 6)
     codes = CONTACTS.index(pair[0]), DIRECTIONS.index(pair[1])
@@ -62,7 +66,7 @@ def with_slopes(library, pair, v, rest, case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_force_is_odd_smooth_and_rises(library, table, case) -> None:
+def test_the_force_is_odd_smooth_and_rises(library: Any, table: Surrogate, case: Case) -> None:
     v = np.concatenate([[0.0, 5e-324, 1e-300], np.linspace(0.0, 2.0 * REST, 401)[1:], np.geomspace(1e-3, 10.0, 50)])
     found = force(library, v, **case)
     assert np.array_equal(force(library, -v, **case), -found)
@@ -86,14 +90,14 @@ def test_the_force_is_odd_smooth_and_rises(library, table, case) -> None:
     ids="-".join,
 )
 @pytest.mark.parametrize("share", [0.0, 0.3, -0.7, 20.0, -500.0])
-def test_the_force_of_every_contact_has_its_derivatives(library, table, pair, share) -> None:
+def test_the_force_of_every_contact_has_its_derivatives(library: Any, table: Surrogate, pair: Any, share: Any) -> None:
     amplitude = {"Fz_amplitude": 4.0} if pair[1] == "normal" else {"y0": CASE["y0"]}  # [N], [m]
     case = {name: x for name, x in CASE.items() if name != "y0"} | amplitude
     speed = abs(share) if abs(share) > 1.0 else 0.5 + 0.5 * share * share
     law = table.evaluate({**case, "v0": speed * REST}, contact=pair[0], direction=pair[1], gradient=True)
     six = {name: case.get(name, 4.0) for name in CASE} | {"v0": share * REST}
 
-    def at(**moved):
+    def at(**moved: Any) -> Any:
         *five, v0 = {**six, **moved}.values()
         return with_slopes(library, pair, v0, REST, dict(zip(CASE, five, strict=True)))
 
@@ -116,7 +120,7 @@ def test_the_force_of_every_contact_has_its_derivatives(library, table, pair, sh
      ({"omega": -1.0}, 5, "omega"), ({"v0": math.nan}, -6, "for a force v0"), ({"v0": -math.inf}, -6, "for a force v0"),
      *[({"rest": x}, -6, "for a force v0 must be finite, and v_rest") for x in (0.0, -1.0, math.nan, math.inf)]],
 )  # fmt: skip
-def test_bad_input_gives_nan_and_the_reason(library, bad, error, says) -> None:
+def test_bad_input_gives_nan_and_the_reason(library: Any, bad: Any, error: Any, says: Any) -> None:
     case = {**CASE, **{name: x for name, x in bad.items() if name in CASE}}
     for v0 in (0.0, 0.5 * REST, -1.0):
         v0, rest = bad.get("v0", v0), bad.get("rest", REST)
@@ -126,7 +130,7 @@ def test_bad_input_gives_nan_and_the_reason(library, bad, error, says) -> None:
     assert library.mumacro_error_text(error).decode().startswith(says)
 
 
-def test_the_ends_of_v_rest_are_legal(library) -> None:
+def test_the_ends_of_v_rest_are_legal(library: Any) -> None:
     for rest in (5e-324, 1e-300, 1e300):
         found = force(library, [0.0, 5e-324, rest, -rest, 0.5 * rest], rest)
         assert np.isfinite(found).all()
@@ -136,7 +140,7 @@ def test_the_ends_of_v_rest_are_legal(library) -> None:
     assert library.mumacro_evaluate_force(0, 0, 1.0, REST, *CASE.values(), NUMBER(), None) == -1
 
 
-def test_steps_in_c_are_those_of_python(library) -> None:
+def test_steps_in_c_are_those_of_python(library: Any) -> None:
     rng = np.random.default_rng(5)
     for springs, contact in ((1, "spring"), (7, "ball")):
         mine, state, sums = Element(0.3, 10.0, 1e6, contact, springs), np.zeros((springs, 2)), np.zeros(2)
@@ -153,7 +157,7 @@ def test_steps_in_c_are_those_of_python(library) -> None:
      ({"mu0": -1.0}, 1, "mu0"), ({"Fz": -1.0}, 2, "Fz"), ({"Fz": math.inf}, 2, "Fz"), ({"k": math.inf}, 3, "k"),
      ({"k": math.nan}, 3, "k")],
 )  # fmt: skip
-def test_a_bad_step_moves_nothing_and_says_why(library, bad, error, says) -> None:
+def test_a_bad_step_moves_nothing_and_says_why(library: Any, bad: Any, error: Any, says: Any) -> None:
     given = {"springs": 2, "mu0": 0.3, "Fz": 10.0, "k": 1e6, "dx": 1e-6, "dy": 0.0, **bad}
     held, sums = (NUMBER * 4)(*[1.0] * 4), (NUMBER * 2)(5.0, 6.0)
     assert library.mumacro_element_step(*given.values(), held, sums) == error
@@ -164,7 +168,7 @@ def test_a_bad_step_moves_nothing_and_says_why(library, bad, error, says) -> Non
     assert library.mumacro_error_text(-1) == b"there is no place for the answer"
 
 
-def test_the_shaker_ends_stick_slip(sources, compilers, repository) -> None:
+def test_the_shaker_ends_stick_slip(sources: Any, repository: Path) -> None:
     """A mass on a belt swings without, and rests with transverse oscillation."""
     source, made = repository / "examples" / "c" / "mass_on_belt.c", sources / "mass_on_belt"
     assert len(source.read_text().splitlines()) <= 60

@@ -9,10 +9,10 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from comparing import close
-from forms import BATCH, WRITERS, Row, as_table, asked, number, posted, rows_of
 from mumacro import InputError, Surrogate
 from mumacro.__main__ import main
+from tests.comparing import close
+from tests.forms import BATCH, WRITERS, Row, as_table, asked, number, posted, rows_of
 from tests.serving import CASE
 
 COLUMNS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")

@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
+from mumacro import Surrogate
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +56,7 @@ print(json.dumps([
 """
 
 
-def run(folder, *command):
+def run(folder: Path, *command: Any) -> Any:
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     options = {"env": environment, "capture_output": True, "text": True, "timeout": 300, "check": False}
     done = subprocess.run([sys.executable, *command], cwd=folder, **options)
@@ -63,7 +65,7 @@ def run(folder, *command):
 
 
 @pytest.fixture(scope="module")
-def folder(live_server, tmp_path_factory):
+def folder(live_server: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A folder with the generated package and the program that uses it."""
     made = tmp_path_factory.mktemp("client")
     (made / "openapi.json").write_bytes(live_server.ask("GET", "/openapi.json")[2])
@@ -74,11 +76,11 @@ def folder(live_server, tmp_path_factory):
     return made
 
 
-def test_it_is_typed(folder):
+def test_it_is_typed(folder: Path) -> None:
     run(folder, "-m", "mypy", "--strict", "--follow-imports", "silent", "--cache-dir", "cache", "program.py")
 
 
-def test_its_answers_are_those_of_the_library(folder, live_server, surrogate):
+def test_its_answers_are_those_of_the_library(folder: Path, live_server: Any, surrogate: Surrogate) -> None:
     case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
     elastic, rigid = surrogate.evaluate(**case, v0=0.01), surrogate.evaluate(**{**case, "k": None}, v0=0.01).mu_macro
     law = surrogate.evaluate(**case, v0=np.geomspace(1e-3, 1.0, 7)).mu_macro.tolist()

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from comparing import close
-from serving import running
-from test_wheel import Installed, build
+from tests.comparing import close
+from tests.serving import running
+from tests.test_wheel import Installed, build
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")]
 

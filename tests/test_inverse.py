@@ -1,24 +1,25 @@
 """The inverse problem: roots against the forward answer, folds, reach, the border."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from comparing import close
-from mumacro import InputError
+from mumacro import InputError, Surrogate
 from mumacro.inverse import border_crossings, solve_for
-from tests.cases import CASE, PAIRS, as_kind, every_pair, without
+from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
+from tests.comparing import close
 
 
-def only_root(solution):
+def only_root(solution: Any) -> Any:
     ((root,),) = solution.roots
     return root
 
 
-def decade(low, high):
+def decade(low: Any, high: Any) -> Any:
     return st.floats(low, high).map(lambda x: 10.0**x)
 
 
@@ -31,7 +32,7 @@ cases = st.fixed_dictionaries(
 @every_pair
 @settings(max_examples=60, deadline=None)
 @given(case=cases, share=st.floats(0.001, 0.999), place=st.integers(0, 5))
-def test_the_forward_answer_is_inverted(surrogate, pair, case, share, place):
+def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any) -> None:
     said, fields, case = as_kind(case, pair, share)
     unknown = fields[place]
     forward = surrogate.evaluate(**case, **said)
@@ -50,21 +51,21 @@ def test_the_forward_answer_is_inverted(surrogate, pair, case, share, place):
     assert any(root.low <= value <= root.high for root in solution.roots[0])
 
 
-def test_a_root_is_enclosed_to_the_tables_error(surrogate):
+def test_a_root_is_enclosed_to_the_tables_error(surrogate: Surrogate) -> None:
     answer = surrogate.evaluate(**CASE, gradient=True)
     root = only_root(solve_for(surrogate, "v0", answer.mu_macro, without(CASE, "v0")))
     width = answer.error_bound / answer.gradient["v0"]
     assert [root.high - 0.01, 0.01 - root.low] == close([width, width], rel=0.05)
 
 
-def test_an_enclosure_on_a_plateau_spans_it(surrogate):
+def test_an_enclosure_on_a_plateau_spans_it(surrogate: Surrogate) -> None:
     # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of this one on
     case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
     root = only_root(solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, without(case, "k")))
     assert root.low < 10.0 < 1e9 < root.high
 
 
-def test_targets_are_solved_together_as_alone(surrogate):
+def test_targets_are_solved_together_as_alone(surrogate: Surrogate) -> None:
     targets = np.linspace(0.23, 0.299, 57)
     together = solve_for(surrogate, "v0", targets, without(CASE, "v0"))
     values = [roots[0].value for roots in together.roots]
@@ -77,7 +78,7 @@ def test_targets_are_solved_together_as_alone(surrogate):
     ("unknown", "low", "high"),
     [("v0", 0.3 * math.sqrt(5.0) / 3.0, 0.3), ("y0", 0.0, 0.3), ("omega", 0.3 * math.sqrt(5.0) / 3.0, 0.3)],
 )
-def test_a_monotone_unknown_reports_its_reach(surrogate, unknown, low, high):
+def test_a_monotone_unknown_reports_its_reach(surrogate: Surrogate, unknown: Any, low: Any, high: Any) -> None:
     targets = [0.999 * low, low + 0.5 * (high - low), 1.001 * high]
     solution = solve_for(surrogate, unknown, targets, without(CASE, unknown))
     assert [len(roots) for roots in solution.roots] == [0, 1, 0]
@@ -85,7 +86,7 @@ def test_a_monotone_unknown_reports_its_reach(surrogate, unknown, low, high):
     assert solution.reach.mu_max == high
 
 
-def test_an_end_that_is_attained_is_a_root_and_one_that_is_only_approached_none(surrogate):
+def test_an_end_that_is_attained_is_a_root_and_one_that_is_only_approached_none(surrogate: Surrogate) -> None:
     static = surrogate.evaluate(**{**CASE, "v0": 0.0}).mu_macro
     for unknown, end in (("v0", static), ("y0", 0.3), ("omega", 0.3)):
         assert only_root(solve_for(surrogate, unknown, end, without(CASE, unknown))).value == 0.0
@@ -99,7 +100,7 @@ def test_an_end_that_is_attained_is_a_root_and_one_that_is_only_approached_none(
 
 
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
-def test_a_fold_has_three_roots(surrogate, unknown):
+def test_a_fold_has_three_roots(surrogate: Surrogate, unknown: Any) -> None:
     case = {**CASE, "v0": 1e-4}  # r = 2600
     kappa = np.geomspace(1e-6, 1e10, 40_001)  # y~
     ratio = surrogate.mu_ratio(kappa / 2600.0, kappa)
@@ -120,7 +121,7 @@ def test_a_fold_has_three_roots(surrogate, unknown):
     assert below.reach.mu_min == close(0.3 * low, rel=1e-6)
 
 
-def test_a_range_keeps_its_roots_only(surrogate):
+def test_a_range_keeps_its_roots_only(surrogate: Surrogate) -> None:
     case = without({**CASE, "v0": 1e-4}, "k")
     target = 0.3 * 0.0023
     every = solve_for(surrogate, "k", target, case)
@@ -139,7 +140,7 @@ def test_a_range_keeps_its_roots_only(surrogate):
     [("v0", {"y0": 0.0}), ("v0", {"omega": 0.0}), ("k", {"y0": 0.0}), ("Fz", {"omega": 0.0}), ("y0", {"omega": 0.0}),
      ("omega", {"y0": 0.0}), ("Fz", {"k": None})],
 )  # fmt: skip
-def test_an_input_without_influence_is_reported(surrogate, unknown, changed):
+def test_an_input_without_influence_is_reported(surrogate: Surrogate, unknown: Any, changed: Any) -> None:
     case = {**CASE, **changed}
     value = surrogate.evaluate(**case).mu_macro
     solution = solve_for(surrogate, unknown, [value, 0.9 * value], without(case, unknown))
@@ -148,7 +149,7 @@ def test_an_input_without_influence_is_reported(surrogate, unknown, changed):
     assert solution.reach.mu_min == solution.reach.mu_max == value
 
 
-def test_at_rest_the_frequency_only_matters_by_being_there(surrogate):
+def test_at_rest_the_frequency_only_matters_by_being_there(surrogate: Surrogate) -> None:
     case = without({**CASE, "v0": 0.0}, "omega")
     solution = solve_for(surrogate, "omega", [0.3, 0.25], case)
     assert [[root.value for root in roots] for roots in solution.roots] == [[0.0], []]
@@ -157,7 +158,7 @@ def test_at_rest_the_frequency_only_matters_by_being_there(surrogate):
     assert (root.low, root.high) == (5e-324, 1.7976931348623157e308)
 
 
-def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(surrogate):
+def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(surrogate: Surrogate) -> None:
     for unknown in ("v0", "y0", "omega", "mu0"):
         case = {**CASE, "k": None}
         target = surrogate.evaluate(**case).mu_macro
@@ -179,7 +180,7 @@ def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(s
      ("f", ("omega", 0.1, {**without(CASE, "omega"), "f": 1e3})),
      ("k", ("v0", 0.1, {**without(CASE, "v0"), "k": [1e6, 2e6]}))],
 )  # fmt: skip
-def test_a_bad_question_names_its_field(surrogate, field, arguments):
+def test_a_bad_question_names_its_field(surrogate: Surrogate, field: str, arguments: Any) -> None:
     with pytest.raises(InputError) as caught:
         solve_for(surrogate, *arguments)
     assert caught.value.field == field
@@ -189,7 +190,7 @@ def test_a_bad_question_names_its_field(surrogate, field, arguments):
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
 @settings(max_examples=15, deadline=None)
 @given(v0=decade(-5, 0), share=st.floats(0.001, 0.999))
-def test_no_root_is_missed_on_a_ray(surrogate, contact, unknown, v0, share):
+def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: str, unknown: Any, v0: Any, share: Any) -> None:
     case, ray = {**CASE, "v0": v0}, CASE[unknown] * np.geomspace(1e-9, 1e9, 20_001)
     mu = surrogate.evaluate(**{**case, unknown: ray}, contact=contact).mu_macro
     target = float(mu[int(share * 20_000)])
@@ -203,7 +204,7 @@ def test_no_root_is_missed_on_a_ray(surrogate, contact, unknown, v0, share):
 
 
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
-def test_a_ball_folds_as_a_spring_does(surrogate, unknown):
+def test_a_ball_folds_as_a_spring_does(surrogate: Surrogate, unknown: Any) -> None:
     case = {**CASE, "v0": 1e-4}
     ray = CASE[unknown] * np.geomspace(*((1e-6, 1e8) if unknown == "k" else (1e-8, 1e6)), 141)
     mu = surrogate.evaluate(**{**case, unknown: ray}, contact="ball").mu_macro
@@ -217,7 +218,7 @@ def test_a_ball_folds_as_a_spring_does(surrogate, unknown):
 
 @pytest.mark.parametrize("pair", [pair for pair in PAIRS if pair[1] != "across"], ids=" ".join)
 @pytest.mark.parametrize("k", [1e6, None])
-def test_along_and_normal_the_whole_friction_is_reached(surrogate, pair, k):
+def test_along_and_normal_the_whole_friction_is_reached(surrogate: Surrogate, pair: Any, k: Any) -> None:
     said, _, case = as_kind({**CASE, "k": k}, pair)
     solution = solve_for(surrogate, "v0", 0.3, without(case, "v0"), **said)
     root = only_root(solution)
@@ -230,7 +231,7 @@ def test_along_and_normal_the_whole_friction_is_reached(surrogate, pair, k):
     assert solution.reach.max_included
 
 
-def test_the_amplitude_of_the_force_stays_below_the_force(surrogate):
+def test_the_amplitude_of_the_force_stays_below_the_force(surrogate: Surrogate) -> None:
     said, _, case = as_kind(CASE, ("spring", "normal"))
     for unknown, within in (("Fz_amplitude", (0.1, 10.0)), ("Fz", (4.0, 100.0))):
         with pytest.raises(InputError, match=r"range must be two ascending.*Fz_amplitude below Fz"):
@@ -250,7 +251,9 @@ def test_the_amplitude_of_the_force_stays_below_the_force(surrogate):
         ("across", "v0", {"k": None, "k_low": 1e6, "k_high": 2e6}, "a target has an interval of roots"),
     ],
 )
-def test_what_does_not_belong_to_the_question_is_refused_with_the_reason(surrogate, pair, unknown, changed, said):
+def test_what_does_not_belong_to_the_question_is_refused_with_the_reason(
+    surrogate: Surrogate, pair: Any, unknown: Any, changed: Any, said: Any
+) -> None:
     keywords, _, case = as_kind(CASE, ("spring", pair))
     with pytest.raises(InputError, match=said):
         solve_for(surrogate, unknown, 0.2, {**without(case, unknown), **changed}, **keywords)
@@ -262,7 +265,7 @@ def test_what_does_not_belong_to_the_question_is_refused_with_the_reason(surroga
 @every_pair
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("speed", [0.01, 0.15])
-def test_the_crossings_are_all_changes_of_the_regime(surrogate, pair, place, speed):
+def test_the_crossings_are_all_changes_of_the_regime(surrogate: Surrogate, pair: Any, place: Any, speed: Any) -> None:
     said, fields, case = as_kind({**CASE, "v0": speed}, pair)
     along = fields[place]
     values = case[along] * np.geomspace(1e-3, 1e3, 3001)
@@ -280,7 +283,7 @@ def test_the_crossings_are_all_changes_of_the_regime(surrogate, pair, place, spe
 
 
 @pytest.mark.parametrize(("along", "expected"), [("v0", 1), ("omega", 1), ("y0", 1), ("k", 2), ("Fz", 2), ("mu0", 2)])
-def test_over_all_values_the_border_is_crossed_once_or_twice(surrogate, along, expected):
+def test_over_all_values_the_border_is_crossed_once_or_twice(surrogate: Surrogate, along: Any, expected: Any) -> None:
     crossings = border_crossings(surrogate, along, without(CASE, along), 1e-12, 1e12)
     assert len(crossings) == expected
     for crossing in crossings:
@@ -289,7 +292,9 @@ def test_over_all_values_the_border_is_crossed_once_or_twice(surrogate, along, e
 
 
 @pytest.mark.parametrize(("share", "expected"), [(1.0 + 1e-9, 2), (1.0 - 1e-9, 0)])
-def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(surrogate, share, expected):
+def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(
+    surrogate: Surrogate, share: Any, expected: Any
+) -> None:
     closest = 1.290791
     ratio = share * closest / surrogate.v_tilde_crit(closest)  # y~ / v~
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}
@@ -298,7 +303,7 @@ def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(surrogat
     assert all(crossing.value == close(closest, rel=1e-3) for crossing in crossings)
 
 
-def test_a_fold_just_above_its_first_ratio_is_found(surrogate):
+def test_a_fold_just_above_its_first_ratio_is_found(surrogate: Surrogate) -> None:
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": 10.0, "v0": 1.0}
     target = float(surrogate.mu_ratio(0.6626, 6.626))  # between minimum and maximum, which differ by a thousandth
     roots = solve_for(surrogate, "k", target, case).roots[0]
@@ -308,7 +313,7 @@ def test_a_fold_just_above_its_first_ratio_is_found(surrogate):
     assert len(below.roots[0]) == 1
 
 
-def test_outside_its_range_there_is_no_border(surrogate):
+def test_outside_its_range_there_is_no_border(surrogate: Surrogate) -> None:
     assert border_crossings(surrogate, "v0", without(CASE, "v0"), 1e-12, 1e-3) == ()
     assert border_crossings(surrogate, "v0", {**without(CASE, "v0"), "k": None}, 0.0, 1e3) == ()
     assert border_crossings(surrogate, "k", {**without(CASE, "k"), "v0": 0.0}, 1e-3, 1e3) == ()

@@ -2,12 +2,14 @@
 
 import platform
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from builder.c.source import files
 from mumacro import library
 from mumacro.table import read_table
+from tests import compilers
 
 KERNEL = Path(library.__file__).parent / "kernel"
 DRIVER = Path(__file__).parent / "c" / "sanitized.c"
@@ -22,7 +24,7 @@ RANDOM, NASTY, TABLES = 100_000, 172_800, 300
     [("-march=native", NATIVE), pytest.param("-DMUMACRO_ONE_LANE", 1, marks=pytest.mark.slow),
      pytest.param("-O1", 2, marks=pytest.mark.slow)],
 )  # fmt: skip
-def test_sanitizers_are_silent(compilers, tables_dir, tmp_path, option, lanes):
+def test_sanitizers_are_silent(tables_dir: Path, tmp_path: Path, option: Any, lanes: Any) -> None:
     """Random and nasty cases, and tables of nonsense, through every entry."""
     (tmp_path / "table.c").write_text(files(read_table(tables_dir / "mumacro-1e-4.nc"))["mumacro_table.c"], "ascii")
     words = (*compilers.compiler("gcc"), "-std=c99", "-O1", "-g", "-ffp-contract=off", *compilers.STRICT, *CHECKS)

@@ -6,19 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparing import close
-from mumacro import InputError, closed_forms
+from mumacro import InputError, Surrogate, closed_forms
 from mumacro.contact import kind_of
 from mumacro.inputs import FIELDS
 from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, approximations, border_speeds, friction_law, sweep_values
-from tests.cases import CASE, PAIRS, as_kind, every_pair, without
+from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
+from tests.comparing import close
 
 INTERVAL = {"k_range": (0.8e6, 1.2e6)}
 LINE = without({**CASE, "y0": 4e-6}, "v0")
 SPEEDS = sweep_values("v0", 1e-4, 2.0, 25, "log")
 
 
-def law_of(surrogate, pair, change: Any = (), values=SPEEDS, **options):
+def law_of(surrogate: Surrogate, pair: Any, change: Any = (), values: Any = SPEEDS, **options: Any) -> Any:
     """A law over v0, the keywords of its kind, and its other inputs."""
     said, _, case = as_kind(LINE, pair, 0.7)
     case = {**without(case, *("k" for name in change if name.startswith("k_"))), **dict(change)}
@@ -29,7 +29,7 @@ def law_of(surrogate, pair, change: Any = (), values=SPEEDS, **options):
 
 
 @pytest.mark.parametrize("scale", ["log", "linear"])
-def test_a_range_has_its_ends_exactly(scale):
+def test_a_range_has_its_ends_exactly(scale: Any) -> None:
     values = sweep_values("v0", 1e-7, 0.3, 101, scale)
     assert (values[0], values[-1], values.size) == (1e-7, 0.3, 101)
     steps = np.diff(np.log(values) if scale == "log" else values)
@@ -46,7 +46,7 @@ def test_a_range_has_its_ends_exactly(scale):
      ("stop", ("v0", 2.0, 2.0, 5, "log")),
      ("stop", ("v0", 1.0, math.inf, 5, "log")), ("start", ("v0", math.nan, 1.0, 5, "log"))],
 )  # fmt: skip
-def test_a_bad_range_names_its_field(field, arguments):
+def test_a_bad_range_names_its_field(field: str, arguments: Any) -> None:
     with pytest.raises(InputError) as caught:
         sweep_values(*arguments)
     assert caught.value.field == field
@@ -57,7 +57,7 @@ def test_a_bad_range_names_its_field(field, arguments):
 
 @every_pair
 @pytest.mark.parametrize("place", range(6))
-def test_a_law_is_the_surrogate_along_a_line(surrogate, pair, place):
+def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, place: Any) -> None:
     said, fields, case = as_kind(CASE, pair, 0.009)
     along = fields[place]
     values = sweep_values(along, 0.01 * case[along], 100.0 * case[along], 41, "log")
@@ -76,7 +76,7 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate, pair, place):
 
 @every_pair
 @pytest.mark.parametrize("interval", [INTERVAL, {"k_low": 0.8e6, "k_high": 1.2e6}], ids=["range", "ends"])
-def test_the_band_holds_every_stiffness_of_its_interval(surrogate, pair, interval) -> None:
+def test_the_band_holds_every_stiffness_of_its_interval(surrogate: Surrogate, pair: Any, interval: Any) -> None:
     law, said, case = law_of(surrogate, pair, interval)
     low, high = law.band
     assert law.case["k"] == close(math.sqrt(0.8e6 * 1.2e6), rel=1e-15)
@@ -101,7 +101,7 @@ def test_the_band_holds_every_stiffness_of_its_interval(surrogate, pair, interva
 
 @every_pair
 @pytest.mark.parametrize("scale", ["log", "linear"])
-def test_a_refined_law_is_straight_between_its_values(surrogate, pair, scale) -> None:
+def test_a_refined_law_is_straight_between_its_values(surrogate: Surrogate, pair: Any, scale: Any) -> None:
     values = sweep_values("v0", 1e-4, 2.0, 25, scale)
     law, said, case = law_of(surrogate, pair, values=values, refine=True)
     assert {*values, *(mark.value for mark in law.border)} <= set(law.values)
@@ -114,7 +114,7 @@ def test_a_refined_law_is_straight_between_its_values(surrogate, pair, scale) ->
 
 
 @pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
-def test_the_articles_formulas_are_refused_for_another_contact(surrogate, pair) -> None:
+def test_the_articles_formulas_are_refused_for_another_contact(surrogate: Surrogate, pair: Any) -> None:
     for formulas in (approximations, border_speeds):
         with pytest.raises(InputError, match="they are those of one spring, across"):
             formulas(surrogate, law_of(surrogate, pair)[0])
@@ -131,13 +131,15 @@ def test_the_articles_formulas_are_refused_for_another_contact(surrogate, pair) 
         ("Fz_amplitude", without(CASE, "y0"), "normal", "Fz_amplitude at index 1 must be >= 0 and below Fz"),
     ],
 )
-def test_a_bad_interval_or_amplitude_is_named(surrogate, along, case, direction, said) -> None:
+def test_a_bad_interval_or_amplitude_is_named(
+    surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
+) -> None:
     with pytest.raises(InputError, match=said):
         friction_law(surrogate, along, np.array([1.0, 10.0]), case, direction=direction)
 
 
 @every_pair
-def test_the_picture_shows_band_and_borders(surrogate, pair) -> None:
+def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> None:
     pytest.importorskip("matplotlib").use("Agg")
     law, _, _ = law_of(surrogate, pair, INTERVAL, refine=True)
     axes = law.plot()
@@ -160,7 +162,7 @@ CONTACT = {"mu0": 0.25, "Fz": 1.0, "k": 4.0, "omega": 3.0}  # l0 = 1/16 m
 LENGTH = 0.0625
 
 
-def columns(surrogate, y, v):
+def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
     """Law, approximations over mu0 and borders as v~ at the amplitude y~ over v~ = ``v``."""
     law = friction_law(surrogate, "v0", np.asarray(v) * LENGTH * 3.0, {**CONTACT, "y0": y * LENGTH})
     borders = border_speeds(surrogate, law)
@@ -187,13 +189,15 @@ def test_every_equation_number_names_a_column() -> None:
         ("corner", 1.0, (1e-12, 1e-9), 1e-8),  # O(mu~^3)
     ],
 )
-def test_the_approximations_hold_where_they_should(surrogate, name, y, ends, off):
+def test_the_approximations_hold_where_they_should(
+    surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any
+) -> None:
     law, found, _ = columns(surrogate, y, np.geomspace(*ends, 31))
     assert np.max(np.abs(found[name] - law.answer.mu_ratio)) < off
 
 
 @pytest.mark.parametrize("y", [1e-3, 0.3, 0.45, 0.55, 0.999, 1.0, 1.45, 1.55, 3.0])
-def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(surrogate, y) -> None:
+def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(surrogate: Surrogate, y: Any) -> None:
     crit = float(surrogate.v_tilde_crit(y))
     v = np.unique(np.concatenate([crit * np.geomspace(1e-6, 1e6, 241), np.geomspace(1e-4, 0.99, 200)]))
     law, found, borders = columns(surrogate, y, v)
@@ -220,7 +224,7 @@ def test_every_formula_is_given_in_its_stated_range_and_nowhere_else(surrogate, 
         assert np.nanmax(np.abs(found["small_amplitude"] - law.answer.mu_ratio)) <= 0.08 * y**4 + 4e-13
 
 
-def test_the_papers_law_of_small_amplitudes(surrogate) -> None:
+def test_the_papers_law_of_small_amplitudes(surrogate: Surrogate) -> None:
     y, v = 0.4, np.linspace(0.0, 0.2, 201)
     law, found, borders = columns(surrogate, y, v)
     low, top = math.sqrt(1.0 - y * y), 1.0 - 0.25 * y * y
@@ -242,7 +246,7 @@ def test_the_papers_law_of_small_amplitudes(surrogate) -> None:
 
 
 @pytest.mark.parametrize("along", FIELDS)
-def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate, along):
+def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate: Surrogate, along: Any) -> None:
     values = sweep_values(along, 0.1 * CASE[along], 10.0 * CASE[along], 31, "log")
     law = friction_law(surrogate, along, values, without(CASE, along))
     speeds = border_speeds(surrogate, law)
@@ -255,7 +259,7 @@ def test_the_border_of_every_case_is_where_the_law_crosses_it(surrogate, along):
 
 
 @pytest.mark.parametrize("along", FIELDS)
-def test_extreme_inputs_give_numbers_or_nan_and_no_warning(surrogate, along) -> None:
+def test_extreme_inputs_give_numbers_or_nan_and_no_warning(surrogate: Surrogate, along: Any) -> None:
     case = {"mu0": 0.3, "Fz": 1e-200, "k": 1e200, "y0": 1e-300, "omega": 1e150, "v0": 1e-150}
     values = sweep_values(along, 1e-300 if along != "v0" else 0.0, 1e300, 41, "log" if along != "v0" else "linear")
     law = friction_law(surrogate, along, values, without(case, along))
@@ -264,7 +268,7 @@ def test_extreme_inputs_give_numbers_or_nan_and_no_warning(surrogate, along) -> 
     assert (law.answer.mu_macro <= (law.values if along == "mu0" else 0.3)).all()
 
 
-def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(surrogate) -> None:
+def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(surrogate: Surrogate) -> None:
     values = sweep_values("v0", 1e-3, 10.0, 5, "log")
     for changed in ({"k": None}, {"k": math.inf}, {"y0": 0.0}, {"omega": 0.0}):
         law = friction_law(surrogate, "v0", values, {**without(CASE, "v0"), **changed})
@@ -276,7 +280,7 @@ def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(surrogate
         assert (law.mu_static == (0.0 if "k" in changed else 0.3)).all()
 
 
-def test_the_static_column_of_a_band_is_that_of_its_middle(surrogate) -> None:
+def test_the_static_column_of_a_band_is_that_of_its_middle(surrogate: Surrogate) -> None:
     law, _, _ = law_of(surrogate, PAIRS[0], INTERVAL)
     assert law.kind == kind_of()
     assert approximations(surrogate, law)["static"] == close(law.mu_static, rel=1e-14)

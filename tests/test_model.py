@@ -15,7 +15,7 @@ from builder.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
 from builder.series import COS_TAU, ORDER, SPEED, X, series
 from builder.steady import border, continuous, workspace
 from builder.stick import stick_excess
-from comparing import close
+from tests.comparing import close
 
 Array = NDArray[np.float64]
 HALF = 0.5 * math.pi

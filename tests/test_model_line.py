@@ -3,18 +3,21 @@
 import doctest
 import math
 import re
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
-from mumacro import InputError, validity
+from mumacro import InputError, Surrogate, validity
 from mumacro.validity import ROWS, digits, k_effect, model_rows
+from tests.cases import Case
+from tests.comparing import close
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 
 
-def rows(surrogate, contact="spring", **changed):
+def rows(surrogate: Surrogate, contact: str = "spring", **changed: Any) -> Any:
     """Text and effect by row."""
     found = model_rows(surrogate, {**CASE, **changed}, contact)
     assert [one["row"] for one in found] == sorted({one["row"] for one in found}, key=ROWS.index)
@@ -25,12 +28,12 @@ def test_the_examples_run() -> None:
     assert doctest.testmod(validity).failed == 0
 
 
-def test_rows_are_those_of_the_document(repository) -> None:
+def test_rows_are_those_of_the_document(repository: Path) -> None:
     text = (repository / "docs" / "validity.md").read_text("utf-8")
     assert {*ROWS} <= {*re.findall(r"^\| ([^|]+?) \|", text.partition("\n## ")[0], re.MULTILINE)}
 
 
-def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate) -> None:
+def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate: Surrogate) -> None:
     mu = surrogate.evaluate(**CASE).mu_macro
     off = [abs(surrogate.evaluate(**{**CASE, "k": 1e6 * x}).mu_macro / mu - 1.0) for x in (1.1, 1.0 / 1.1)]
     text, effect = rows(surrogate)["k is known"]
@@ -49,20 +52,20 @@ def test_an_uncertain_stiffness_is_told_with_its_effect(surrogate) -> None:
     assert k_effect(surrogate, {**CASE, "y0": 3.1e-6, "v0": 0.0}) == math.inf  # 0, and not 0 for a softer contact
 
 
-def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate) -> None:
+def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate: Surrogate) -> None:
     found = rows(surrogate, y0=2.0)
     assert list(found) == ["units"]
     assert "is y0 = 2 in metres?" in found["units"][0]
     assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
 
 
-def test_large_amplitudes_hardly_depend_on_k(surrogate) -> None:
+def test_large_amplitudes_hardly_depend_on_k(surrogate: Surrogate) -> None:
     text, effect = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.5)["k is known"]
     assert effect < 1e-3
     assert "hardly" in text
 
 
-def test_creeping_and_rest_are_told(surrogate) -> None:
+def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
     text, _ = rows(surrogate, v0=1e-6)["steady cycle"]
     periods, seconds = (float(x) for x in re.findall(r"([\d.e+]+) (?:periods|s$)", text))
     assert periods == close(20e3 * seconds, rel=0.01)
@@ -72,7 +75,7 @@ def test_creeping_and_rest_are_told(surrogate) -> None:
     assert "steady cycle" not in rows(surrogate, v0=0.1)
 
 
-def test_slip_path_tilt_and_heat_have_their_sizes(surrogate) -> None:
+def test_slip_path_tilt_and_heat_have_their_sizes(surrogate: Surrogate) -> None:
     found = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
     way = float(re.search(r"slip path ([\d.e-]+) m a period", found["Coulomb friction"][0])[1])
     assert way == close(4.0 * 5e-6, rel=0.1)  # the foot follows the motion but for l0 = 0.23 um at each turn
@@ -84,11 +87,11 @@ def test_slip_path_tilt_and_heat_have_their_sizes(surrogate) -> None:
 
 
 @pytest.mark.parametrize("case", [{"y0": 0.0}, {"f": 0.0}, {"k": None}, {"k": math.inf}, {"k": "rigid"}])
-def test_nothing_is_said_where_nothing_oscillates_or_gives_way(surrogate, case) -> None:
+def test_nothing_is_said_where_nothing_oscillates_or_gives_way(surrogate: Surrogate, case: Case) -> None:
     assert model_rows(surrogate, {**CASE, **case}) == []
 
 
-def test_the_other_contact_is_told_with_the_difference(surrogate) -> None:
+def test_the_other_contact_is_told_with_the_difference(surrogate: Surrogate) -> None:
     case = {"k": 1.307e7, "y0": 0.2e-6, "v0": 0.005}
     text, effect = rows(surrogate, **case)["one spring"]
     assert effect == close(0.2551 / 0.2477 - 1.0, abs=5e-4)
@@ -108,11 +111,11 @@ def test_digits_are_those_that_the_uncertainty_leaves() -> None:
     ("changed", "said"),
     [({"v0": -1.0}, "v0 must be"), ({"k": [1e6, 2e6]}, "case must be one case"), ({"contact": 1}, "contact")],
 )
-def test_bad_cases_are_named(surrogate, changed, said) -> None:
+def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises((InputError, TypeError), match=said):
         model_rows(surrogate, {**CASE, **changed})
 
 
-def test_the_uncertainty_of_k_is_positive(surrogate) -> None:
+def test_the_uncertainty_of_k_is_positive(surrogate: Surrogate) -> None:
     with pytest.raises(InputError, match="known must be finite and > 0"):
         k_effect(surrogate, CASE, known=0.0)

@@ -3,19 +3,23 @@
 import json
 import math
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
-from mumacro import MumacroError, fit
+from mumacro import MumacroError, Surrogate, fit
 from mumacro.fitted import Fit
+from tests.comparing import close
 
 CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
 SPEEDS = np.geomspace(1e-3, 1.0, 30)
 
 
-def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_from(repository, monkeypatch):
+def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_from(
+    repository: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("scipy")
     pytest.importorskip("pandas")
     pytest.importorskip("matplotlib")
@@ -33,7 +37,7 @@ def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_fro
     assert names["known"].mu_macro_low < names["one"].mu_macro < names["known"].mu_macro_high
 
 
-def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate):
+def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate: Surrogate) -> None:
     pytest.importorskip("scipy")
     assert surrogate.id in surrogate._repr_html_()
     answer = surrogate.evaluate(**CASE, v0=SPEEDS)
@@ -55,7 +59,7 @@ def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate):
     [{}, {"gradient": True}, {"groups": True}, {"contact": "ball"}, {"k_range": (0.8e6, 1.2e6)}, {"v0": 0.01},
      {"v0": SPEEDS.reshape(5, 6)}, {"v0": np.array([0.01, -1.0])}],
 )  # fmt: skip
-def test_a_frame_has_one_row_a_case_with_what_was_requested(surrogate, more):
+def test_a_frame_has_one_row_a_case_with_what_was_requested(surrogate: Surrogate, more: Any) -> None:
     pandas = pytest.importorskip("pandas")
     case = {name: value for name, value in CASE.items() if name != "k" or "k_range" not in more}
     answer = surrogate.evaluate(**{**case, "v0": SPEEDS, **more})
@@ -68,12 +72,12 @@ def test_a_frame_has_one_row_a_case_with_what_was_requested(surrogate, more):
     assert ("d_mu_macro_d_k" in frame) == ("gradient" in more)
 
 
-def test_a_frame_of_labelled_cases_keeps_the_index(surrogate):
+def test_a_frame_of_labelled_cases_keeps_the_index(surrogate: Surrogate) -> None:
     v0 = pytest.importorskip("pandas").Series([0.01, 0.1], index=["slow", "fast"])
     assert surrogate.evaluate(**CASE, v0=v0).to_frame().index.tolist() == ["slow", "fast"]
 
 
-def test_the_map_of_a_normal_force_ends_where_it_lifts_off(surrogate):
+def test_the_map_of_a_normal_force_ends_where_it_lifts_off(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
     normal = surrogate.plot(figure.add_subplot(), direction="normal")
     v, y = normal.lines[0].get_data()
@@ -81,7 +85,7 @@ def test_the_map_of_a_normal_force_ends_where_it_lifts_off(surrogate):
     assert v.tolist() == close(y.tolist(), rel=1e-15)  # normal: the border is the amplitude itself
 
 
-def test_without_pandas_a_frame_names_it(surrogate, monkeypatch):
+def test_without_pandas_a_frame_names_it(surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MumacroError, match="pip install pandas"):
         surrogate.evaluate(**CASE, v0=0.01).to_frame()

@@ -7,6 +7,8 @@ import shutil
 import subprocess
 import sys
 import tarfile
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +19,7 @@ from mumacro.extras import missing
 from service.settings import load_settings
 
 
-def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository):
+def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository: Path) -> None:
     assert service.__version__ == mumacro.__version__
     assert not hasattr(service, "nothing")
     for name, pattern in (
@@ -30,7 +32,7 @@ def test_the_version_is_the_same_wherever_a_file_must_repeat_it(repository):
         assert set(found) == {mumacro.__version__}, name
 
 
-def test_the_manifest_gives_a_pod_nothing_that_it_does_not_need(repository):
+def test_the_manifest_gives_a_pod_nothing_that_it_does_not_need(repository: Path) -> None:
     yaml = pytest.importorskip("yaml", reason="the PyPI package PyYAML is not installed")
     text = (repository / "deploy" / "kubernetes.yaml").read_text("utf-8")
     found = {one["kind"]: one for one in yaml.safe_load_all(text)}
@@ -60,7 +62,7 @@ BUILD = "import runpy; runpy.run_path('hatch_build.py', run_name='__main__')"
 REQUIREMENTS = "import hatchling.build as b; print(*b.get_requires_for_build_wheel())"
 
 
-def python(folder, program, *arguments, **variables):
+def python(folder: Path, program: Any, *arguments: Any, **variables: Any) -> Any:
     """A program in a folder, without the caller's choice of a compiler."""
     env = {name: value for name, value in os.environ.items() if name != "CC"} | variables
     command = [sys.executable, "-c", program, *map(str, arguments)]
@@ -68,7 +70,7 @@ def python(folder, program, *arguments, **variables):
 
 
 @pytest.mark.parametrize("where", ["nothing", "without headers", "another platform", "here"])
-def test_zig_is_a_build_requirement_only_where_no_compiler_works(repository, tmp_path, where):
+def test_zig_is_a_build_requirement_only_where_no_compiler_works(repository: Path, tmp_path: Path, where: Any) -> None:
     if where == "without headers":
         (tmp_path / "cc").write_text("#!/bin/sh\necho 'fatal error: math.h: No such file' >&2; exit 1\n")
         (tmp_path / "cc").chmod(0o755)
@@ -89,7 +91,9 @@ def test_zig_is_a_build_requirement_only_where_no_compiler_works(repository, tmp
         ({"MUMACRO_BUILD_DEBUG": "1", "PATH": ""}, "", "needs gcc or clang"),
     ],
 )
-def test_a_build_that_cannot_be_made_says_so_in_one_line(repository, tmp_path, variables, code, words):
+def test_a_build_that_cannot_be_made_says_so_in_one_line(
+    repository: Path, tmp_path: Path, variables: Any, code: Any, words: Any
+) -> None:
     done = python(repository, f"{code}\n{BUILD}", tmp_path, **variables)
     assert done.returncode == 1
     assert words in done.stderr
@@ -97,7 +101,7 @@ def test_a_build_that_cannot_be_made_says_so_in_one_line(repository, tmp_path, v
     assert not list(tmp_path.iterdir())
 
 
-def test_a_platform_without_a_wheel_is_refused_by_name(repository):
+def test_a_platform_without_a_wheel_is_refused_by_name(repository: Path) -> None:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel"]
     env = {**os.environ, "MUMACRO_BUILD_PLATFORM": "amiga"}
     done = subprocess.run(command, cwd=repository, env=env, capture_output=True, text=True, check=False)
@@ -107,7 +111,7 @@ def test_a_platform_without_a_wheel_is_refused_by_name(repository):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
-def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository, tmp_path):
+def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository: Path, tmp_path: Path) -> None:
     for folder in ("mumacro/kernel", "third_party"):
         shutil.copytree(repository / folder, tmp_path / folder)
     for name in ("hatch_build.py", "pyproject.toml"):
@@ -124,7 +128,7 @@ def test_a_failed_compilation_keeps_the_shared_object_that_was_there(repository,
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("gcc"), reason="needs Linux and gcc")
-def test_the_debug_build_alone_has_both_sanitizers(repository, tmp_path):
+def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: Path) -> None:
     done = python(repository, BUILD, tmp_path, CC="gcc", MUMACRO_BUILD_DEBUG="1")
     assert done.returncode == 0, done.stderr
     for folder, debug in ((tmp_path, True), (repository / "mumacro", False)):
@@ -132,7 +136,9 @@ def test_the_debug_build_alone_has_both_sanitizers(repository, tmp_path):
         assert (b"libasan" in made, b"libubsan" in made) == (debug, debug)
 
 
-def test_the_development_command_sees_a_change_of_the_c_sources(repository, tmp_path, monkeypatch):
+def test_the_development_command_sees_a_change_of_the_c_sources(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.syspath_prepend(repository)
     dev = importlib.import_module("dev")
     monkeypatch.setattr(dev, "ROOT", tmp_path)
@@ -156,7 +162,7 @@ def test_the_development_command_sees_a_change_of_the_c_sources(repository, tmp_
 
 
 @pytest.mark.slow
-def test_the_source_distribution_builds_and_its_tests_collect(repository, tmp_path):
+def test_the_source_distribution_builds_and_its_tests_collect(repository: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path]
     subprocess.run(command, cwd=repository, check=True, capture_output=True)
     (archive,) = tmp_path.glob("*.tar.gz")
@@ -177,7 +183,9 @@ def test_the_source_distribution_builds_and_its_tests_collect(repository, tmp_pa
 # --- the installed package -----------------------------------------------------------------------------
 
 
-def test_an_installed_package_finds_its_own_tables_and_no_others(tmp_path, monkeypatch, tables_dir):
+def test_an_installed_package_finds_its_own_tables_and_no_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path
+) -> None:
     assert bundled.bundled_tables() == sorted(tables_dir.glob("*.nc"))  # a checkout
     package = tmp_path / "mumacro"
     for folder in (package, tmp_path / "tables"):
@@ -200,7 +208,9 @@ PARTS = ("service", "builder", "mumacro")
         *((name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*") for name in PARTS[1:]),
     ],
 )
-def test_what_is_missing_is_said_in_one_line(repository, tmp_path, module, lacks, said):
+def test_what_is_missing_is_said_in_one_line(
+    repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any
+) -> None:
     ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
     for name in {"mumacro", module}:
         shutil.copytree(repository / name, tmp_path / name, ignore=ignored)
@@ -211,6 +221,6 @@ def test_what_is_missing_is_said_in_one_line(repository, tmp_path, module, lacks
     assert re.fullmatch(said, done.stderr.strip())
 
 
-def test_a_missing_module_of_the_project_itself_is_not_explained_away():
+def test_a_missing_module_of_the_project_itself_is_not_explained_away() -> None:
     with pytest.raises(ModuleNotFoundError):
         missing("builder", ModuleNotFoundError("No module named 'builder.nothing'", name="builder.nothing"))

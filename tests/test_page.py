@@ -5,24 +5,27 @@ import os
 import re
 import shutil
 import subprocess
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from browser import START
-from comparing import close
+from mumacro import Surrogate
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs import UNITS_OF
 from service.app import create_app
 from service.routes.page import ASSETS, POLICY
 from service.settings import Settings
+from tests.browser import START
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 AXE = "tests/data/axe-core/axe.min.js"
 
 
-def test_the_page_comes_with_a_strict_policy(client):
+def test_the_page_comes_with_a_strict_policy(client: Any) -> None:
     page = client.get("/")
     assert page.headers["content-type"].startswith("text/html")
     assert page.headers["content-security-policy"] == POLICY
@@ -36,7 +39,7 @@ def test_the_page_comes_with_a_strict_policy(client):
         assert set(re.findall(r'from "\./([^"]+)"', part.text)) <= ASSETS.keys()
 
 
-def test_the_map_is_the_surrogates(client, surrogate):
+def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate) -> None:
     response = client.get("/static/page/map.json")
     data = response.json()
     v, y = (np.geomspace(axis["start"], axis["stop"], axis["n"]) for axis in (data["v_tilde"], data["y_tilde"]))
@@ -48,8 +51,8 @@ def test_the_map_is_the_surrogates(client, surrogate):
     assert client.get("/static/page/map.json", headers={"If-None-Match": etag}).status_code == 304
 
 
-def test_units_and_geometries_are_the_librarys(client):
-    def scales(units):
+def test_units_and_geometries_are_the_librarys(client: Any) -> None:
+    def scales(units: Any) -> Any:
         return {unit: list(scale) for unit, scale in units.items()}
 
     told = client.get("/static/page/names.json").json()
@@ -66,13 +69,15 @@ def test_units_and_geometries_are_the_librarys(client):
     assert set(told["knows"]) == {"service", *described["components"]["schemas"]["CaseRequest"]["properties"], *panels}
 
 
-def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path, problem):
+def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, problem: Any) -> None:
     with TestClient(create_app(Settings(tables=(tmp_path,)))) as client:
         assert client.get("/").status_code == 200
         problem(client.get("/static/page/map.json"), 503)
 
 
-def test_the_built_documentation_is_served_where_a_folder_is_named(tmp_path, tables_dir, client, problem):
+def test_the_built_documentation_is_served_where_a_folder_is_named(
+    tmp_path: Path, tables_dir: Path, client: Any, problem: Any
+) -> None:
     (tmp_path / "how-to").mkdir()
     (tmp_path / "index.html").write_text("<h1>Guide</h1>")
     (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
@@ -88,7 +93,7 @@ def test_the_built_documentation_is_served_where_a_folder_is_named(tmp_path, tab
     problem(client.get("/guide/"), 404)
 
 
-def test_a_wheel_holds_the_built_documents_where_there_are_any(tmp_path, monkeypatch):
+def test_a_wheel_holds_the_built_documents_where_there_are_any(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import hatch_build
     from service import settings
 
@@ -108,7 +113,7 @@ def test_a_wheel_holds_the_built_documents_where_there_are_any(tmp_path, monkeyp
     assert settings.Settings().guide == tmp_path / "guide"
 
 
-def test_what_is_typed_and_asked_without_a_browser(client, repository, tmp_path):
+def test_what_is_typed_and_asked_without_a_browser(client: Any, repository: Path, tmp_path: Path) -> None:
     """The tests of the modules in node: texts, numbers, addresses, questions."""
     node = shutil.which("node")
     if node is None or tuple(map(int, re.findall(r"\d+", subprocess.check_output([node, "-v"], text=True)))) < (20, 19):
@@ -122,7 +127,7 @@ def test_what_is_typed_and_asked_without_a_browser(client, repository, tmp_path)
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (320, 640), (1024, 768), (1440, 900)])
-def test_it_fits_the_screen(open_page, width, height):
+def test_it_fits_the_screen(open_page: Any, width: Any, height: Any) -> None:
     page = open_page(width=width, height=height)
     boxes = page.run(
         "return Object.fromEntries(['map', 'law', 'mu', 'inputs'].map((id) => {"
@@ -165,7 +170,7 @@ def test_it_fits_the_screen(open_page, width, height):
     assert (cut, page.run(f"{rows} one.getBoundingClientRect().y)).size);")) == (0, [1, 1])
 
 
-def inaccessible(page, repository):
+def inaccessible(page: Any, repository: Path) -> Any:
     """Violations found by axe-core, in the light and dark schemes: rules and elements."""
     found = {}
     page.browser.execute_script((repository / AXE).read_text("utf-8"))
@@ -181,7 +186,7 @@ def inaccessible(page, repository):
 
 
 @pytest.mark.parametrize("width", [1440, 390])
-def test_the_page_is_accessible(open_page, repository, width):
+def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) -> None:
     page = open_page("#bad=1&v0=1e6&digits=all", width=width)
     page.open_all()
     assert inaccessible(page, repository) == {}
@@ -197,7 +202,7 @@ def test_the_page_is_accessible(open_page, repository, width):
     assert page.run("return document.documentElement.scrollWidth;") <= width
 
 
-def test_the_description_is_accessible_and_leads_back(open_page, repository, surrogate):
+def test_the_description_is_accessible_and_leads_back(open_page: Any, repository: Path, surrogate: Surrogate) -> None:
     page = open_page(path="docs")
     page.wait_for("#swagger-ui", "The value of one input that gives a wanted mu_macro")
     assert not page.find("#key-form").is_displayed()
@@ -212,15 +217,15 @@ def test_the_description_is_accessible_and_leads_back(open_page, repository, sur
     assert page.complaints() == []
 
 
-def test_the_pages_ask_for_the_key_and_use_it(open_page, serving, tables_dir, tmp_path):
+def test_the_pages_ask_for_the_key_and_use_it(open_page: Any, serving: Any, tables_dir: Path, tmp_path: Path) -> None:
     with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
         ask_for_the_key(open_page(url=server.url, path="docs"), tmp_path)
 
 
-def ask_for_the_key(page, folder):
+def ask_for_the_key(page: Any, folder: Path) -> None:
     """The pages of a service with an API key in force."""
 
-    def enter(key):
+    def enter(key: Any) -> None:
         page.type("#key", key, commit=False)
         page.find("#key-form button").click()
 

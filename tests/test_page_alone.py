@@ -4,29 +4,32 @@ import functools
 import http.server
 import threading
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from browser import START
 from builder.c.wasm import compiler
 from builder.export import export_table
 from builder.export_page import PageError, main, write_page
-from comparing import close
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
+from tests.browser import START
+from tests.cases import Capture
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 OFFERED_BY_A_SERVICE = ("#solve", "#stiffness", "#fit", "#contact", "nav a[href='docs']", "nav a[href='guide/']")
 
 
 @pytest.fixture(scope="module")
-def table(tables_dir):
+def table(tables_dir: Path) -> Any:
     return Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=1)
 
 
 @pytest.fixture(scope="module")
-def folder(table, tmp_path_factory):
+def folder(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The page's folder."""
     if compiler() is None:
         pytest.skip("neither zig nor clang with lld is installed")
@@ -37,11 +40,11 @@ def folder(table, tmp_path_factory):
 
 
 @contextmanager
-def hosted(folder):
+def hosted(folder: Path) -> Any:
     """The address of a static host on a loopback port."""
 
     class Handler(http.server.SimpleHTTPRequestHandler):
-        def log_message(self, *_):
+        def log_message(self, *_: Any) -> None:
             pass
 
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=folder)) as server:
@@ -55,13 +58,15 @@ def hosted(folder):
 
 
 @pytest.fixture(scope="module")
-def host(folder):
+def host(folder: Path) -> Any:
     """One host for all tests that do not stop it."""
     with hosted(folder) as url:
         yield url
 
 
-def test_the_module_is_small_and_is_of_its_table(folder, table, tables_dir, tmp_path, capsys):
+def test_the_module_is_small_and_is_of_its_table(
+    folder: Path, table: Surrogate, tables_dir: Path, tmp_path: Path, capsys: Capture
+) -> None:
     path, other = folder / "static" / "page" / "mumacro.wasm", tables_dir / "mumacro-1e-4.nc"
     module = path.read_bytes()
     assert module[:4] == b"\0asm"
@@ -74,7 +79,7 @@ def test_the_module_is_small_and_is_of_its_table(folder, table, tables_dir, tmp_
     assert "not exported from" in capsys.readouterr().err
 
 
-def test_it_answers_and_goes_on_when_its_host_is_gone(open_page, folder, table):
+def test_it_answers_and_goes_on_when_its_host_is_gone(open_page: Any, folder: Path, table: Surrogate) -> None:
     with hosted(folder) as url:
         page = open_page("", url=url, new=True).settle()
     told = page.text("#alone")
@@ -96,7 +101,7 @@ def test_it_answers_and_goes_on_when_its_host_is_gone(open_page, folder, table):
     assert page.complaints() == []
 
 
-def test_its_numbers_are_pythons(open_page, host, table):
+def test_its_numbers_are_pythons(open_page: Any, host: Any, table: Surrogate) -> None:
     """Some thousand cases of every regime."""
     rng = np.random.default_rng(13)
     n = 20_000
@@ -122,7 +127,7 @@ def test_its_numbers_are_pythons(open_page, host, table):
         assert np.all(np.abs(found[:, 2 + i] - answer.gradient[name]) <= answer.gradient_bound[name])
 
 
-def both(open_page, host, client, path, asked):
+def both(open_page: Any, host: Any, client: Any, path: Any, asked: Any) -> Any:
     """The answers of the page and of the service."""
     page = open_page("", url=host)
     found = page.run(f"return (await import('./static/page/service.js')).post('{path}', {asked});")
@@ -131,7 +136,7 @@ def both(open_page, host, client, path, asked):
 
 @pytest.mark.parametrize("along", FIELDS)
 @pytest.mark.parametrize("scale", ["log", "linear"])
-def test_its_laws_are_the_services(open_page, host, client, along, scale):
+def test_its_laws_are_the_services(open_page: Any, host: Any, client: Any, along: Any, scale: Any) -> None:
     ends = {"start": 0.1 * START[along], "stop": 50.0 * START[along], "points": 101}
     given = {name: value for name, value in START.items() if name != along}
     found, expected = both(open_page, host, client, "v1/law", {**given, **ends, "along": along, "scale": scale})
@@ -146,7 +151,7 @@ def test_its_laws_are_the_services(open_page, host, client, along, scale):
 @pytest.mark.parametrize(
     "changed", [{}, {"k": "rigid"}, {"y0": 0.0}, {"omega": 0.0}, {"v0": 0.0}, {"y0": 5e-6}, {"v0": 30.0}]
 )
-def test_its_readout_is_the_services(open_page, host, client, changed):
+def test_its_readout_is_the_services(open_page: Any, host: Any, client: Any, changed: Any) -> None:
     include = ["groups", "limits", "stick_fraction", "power", "gradient"]
     found, expected = both(open_page, host, client, "v1/mu-macro", {**START, **changed, "include": include})
     assert (found["regime"], found["source"]) == (expected["regime"], expected["source"])

@@ -1,19 +1,21 @@
 """The page in a browser: typed values, links, and the display while there is no response."""
 
 import math
+from typing import Any
 
 import pytest
 
-from browser import START
-from comparing import close
+from mumacro import Surrogate
+from tests.browser import START
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
 
-def test_a_typed_value_applies_on_commit(open_page, surrogate):
+def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
 
-    def expect(**changed):
+    def expect(**changed: Any) -> None:
         assert page.number() == page.rounded(surrogate.evaluate(**{**START, **changed}).mu_macro)
 
     page.type("#field-y0", "2.9", commit=False)
@@ -36,7 +38,7 @@ def test_a_typed_value_applies_on_commit(open_page, surrogate):
     assert page.complaints() == []
 
 
-def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate):
+def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.type("#field-Fz", "5 mm")
     assert page.is_old()
@@ -69,7 +71,7 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page, surrogate)
     assert page.complaints() == []
 
 
-def test_a_contact_is_rigid_by_a_switch(open_page, surrogate):
+def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page("#k=5e5")
     page.click("#rigid")
     assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": None}).mu_macro, 6)  # no k to be known
@@ -87,7 +89,7 @@ def test_a_contact_is_rigid_by_a_switch(open_page, surrogate):
     assert page.complaints() == []
 
 
-def test_offline_the_result_is_grey_until_the_service_is_back(open_page, surrogate):
+def test_offline_the_result_is_grey_until_the_service_is_back(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     before = page.number()
     try:
@@ -104,7 +106,7 @@ def test_offline_the_result_is_grey_until_the_service_is_back(open_page, surroga
     page.complaints()
 
 
-def test_every_trouble_of_the_service_has_its_own_message(open_page):
+def test_every_trouble_of_the_service_has_its_own_message(open_page: Any) -> None:
     said = "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { 'Retry-After': '1' } })"
     with open_page.faked("(...all) => (window.reply ?? real)(...all)") as page:
         page.settle()
@@ -125,7 +127,7 @@ def test_every_trouble_of_the_service_has_its_own_message(open_page):
         page.complaints()
 
 
-def test_the_start_is_calm_while_the_service_is_not_ready(open_page, surrogate):
+def test_the_start_is_calm_while_the_service_is_not_ready(open_page: Any, surrogate: Surrogate) -> None:
     unready = (
         "async (path, options) => (window.ready || path.includes('names.json') ? real(path, options) : new Response("
         "'{\"detail\": \"the tables are not loaded yet\"}', { status: 503, headers: { 'Retry-After': '1' } }))"
@@ -143,7 +145,7 @@ def test_the_start_is_calm_while_the_service_is_not_ready(open_page, surrogate):
         assert page.number() == page.rounded(surrogate.evaluate(**START).mu_macro)
 
 
-def test_a_link_reproduces_the_state(open_page, surrogate):
+def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page("#Fz=12.5&along=y0&v0=0.01m/s&range=1e-7..1e-5&digits=all")
     link = page.address()
     before = [page.text("#mu"), page.find("#law").get_attribute("aria-label")]

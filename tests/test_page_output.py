@@ -2,27 +2,30 @@
 
 import csv
 import re
+from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from browser import RECORDED, START
-from comparing import close
+from mumacro import Surrogate
 from mumacro.geometries import contact_of
 from service.routes.page import ASSETS
+from tests.browser import RECORDED, START
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 ODD = r"NaN|undefined|null|Infinity|\[object"
 
 
-def seen(page):
+def seen(page: Any) -> Any:
     """All text that the page shows."""
     return page.run("return document.querySelector('main').innerText;")
 
 
-def test_it_loads_and_shows_the_known_value(open_page, surrogate, live_server):
+def test_it_loads_and_shows_the_known_value(open_page: Any, surrogate: Surrogate, live_server: Any) -> None:
     page = open_page(new=True)
     answer = surrogate.evaluate(**START, gradient=True)
     assert page.number() == page.rounded(answer.mu_macro) == 0.2405
@@ -55,7 +58,7 @@ def test_it_loads_and_shows_the_known_value(open_page, surrogate, live_server):
     assert page.complaints() == []
 
 
-def test_solving_for_an_input(open_page, surrogate):
+def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.click("#solve-form button")  # which amplitude halves the friction?
     found = page.wait_for("#solve-result", r"y₀ = (\S+) µm: µ = 0.15, stick slip, shaker (\S+) mW")
@@ -79,7 +82,7 @@ def test_solving_for_an_input(open_page, surrogate):
     page.complaints()  # a refusal is logged by the browser
 
 
-def test_the_map_is_read_and_moved_on(open_page, surrogate):
+def test_the_map_is_read_and_moved_on(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.touched("#map", 0.6, 0.4)
     read = page.wait_for("#map-read", r"ṽ = (\S+), ỹ = (\S+): µ/µ₀ ≈ (\S+)$")
@@ -107,7 +110,7 @@ def test_the_map_is_read_and_moved_on(open_page, surrogate):
         ("#v0=1e6&y0=1e-12", (1, -1), "ỹ = 3.33e-7"),
     ],
 )  # fmt: skip
-def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page, address, side, said):
+def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page: Any, address: Any, side: Any, said: Any) -> None:
     page = open_page(address)
     assert re.search(said, page.text("#map-out"))
     x, y = page.run(
@@ -122,7 +125,7 @@ def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page, address, s
     assert page.complaints() == []
 
 
-def test_the_map_has_a_colour_between_two_levels(open_page, surrogate, repository):
+def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surrogate, repository: Path) -> None:
     page = open_page()
     script = (repository / "service/static/page/figures.js").read_text("utf-8")
     levels = [float(one) for one in re.search(r"LEVELS = \[(.*)\]", script)[1].split(",")]
@@ -146,12 +149,12 @@ def test_the_map_has_a_colour_between_two_levels(open_page, surrogate, repositor
     assert (shades[0], shades[-1]) == ((68, 1, 84), (253, 231, 37))  # viridis
 
 
-def heading(page):
+def heading(page: Any) -> Any:
     """The title of the law's axis."""
     return page.run("return document.querySelector('#law > .upright').previousSibling.textContent;")
 
 
-def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page, surrogate):
+def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.touched("#law", 0.5, 0.5)
     read = page.wait_for("#law-read", r"v₀ = (\S+) mm/s: µ = (\S+),")
@@ -192,7 +195,7 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page, surro
         ("#v0=0&y0=3e-6", "v₀ [m/s]"),
     ],
 )  # fmt: skip
-def test_every_law_and_the_ends_of_every_range_are_answered(open_page, address, head):
+def test_every_law_and_the_ends_of_every_range_are_answered(open_page: Any, address: Any, head: Any) -> None:
     page = open_page(address)
     assert page.number() >= 0
     assert heading(page) == head
@@ -202,7 +205,7 @@ def test_every_law_and_the_ends_of_every_range_are_answered(open_page, address, 
     assert page.complaints() == []
 
 
-def test_downloads(open_page, surrogate, tmp_path):
+def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None:
     page = open_page()
     header, *rows = csv.reader(page.download("#csv", tmp_path, "friction-law-v0.csv").splitlines())
     assert header == ["v₀ [mm/s]", "mu_macro [-]", "mu_static [-]", "regime"]
@@ -221,7 +224,9 @@ def test_downloads(open_page, surrogate, tmp_path):
 
 @pytest.mark.parametrize("direction", ["across", "along", "normal"])
 @pytest.mark.parametrize("contact", ["spring", "ball"])
-def test_every_contact_and_direction_is_answered(open_page, surrogate, contact, direction):
+def test_every_contact_and_direction_is_answered(
+    open_page: Any, surrogate: Surrogate, contact: str, direction: Any
+) -> None:
     with open_page.faked(RECORDED) as page:
         page.settle()
         page.click(f"[name=contact][value={contact}]")
@@ -257,7 +262,7 @@ def test_every_contact_and_direction_is_answered(open_page, surrogate, contact, 
         assert page.complaints() == []
 
 
-def test_the_panels_ask_and_fill_the_form(open_page, surrogate, tmp_path):
+def test_the_panels_ask_and_fill_the_form(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None:
     with open_page.faked(RECORDED, "#contact=ball") as page:
         page.settle()
         page.open_all()

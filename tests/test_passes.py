@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from comparing import close
 from mumacro import Surrogate, batch, charts
 from mumacro.cells import outer_cells
 from mumacro.charts import CHARTS, RHO_MAX, SIGMA_CUT, Y_CONT, Y_HIGH, Y_MID, Y_STICK_LO, Y_TAIL
 from mumacro.contact import put_rules
 from mumacro.library import Kernel, kernels
 from tests.cases import Array, log_uniform, tables
+from tests.comparing import close
 
 CHUNK = 256  # points that the kernel's passes take together
 table = tables(1e-4, 1e-12)

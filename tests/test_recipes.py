@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparing import close
 from mumacro import Surrogate
+from tests.comparing import close
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 

@@ -1,18 +1,21 @@
 """Batches and streams over HTTP: bad cases among good ones, order, options, and what only one form has."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
-from forms import BATCH, as_csv, as_ndjson, asked, posted, read, stream_of
+from mumacro import Surrogate
+from tests.cases import Case
+from tests.forms import BATCH, as_csv, as_ndjson, asked, posted, read, stream_of
 
 VALUES = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 GAP = "is missing; write rigid or a number"
 
 
-def one(client, case):
+def one(client: Any, case: Case) -> Any:
     return client.post("/v1/mu-macro", json=case).json()
 
 
@@ -26,7 +29,7 @@ BAD_ROWS = [
 ]  # fmt: skip
 
 
-def test_a_bad_case_affects_only_itself_in_rows(client, case):
+def test_a_bad_case_affects_only_itself_in_rows(client: Any, case: Case) -> None:
     rows = [{**case, **row} if isinstance(row, dict) else row for row, _, _ in BAD_ROWS]
     rows = [{name: x for name, x in row.items() if x is not ...} if isinstance(row, dict) else row for row in rows]
     answer = client.post(BATCH, json=[case, *rows]).json()
@@ -37,7 +40,7 @@ def test_a_bad_case_affects_only_itself_in_rows(client, case):
         assert words in error["reason"]
 
 
-def test_the_list_of_errors_is_bounded_and_their_number_is_given(client, case):
+def test_the_list_of_errors_is_bounded_and_their_number_is_given(client: Any, case: Case) -> None:
     answer = client.post(BATCH, json={**case, "v0": [-1.0] * 5000 + [1.0], "include": ["groups"]}).json()
     assert [error["index"] for error in answer["errors"]] == list(range(1000))
     assert answer["n_errors"] == 5000
@@ -48,7 +51,7 @@ def test_the_list_of_errors_is_bounded_and_their_number_is_given(client, case):
 
 
 @pytest.mark.parametrize("gap", [None, "", "  ", float("nan")])
-def test_a_gap_in_k_is_never_a_rigid_contact(client, case, gap):
+def test_a_gap_in_k_is_never_a_rigid_contact(client: Any, case: Case, gap: Any) -> None:
     """Null, an empty cell, NaN: in every form the case is refused, and the others are answered."""
     rows = [{**case, "k": value} for value in (case["k"], gap, "rigid")]
     k, long = [row["k"] for row in rows], [case["k"]] * 1000
@@ -62,7 +65,7 @@ def test_a_gap_in_k_is_never_a_rigid_contact(client, case, gap):
     assert [row["error"] and row["error"][:2] for row in asked(client, "csv", rows)] == [None, "k:", None]
 
 
-def test_explicit_nulls_are_read_like_absent_names(client, case):
+def test_explicit_nulls_are_read_like_absent_names(client: Any, case: Case) -> None:
     rows = [{**case, "f": None}, {**case, "k": "rigid"}, {**case, "omega": None, "f": 1e4}]
     answer = client.post(BATCH, json=rows).json()
     assert answer["n_errors"] == 0
@@ -75,7 +78,7 @@ def test_explicit_nulls_are_read_like_absent_names(client, case):
 # --- order, sizes, options ------------------------------------------------------------------------------
 
 
-def test_a_large_batch_keeps_its_order(client, case, surrogate):
+def test_a_large_batch_keeps_its_order(client: Any, case: Case, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-9, 1e9, 100_000)
     response = client.post(BATCH, json={**case, "v0": v0.tolist()}, params={"tolerance": surrogate.tolerance})
     assert response.headers["x-table"] == response.json()["table"]["id"] == surrogate.id
@@ -87,7 +90,7 @@ def test_a_large_batch_keeps_its_order(client, case, surrogate):
 
 
 @pytest.mark.parametrize("n", [1, 7, 300, 4096, 4097])
-def test_plain_columns_get_the_same_bytes_on_the_fast_path(client, case, n):
+def test_plain_columns_get_the_same_bytes_on_the_fast_path(client: Any, case: Case, n: int) -> None:
     columns = {**case, "v0": np.geomspace(1e-6, 1e2, n).tolist(), "k": [1e6] * n}
     text = json.dumps(columns)
     escaped = text.replace('"mu0"', '"\\u006du0"')  # an escaped name is read by the general parser
@@ -99,7 +102,7 @@ def test_plain_columns_get_the_same_bytes_on_the_fast_path(client, case, n):
     assert answer["mu_macro"][:-1] == short.json()["mu_macro"][:-1]
 
 
-def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client, case):
+def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client: Any, case: Case) -> None:
     rows = client.post(BATCH, json=[]).json()
     assert (rows["results"], rows["errors"], rows["n_errors"]) == ([], [], 0)
     columns = client.post(BATCH, json={**case, "v0": [], "k": [], "include": ["limits"]}).json()
@@ -113,7 +116,7 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client, cas
 # --- lines ----------------------------------------------------------------------------------------------
 
 
-def test_a_line_is_answered_like_a_batch_or_a_case(client, case):
+def test_a_line_is_answered_like_a_batch_or_a_case(client: Any, case: Case) -> None:
     columns, rows = {**case, "v0": [0.1, -1, 0.2]}, [case, 17]
     first, second, third = read("ndjson", posted(client, "ndjson", as_ndjson([columns, rows, case])))
     assert first == client.post(BATCH, json=columns).json()
@@ -121,7 +124,7 @@ def test_a_line_is_answered_like_a_batch_or_a_case(client, case):
     assert third == one(client, case)
 
 
-def test_lines_keep_their_order_however_they_arrive(client, case):
+def test_lines_keep_their_order_however_they_arrive(client: Any, case: Case) -> None:
     text = as_ndjson([{**case, "v0": [0.001 * i, 0.002 * i]} for i in range(1, 200)]).replace("\n", "\r\n").encode()
     whole = posted(client, "ndjson", text)
     assert whole.text.count("\n") == 199
@@ -130,7 +133,7 @@ def test_lines_keep_their_order_however_they_arrive(client, case):
         assert posted(client, "ndjson", pieces).content == whole.content
 
 
-def test_options_of_a_stream_come_with_its_query_or_its_lines(client, case, problem):
+def test_options_of_a_stream_come_with_its_query_or_its_lines(client: Any, case: Case, problem: Any) -> None:
     body = as_ndjson([case, {**case, "include": ["limits"]}])
     plain, extended = read("ndjson", posted(client, "ndjson", body))
     assert ("limits" in plain, "limits" in extended) == (False, True)
@@ -146,7 +149,7 @@ def test_options_of_a_stream_come_with_its_query_or_its_lines(client, case, prob
     [('{"mu0":1', 400), ('"Fz":10}', 400), ('{"a":{}}', 422), ("{},{}", 400), ('{"v0":2}', 422), ("[]", None),
      ("{} {}", 400), ('{"include":["groups"]}', 422), ("", ...), ("17", 422), ('{"mu0": 1}', 422)],
 )  # fmt: skip
-def test_an_odd_line_among_plain_ones_affects_only_itself(client, case, odd, status):
+def test_an_odd_line_among_plain_ones_affects_only_itself(client: Any, case: Case, odd: Any, status: Any) -> None:
     good = json.dumps(case)
     answers = read("ndjson", posted(client, "ndjson", "\n".join([good, "", odd, good])))
     (expected,) = asked(client, "ndjson", [case])
@@ -157,7 +160,9 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(client, case, odd, sta
         assert answers[1]["type"].endswith("malformed-body") == (status == 400)
 
 
-def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(client, case, surrogate):
+def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(
+    client: Any, case: Case, surrogate: Surrogate
+) -> None:
     lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(3000)]
     expected = surrogate.evaluate({**case, "v0": [line["v0"] for line in lines]}).mu_macro.tolist()
     bad = range(3, 3000, 7)
@@ -170,7 +175,7 @@ def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(client, ca
         assert answers[index]["errors"][0]["field"] == ("v0" if index % 2 else "speed")
 
 
-def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started, case):
+def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started: Any, case: Case) -> None:
     with started(max_body_bytes=1024) as client:
         line = json.dumps(case) + "\n"
         assert len(read("ndjson", posted(client, "ndjson", iter([line.encode()] * 100)))) == 100
@@ -184,14 +189,16 @@ def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started, case)
 # --- CSV and Arrow --------------------------------------------------------------------------------------
 
 
-def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client, case):
+def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client: Any, case: Case) -> None:
     rows = read("csv", posted(client, "csv", as_csv([case] * 2).replace("\r\n", ",7\r\n").replace("v0,7", "v0", 1)))
     assert [row["error"] for row in rows] == ["case: has 7 cells where the head has 6"] * 2
     good = read("csv", posted(client, "csv", "\ufeff" + as_csv([case])))
     assert good[0]["mu_macro"] == one(client, case)["mu_macro"]
 
 
-def test_arrow_keeps_order_over_record_batches_and_names_its_table(started, case, surrogate):
+def test_arrow_keeps_order_over_record_batches_and_names_its_table(
+    started: Any, case: Case, surrogate: Surrogate
+) -> None:
     v0 = np.geomspace(1e-6, 1e3, 150_000)
     columns = {**{name: np.full(v0.size, value) for name, value in case.items()}, "v0": v0}
     whole = pa.record_batch(columns)
@@ -204,7 +211,7 @@ def test_arrow_keeps_order_over_record_batches_and_names_its_table(started, case
     assert answer.schema.metadata[b"api_version"] == b"1"
 
 
-def test_a_bad_arrow_case_affects_only_itself(client, case):
+def test_a_bad_arrow_case_affects_only_itself(client: Any, case: Case) -> None:
     columns = {name: pa.array([value] * 6) for name, value in case.items()}
     columns["v0"] = pa.array([0.1, -1.0, None, float("nan"), 0.1, 0.1])
     columns["k"] = pa.array([1e6, 1e6, 1e6, 1e6, float("inf"), None])
@@ -215,7 +222,7 @@ def test_a_bad_arrow_case_affects_only_itself(client, case):
     assert rows[4]["mu_macro"] == one(client, {**case, "k": None, "v0": 0.1})["mu_macro"]
 
 
-def test_arrow_numbers_of_other_types_are_numbers(client, case):
+def test_arrow_numbers_of_other_types_are_numbers(client: Any, case: Case) -> None:
     given = pa.record_batch({name: pa.array([value], type=pa.float32()) for name, value in case.items()})
     given = given.set_column(1, "Fz", pa.array([10], type=pa.int16()))
     (row,) = read("arrow", posted(client, "arrow", stream_of(given)))
@@ -225,7 +232,7 @@ def test_arrow_numbers_of_other_types_are_numbers(client, case):
 
 
 @pytest.mark.slow
-def test_a_damaged_arrow_stream_is_answered_or_refused(client, case):
+def test_a_damaged_arrow_stream_is_answered_or_refused(client: Any, case: Case) -> None:
     columns = {**{name: [value] * 3 for name, value in case.items()}, "k": [1e6, None, 1e5]}
     whole = stream_of(pa.record_batch(columns))
     lies = (b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\0\0\0\0", b"\0\0\0\1")

@@ -8,10 +8,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Any
 
 import orjson
 import pytest
 
+from mumacro import Surrogate
 from tests.serving import CASE, chunk, connect, head, to_end
 
 SINGLE, BATCH, NDJSON = "/v1/mu-macro", "/v1/mu-macro/batch", "application/x-ndjson"
@@ -24,12 +26,12 @@ LINE = json.dumps(CASE).encode() + b"\n"
 END = chunk(b"")
 
 
-def columns(n, **more):
+def columns(n: int, **more: Any) -> Any:
     return json.dumps({**CASE, "v0": [1e-6 * i for i in range(1, n + 1)], **more}).encode()
 
 
 @pytest.fixture(scope="module")
-def strict(serving, surrogate):
+def strict(serving: Any, surrogate: Surrogate) -> Any:
     """A service with short times, few connections, and two batches at a time."""
     with serving(
         surrogate.path, MUMACRO_CLIENT_TIMEOUT_S=str(WAIT_S), MUMACRO_TIME_LIMIT_S="4", MUMACRO_KEEP_ALIVE_S="60",
@@ -39,19 +41,19 @@ def strict(serving, surrogate):
 
 
 @pytest.fixture
-def raw(live_server):
+def raw(live_server: Any) -> Any:
     with connect(live_server) as made:
         yield made
 
 
-def answer(raw):
+def answer(raw: Any) -> Any:
     """One answer."""
     response = http.client.HTTPResponse(raw, method="POST")
     response.begin()
     return response.status, response.read()
 
 
-def posted(path, body):
+def posted(path: Any, body: Any) -> Any:
     return head(path, len(body)) + body
 
 
@@ -59,7 +61,7 @@ def posted(path, body):
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000])
-def test_the_answers_do_not_depend_on_how_the_bytes_come(raw, size):
+def test_the_answers_do_not_depend_on_how_the_bytes_come(raw: Any, size: Any) -> None:
     body = LINE.strip()
     pieces = head(SINGLE, None) + chunk(body[:40]) + chunk(body[40:]) + END
     requests = [posted(SINGLE, body), GET, pieces, b"GET /x HTTP/1.1\r\nHost: x\r\n\r\n", posted(SINGLE, b"{"),
@@ -75,7 +77,7 @@ def test_the_answers_do_not_depend_on_how_the_bytes_come(raw, size):
     assert to_end(raw) == b""
 
 
-def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes(raw):
+def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes(raw: Any) -> None:
     raw.sendall(posted(SINGLE, b"{}") + GET * 5000)
     received = to_end(raw)
     assert received.count(b"HTTP/1.1 ") == 1
@@ -83,7 +85,7 @@ def test_a_second_request_before_the_answer_is_dropped_and_the_connection_closes
     assert b"connection: close" in received
 
 
-def test_a_half_closed_client_gets_the_whole_answer(raw):
+def test_a_half_closed_client_gets_the_whole_answer(raw: Any) -> None:
     raw.sendall(posted(BATCH, columns(50_000)))
     raw.shutdown(socket.SHUT_WR)
     received = to_end(raw)
@@ -102,14 +104,14 @@ HEADS = [
 
 
 @pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
-def test_a_head_is_refused_with_its_status(raw, text, status):
+def test_a_head_is_refused_with_its_status(raw: Any, text: str, status: Any) -> None:
     raw.sendall(text)
     found, content = answer(raw)
     assert found == status
     assert status == 200 or json.loads(content)["status"] == status
 
 
-def test_a_head_without_an_end_is_cut_at_its_limit(raw):
+def test_a_head_without_an_end_is_cut_at_its_limit(raw: Any) -> None:
     with suppress(OSError):
         raw.sendall(GET[:-2] + b"A: " + b"b" * 10_000_000)
     assert not to_end(raw).startswith(b"HTTP/1.1 200")
@@ -134,7 +136,7 @@ SLOW = {
 }
 
 
-def given_up(server, text, drop):
+def given_up(server: Any, text: str, drop: Any) -> Any:
     """All that a client gets until it is disconnected."""
     received, until = b"", time.monotonic() + PATIENCE_S
     with connect(server) as raw, suppress(ConnectionError):
@@ -151,7 +153,7 @@ def given_up(server, text, drop):
     return received
 
 
-def test_a_client_that_stops_or_drips_is_given_up(strict):
+def test_a_client_that_stops_or_drips_is_given_up(strict: Any) -> None:
     with ThreadPoolExecutor(len(SLOW)) as pool:
         found = pool.map(lambda slow: given_up(strict, *slow[:2]), SLOW.values())
         assert strict.ask("GET", "/livez")[0] == 200
@@ -160,7 +162,7 @@ def test_a_client_that_stops_or_drips_is_given_up(strict):
     assert not received["lines until the deadline"].endswith(END)
 
 
-def test_a_client_that_does_not_read_is_disconnected_and_takes_little_memory(strict):
+def test_a_client_that_does_not_read_is_disconnected_and_takes_little_memory(strict: Any) -> None:
     with connect(strict, receive_buffer=4096) as raw:
         raw.sendall(posted(BATCH, columns(100_000, include=["groups", "limits"])))
         time.sleep(3 * WAIT_S)
@@ -170,7 +172,7 @@ def test_a_client_that_does_not_read_is_disconnected_and_takes_little_memory(str
     assert len(received) < 8_000_000
 
 
-def test_a_client_that_leaves_within_a_body_frees_its_place(strict):
+def test_a_client_that_leaves_within_a_body_frees_its_place(strict: Any) -> None:
     for sent in (300_000, 3_000_000, 3_000_000):  # one more than the batches allowed
         with connect(strict) as raw:
             raw.sendall(head(BATCH, 5_000_000) + b"[" + b" " * sent)
@@ -179,7 +181,7 @@ def test_a_client_that_leaves_within_a_body_frees_its_place(strict):
         assert time.monotonic() < deadline
 
 
-def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(strict):
+def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(strict: Any) -> None:
     status, headers, content = strict.ask("POST", SINGLE, b"x" * 3_000_000)
     assert (status, headers["connection"]) == (413, "close")
     assert json.loads(content)["max_bytes"] == 65536
@@ -188,7 +190,7 @@ def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(s
 # --- many clients ---------------------------------------------------------------------------------------
 
 
-def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(strict):
+def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(strict: Any) -> None:
     large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
     compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
     assert len(compact) < 64 * 1024
@@ -214,7 +216,7 @@ def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(
         assert strict.ask("POST", BATCH, json.dumps([CASE]))[0] == 200
 
 
-def test_health_is_answered_when_all_connections_are_open(strict):
+def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
     query = "&".join(f"{name}={value}" for name, value in CASE.items())
     with ExitStack() as held:
         for _ in range(3 * FULL):  # silent ones: the oldest gives way
@@ -233,7 +235,9 @@ def test_health_is_answered_when_all_connections_are_open(strict):
 
 
 @pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])
-def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(live_server, raw, kind, step):
+def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(
+    live_server: Any, raw: Any, kind: Any, step: Any
+) -> None:
     body = columns(20_000)
     raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
     said = b""
@@ -248,7 +252,7 @@ def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(live_server, ra
     assert received.strip() == live_server.ask("POST", BATCH, body)[2]
 
 
-def test_no_piece_of_a_stream_is_lost(raw):
+def test_no_piece_of_a_stream_is_lost(raw: Any) -> None:
     # Lines end inside pieces and between pieces, and both directions are busy at the same time.
     lines = b"".join(json.dumps({**CASE, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))
     answers = []
@@ -265,11 +269,11 @@ def test_no_piece_of_a_stream_is_lost(raw):
 
 
 @pytest.mark.slow
-def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server):
+def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server: Any) -> None:
     line, sizes, received = columns(1000) + b"\n", [], [0, b""]
     with connect(live_server) as raw:
 
-        def read():
+        def read() -> None:
             while received[1] != END and (piece := raw.recv(1 << 20)):
                 received[:] = received[0] + len(piece), (received[1] + piece)[-5:]
 
@@ -287,7 +291,7 @@ def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server):
 
 
 @pytest.mark.slow
-def test_short_requests_are_answered_while_a_large_batch_is(serving, surrogate):
+def test_short_requests_are_answered_while_a_large_batch_is(serving: Any, surrogate: Surrogate) -> None:
     n = 1_000_000
     body = json.dumps({**{name: [value] * n for name, value in CASE.items()}, "v0": [1e-7 * i for i in range(n)]})
     with (
@@ -312,7 +316,9 @@ def test_short_requests_are_answered_while_a_large_batch_is(serving, surrogate):
 
 
 @pytest.mark.slow
-def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(serving, surrogate):
+def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
+    serving: Any, surrogate: Surrogate
+) -> None:
     places, n = 6, 100_000
     rows = json.dumps([{**CASE, "v0": 1e-7 * i} for i in range(1, n + 1)]).encode()
     assert len(rows) > 8_000_000

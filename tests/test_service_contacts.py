@@ -1,13 +1,15 @@
 """Balls, other directions and intervals of k over HTTP: every form gives the library's answer, bit for bit."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
-from forms import BATCH, as_csv, asked, posted, read
+from mumacro import Surrogate
 from mumacro.validity import digits, k_effect, model_rows
+from tests.comparing import close
+from tests.forms import BATCH, as_csv, asked, posted, read
 
 PATH = "/v1/mu-macro"
 V0 = [0.0, 1e-3, 0.02, 0.26, 3.0]
@@ -26,7 +28,7 @@ ASKED = {
 
 
 @pytest.mark.parametrize("name", ASKED)
-def test_every_form_gives_the_librarys_answer(client, surrogate, name):
+def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate, name: str) -> None:
     options, inputs = ASKED[name]
     inputs = {**RIG, **inputs}
     known = {**inputs, "k": np.inf} if inputs.get("k") == "rigid" else inputs
@@ -57,13 +59,13 @@ def test_every_form_gives_the_librarys_answer(client, surrogate, name):
     assert float(client.get(f"{PATH}.txt", params=of_query).text) == of_one.mu_macro
 
 
-def test_an_end_of_an_interval_may_have_a_unit_in_csv(client):
+def test_an_end_of_an_interval_may_have_a_unit_in_csv(client: Any) -> None:
     rows = [{**RIG, **ENDS, "y0": 2e-6, "v0": 0.02}]
     text = as_csv(rows).replace("k_low", "k_low [N/mm]").replace("800000.0", "800.0")
     assert read("csv", posted(client, "csv", text)) == asked(client, "csv", rows)
 
 
-def test_bad_rows_spoil_only_themselves(client):
+def test_bad_rows_spoil_only_themselves(client: Any) -> None:
     given = {**RIG, "y0": 2e-6, "v0": 0.01, "k_low": [8e5, None, 2e6, 1e6], "k_high": [1e6, 1e6, 1e6, "rigid"]}
     answer = client.post(BATCH, json=given).json()
     assert [mu is None for mu in answer["mu_macro_low"]] == [False, True, True, True]
@@ -84,7 +86,7 @@ def test_bad_rows_spoil_only_themselves(client):
 
 @pytest.mark.parametrize("v0", [1e-4, 0.02, 5.0])
 @pytest.mark.parametrize("name", ["spring", "ball", "along", "ball along", "normal"])
-def test_included_quantities_are_the_librarys(client, surrogate, name, v0):
+def test_included_quantities_are_the_librarys(client: Any, surrogate: Surrogate, name: str, v0: Any) -> None:
     options, inputs = ASKED[name]
     case = {**RIG, **inputs, "v0": v0}
     include = ["groups", "limits", "gradient", "stick_fraction", "std"]
@@ -116,7 +118,7 @@ def test_included_quantities_are_the_librarys(client, surrogate, name, v0):
     assert batch["std"] == [answer["std"]]
 
 
-def test_what_the_model_leaves_out(client, surrogate):
+def test_what_the_model_leaves_out(client: Any, surrogate: Surrogate) -> None:
     case = {**RIG, **ACROSS, "v0": 0.02}
     answer = client.post(PATH, json={**case, "contact": "ball", "include": ["model"]}).json()
     assert answer["model"] == model_rows(surrogate, case, contact="ball")
@@ -125,7 +127,7 @@ def test_what_the_model_leaves_out(client, surrogate):
     assert "k is known" not in [row["row"] for row in client.post(PATH, json=told).json()["model"]]
 
 
-def test_a_law_has_a_band_and_an_inverse_its_contact(client, surrogate):
+def test_a_law_has_a_band_and_an_inverse_its_contact(client: Any, surrogate: Surrogate) -> None:
     rig = {**RIG, "y0": 2e-6, "contact": "ball"}
     sweep = {"start": 1e-3, "stop": 1.0, "points": 5}
     law = client.post("/v1/law", json={**rig, "k_range": [8e5, 1.2e6], **sweep}).json()

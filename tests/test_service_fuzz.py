@@ -3,7 +3,7 @@
 import pytest
 
 from fuzz import attacks, strange
-from serving import Server
+from tests.serving import Server
 
 SHARE = 0.2
 MOST_MB, MOST_S = 512, 2.0  # the aim for the wait is 0.25 s, on a machine that does nothing else

@@ -2,8 +2,11 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from tests.cases import Case
 
 STATIC = Path(__file__).resolve().parent.parent / "service" / "static"
 FILES = {
@@ -23,20 +26,20 @@ KEY = {"X-API-Key": "s3cret-key"}
 @pytest.mark.parametrize(
     "path", ["/nowhere", "/static/page/", "/v1", "/v1/mu-macro/", "/v2/mu-macro", "/static/../settings.py", "/%00"]
 )
-def test_an_unknown_path_is_not_found(client, problem, path):
+def test_an_unknown_path_is_not_found(client: Any, problem: Any, path: Any) -> None:
     problem(client.get(path), 404)
 
 
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
-def test_a_wrong_method_is_answered_with_the_right_ones(client, problem, path, method):
+def test_a_wrong_method_is_answered_with_the_right_ones(client: Any, problem: Any, path: Any, method: Any) -> None:
     response = client.request(method, path)
     problem(response, 405)
     assert response.headers["allow"] == PATHS[path]
 
 
 @pytest.mark.parametrize("offered", ["abc-123", "A.b_c:9", "x" * 128, "", "x" * 129, "a b", "a;b", 'a"b', "ä"])
-def test_an_ill_formed_request_id_is_replaced(client, offered):
+def test_an_ill_formed_request_id_is_replaced(client: Any, offered: Any) -> None:
     given = client.get("/livez", headers={"X-Request-ID": offered.encode("latin-1")}).headers["x-request-id"]
     if offered in ("abc-123", "A.b_c:9", "x" * 128):
         assert given == offered
@@ -51,8 +54,16 @@ def test_an_ill_formed_request_id_is_replaced(client, offered):
 @pytest.mark.parametrize(
     ("error", "status"), [(RuntimeError("secret detail"), 500), (MemoryError("secret detail"), 503)]
 )
-def test_an_unexpected_error_is_logged_and_not_shown(client, case, problem, caplog, monkeypatch, error, status):
-    def fail(*_args, **_named):
+def test_an_unexpected_error_is_logged_and_not_shown(
+    client: Any,
+    case: Case,
+    problem: Any,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    error: Any,
+    status: Any,
+) -> None:
+    def fail(*_args: Any, **_named: Any) -> None:
         raise error
 
     monkeypatch.setattr("mumacro.Surrogate.evaluate_case", fail)
@@ -67,7 +78,7 @@ def test_an_unexpected_error_is_logged_and_not_shown(client, case, problem, capl
 
 
 @pytest.fixture(scope="module")
-def closed(started):
+def closed(started: Any) -> Any:
     """A client of an application with an API key."""
     with started(api_key=KEY["X-API-Key"]) as client:
         yield client
@@ -79,7 +90,7 @@ NO_KEY = [
 ]  # fmt: skip
 
 
-def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed, problem):
+def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed: Any, problem: Any) -> None:
     open_to_all = {"/livez", "/readyz", "/healthz", "/", "/docs", "/static/page/names.json", *FILES}
     described = closed.get("/openapi.json", headers=KEY).json()
     assert described["security"] == [{"key": []}, {"bearer": []}]
@@ -100,14 +111,14 @@ def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed, problem)
 
 
 @pytest.mark.parametrize("headers", [KEY, {"Authorization": "bearer s3cret-key"}])
-def test_the_key_gives_access(closed, case, headers):
+def test_the_key_gives_access(closed: Any, case: Case, headers: Any) -> None:
     response = closed.get("/v1/mu-macro", params=case, headers=headers)
     assert response.status_code == 200
     assert response.headers["cache-control"] == "private, max-age=3600"
     assert response.headers["vary"] == "X-API-Key, Authorization"
 
 
-def test_a_key_given_twice_and_an_upgrade_with_a_body_are_refused(closed, case, problem):
+def test_a_key_given_twice_and_an_upgrade_with_a_body_are_refused(closed: Any, case: Case, problem: Any) -> None:
     for name, value in (("X-API-Key", "s3cret-key"), ("Authorization", "Bearer s3cret-key")):
         problem(closed.get("/v1/mu-macro", params=case, headers=[(name, value), (name, "wrong")]), 400)
     upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", **KEY}
@@ -119,7 +130,7 @@ def test_a_key_given_twice_and_an_upgrade_with_a_body_are_refused(closed, case, 
 # --- bodies ---------------------------------------------------------------------------------------------
 
 
-def test_a_large_body_is_refused_with_and_without_a_length(started, case, problem):
+def test_a_large_body_is_refused_with_and_without_a_length(started: Any, case: Case, problem: Any) -> None:
     body = json.dumps(case).encode()
     with started(max_body_bytes=1024) as narrow:
         assert narrow.post("/v1/mu-macro", content=body.ljust(1024)).status_code == 200
@@ -133,7 +144,7 @@ def test_a_large_body_is_refused_with_and_without_a_length(started, case, proble
 # --- the description ------------------------------------------------------------------------------------
 
 
-def test_the_description_is_whole(client):
+def test_the_description_is_whole(client: Any) -> None:
     document = client.get("/openapi.json").json()
     schemas = document["components"]["schemas"]
     six = ("mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude")
@@ -148,7 +159,7 @@ def test_the_description_is_whole(client):
     assert {parameter["name"] for parameter in parameters if parameter["required"]} == {"mu0", "Fz", "v0"}
 
 
-def examples_of(operation, schemas):
+def examples_of(operation: Any, schemas: Any) -> Any:
     """Arguments of the requests that an operation shows; one without input has the empty one."""
     bodies = operation.get("requestBody", {}).get("content", {})
     for media_type, content in bodies.items():
@@ -163,7 +174,7 @@ def examples_of(operation, schemas):
         yield {"params": {name: kind["examples"][0] for name, kind in kinds.items() if "examples" in kind}}
 
 
-def test_the_described_examples_are_answered(client):
+def test_the_described_examples_are_answered(client: Any) -> None:
     document = client.get("/openapi.json").json()
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
@@ -178,7 +189,7 @@ def test_the_described_examples_are_answered(client):
 # --- pages, files, headers ------------------------------------------------------------------------------
 
 
-def test_the_page_loads_nothing_from_elsewhere(client):
+def test_the_page_loads_nothing_from_elsewhere(client: Any) -> None:
     page = client.get("/docs")
     assert page.headers["content-type"].startswith("text/html")
     assert "//" not in page.text
@@ -191,7 +202,7 @@ def test_the_page_loads_nothing_from_elsewhere(client):
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/v1/table.nc", *FILES])
-def test_a_page_that_the_client_has_is_not_sent_again(client, path):
+def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) -> None:
     first = client.get(path)
     tag = first.headers["etag"]
     for offered in (tag, f"W/{tag}", f'"other", {tag}', "*"):
@@ -209,14 +220,16 @@ def test_a_page_that_the_client_has_is_not_sent_again(client, path):
      ("nonsense", 400), ("bytes=", 400), ("bytes=a-b", 400), ("bytes=\xff-", 400)],
 )  # fmt: skip
 @pytest.mark.parametrize("path", ["/v1/table.nc", "/", "/static/page/main.js"])
-def test_a_range_that_the_file_has_not_is_a_problem_document(client, problem, path, given, status):
+def test_a_range_that_the_file_has_not_is_a_problem_document(
+    client: Any, problem: Any, path: Any, given: Any, status: Any
+) -> None:
     response = client.get(path, headers={"Range": given.encode("latin-1")})
     problem(response, status)
     size = client.get(path).headers["content-length"]
     assert response.headers.get("content-range") == (f"bytes */{size}" if status == 416 else None)
 
 
-def test_every_answer_has_the_security_headers(client, case):
+def test_every_answer_has_the_security_headers(client: Any, case: Case) -> None:
     for path in ("/", "/docs"):
         page = client.get(path)
         policy = dict(part.strip().split(" ", 1) for part in page.headers["content-security-policy"].split(";"))
@@ -234,7 +247,7 @@ def test_every_answer_has_the_security_headers(client, case):
     assert client.get("/nowhere").headers["cache-control"] == "no-store"
 
 
-def test_pages_of_other_hosts_are_answered_only_where_a_setting_allows_them(started):
+def test_pages_of_other_hosts_are_answered_only_where_a_setting_allows_them(started: Any) -> None:
     asked = {"Origin": "https://tool.example", "Access-Control-Request-Method": "POST"}
     with started(cors_origins=("https://tool.example",)) as client:
         allowed, answer = client.options("/v1/mu-macro", headers=asked), client.get("/livez", headers=asked)

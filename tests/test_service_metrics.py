@@ -2,14 +2,18 @@
 
 import json
 import time
+from typing import Any
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from mumacro import Surrogate
+from tests.cases import Case
+
 PATH = "/v1/mu-macro"
 
 
-def samples(text):
+def samples(text: str) -> Any:
     return {
         (sample.name, *sorted(sample.labels.values())): sample.value
         for family in text_string_to_metric_families(text)
@@ -18,13 +22,13 @@ def samples(text):
 
 
 @pytest.fixture
-def fresh(started):
+def fresh(started: Any) -> Any:
     """A client of an application with all counters at zero."""
     with started() as client:
         yield client
 
 
-def scrape(fresh):
+def scrape(fresh: Any) -> Any:
     response = fresh.get("/metrics")
     assert response.status_code == 200
     assert response.headers["content-type"] == "text/plain; version=1.0.0; charset=utf-8"
@@ -32,7 +36,7 @@ def scrape(fresh):
     return samples(response.text)
 
 
-def test_requests_are_counted_by_route_method_and_status(fresh, case):
+def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case) -> None:
     for _ in range(3):
         fresh.post(PATH, json=case)
     fresh.get(PATH, params=case)
@@ -56,10 +60,10 @@ def test_requests_are_counted_by_route_method_and_status(fresh, case):
         assert found["mumacro_requests_total", *sorted((path, "other", "405"))] >= 1
 
 
-def test_clients_cannot_add_labels(fresh, case):
+def test_clients_cannot_add_labels(fresh: Any, case: Case) -> None:
     """The number of series does not depend on the paths, methods and names that clients send."""
 
-    def ask(i):
+    def ask(i: Any) -> None:
         fresh.get(f"/nowhere/{i}")
         fresh.request(f"BREW{i}", f"/v1/{i}")
         fresh.get("/v1/table", params={"id": f"t{i}"})
@@ -73,7 +77,7 @@ def test_clients_cannot_add_labels(fresh, case):
     assert scrape(fresh).keys() == before
 
 
-def test_cases_are_counted_by_source_and_regime(fresh, case, surrogate):
+def test_cases_are_counted_by_source_and_regime(fresh: Any, case: Case, surrogate: Surrogate) -> None:
     rows = [{**case, "v0": v0} for v0 in (0, 1e-4, 0.01, 0.1, 10.0)] + [{**case, "v0": -1}] * 4
     answers = [fresh.post(PATH, json=row).json() for row in rows[:5]]
     fresh.post(f"{PATH}/batch", json=rows)
@@ -92,7 +96,9 @@ def test_cases_are_counted_by_source_and_regime(fresh, case, surrogate):
 
 
 @pytest.mark.slow
-def test_several_workers_serve_behind_a_key_count_together_and_stop(serving, surrogate, case):
+def test_several_workers_serve_behind_a_key_count_together_and_stop(
+    serving: Any, surrogate: Surrogate, case: dict[str, Any]
+) -> None:
     body, asked, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
     with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
         server.wait_until_ready(2)

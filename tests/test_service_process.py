@@ -11,8 +11,13 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import pytest
+
+from mumacro import Surrogate
+from tests.cases import Case
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 #: texts that a client behind a proxy can send in place of its address
@@ -20,10 +25,10 @@ NO_ADDRESS = ['a"b', "a\\", '1.2.3.4" "level": "error', "\t1.2.3.4", "{}", "\u00
 NO_PATH = ("/%0a%7B%22level%22%3A%22error%22%7D", "/%22", "/%00", "/%ff", "/%E2%80%A8", "/a%0d%0ab")
 
 
-def fields_of(lines):
+def fields_of(lines: Any) -> Any:
     """Every line as an object; a line that is not JSON, or has a name twice, fails the test."""
 
-    def once(pairs):
+    def once(pairs: Any) -> Any:
         names = [name for name, _ in pairs]
         assert len(names) == len(set(names)), names
         return dict(pairs)
@@ -33,7 +38,7 @@ def fields_of(lines):
     return found
 
 
-def accesses(lines):
+def accesses(lines: Any) -> Any:
     return [line for line in fields_of(lines) if line["logger"] == "mumacro.access"]
 
 
@@ -41,7 +46,7 @@ def accesses(lines):
 
 
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGTERM), pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
-def test_a_requested_stop_is_a_success(serving, surrogate, case, number):
+def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case: Case, number: Any) -> None:
     with serving(surrogate.path, MUMACRO_ROOT_PATH="/friction") as server:
         status, headers, _ = server.ask("POST", SINGLE, json.dumps(case), {"X-Request-ID": "the-last"})
         assert (status, headers["x-request-id"]) == (200, "the-last")
@@ -57,7 +62,7 @@ def test_a_requested_stop_is_a_success(serving, surrogate, case, number):
 
 
 @pytest.mark.slow
-def test_without_a_table_or_pyarrow_it_starts_and_says_so(serving, tmp_path, case):
+def test_without_a_table_or_pyarrow_it_starts_and_says_so(serving: Any, tmp_path: Path, case: Case) -> None:
     (tmp_path / "damaged.nc").write_bytes(b"damaged")
     (tmp_path / "sitecustomize.py").write_text('import sys\n\nsys.modules["pyarrow"] = None\n')
     path = os.pathsep.join([str(tmp_path), os.getcwd()])
@@ -71,14 +76,16 @@ def test_without_a_table_or_pyarrow_it_starts_and_says_so(serving, tmp_path, cas
         assert server.stop() == 0
 
 
-def command(repository, *arguments):
+def command(repository: Path, *arguments: Any) -> Any:
     return subprocess.run(
         [sys.executable, "-m", "service", *arguments], cwd=repository, capture_output=True, text=True, check=False,
         timeout=180, env={**os.environ, "http_proxy": "http://[::1]:9"},
     )  # fmt: skip
 
 
-def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure(live_server, repository, surrogate):
+def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure(
+    live_server: Any, repository: Path, surrogate: Surrogate
+) -> None:
     assert command(repository, "healthcheck", "--port", str(live_server.port)).returncode == 0
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
@@ -91,7 +98,9 @@ def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure
 # --- the log --------------------------------------------------------------------------------------------
 
 
-def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(serving, surrogate, case):
+def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
+    serving: Any, surrogate: Surrogate, case: dict[str, Any]
+) -> None:
     alice, bob, wrong = "k3y-of-alice", "k3y-of-bob", "wr0ng-key"
     body, told = json.dumps(case), []
     known = "&".join(f"{name}={value}" for name, value in case.items())
@@ -121,7 +130,7 @@ def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(serving, s
 
 
 @contextmanager
-def unread(repository, surrogate):
+def unread(repository: Path, surrogate: Surrogate) -> Any:
     """A service whose standard output is read up to the line with its port only: process, port, lines."""
     words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
@@ -140,7 +149,7 @@ def unread(repository, surrogate):
         process.stdout.close()
 
 
-def statuses(port, path, many):
+def statuses(port: Any, path: Any, many: Any) -> Any:
     """Responses to the same request on one connection."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     found = []
@@ -155,7 +164,9 @@ def statuses(port, path, many):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("then", ["reads", "stays", "leaves"])
-def test_a_log_reader_that_stalls_delays_no_request(repository, surrogate, case, then):
+def test_a_log_reader_that_stalls_delays_no_request(
+    repository: Path, surrogate: Surrogate, case: Case, then: Any
+) -> None:
     query = f"{SINGLE}?" + "&".join(f"{name}={value}" for name, value in case.items())
     many = 3000 if then == "reads" else 500
     with unread(repository, surrogate) as (process, port, lines):

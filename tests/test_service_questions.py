@@ -4,21 +4,23 @@ import csv
 import io
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 import mumacro
-from comparing import close
+from mumacro import Surrogate
 from mumacro.geometries import contact_of
 from mumacro.law import APPROXIMATIONS, BORDERS
+from tests.comparing import close
 from tests.serving import CASE
 
 SOLVE = {"unknown": "y0", "target": 0.15, **{name: value for name, value in CASE.items() if name != "y0"}}
 LAW = {"start": 1e-4, "stop": 10.0, "points": 33, **{name: value for name, value in CASE.items() if name != "v0"}}
 
 
-def answered(client, path, given, **changed):
+def answered(client: Any, path: Any, given: Any, **changed: Any) -> Any:
     given = {name: value for name, value in {**given, **changed}.items() if value is not ...}
     response = client.post(f"/v1/{path}", json=given)
     assert response.status_code == 200, response.text
@@ -28,7 +30,7 @@ def answered(client, path, given, **changed):
 # --- solve-for ------------------------------------------------------------------------------------------
 
 
-def test_a_root_gives_its_target_back(client):
+def test_a_root_gives_its_target_back(client: Any) -> None:
     answer = answered(client, "solve-for", SOLVE)
     assert answer.keys() == {"unknown", "unit", "quantity", "range", "reachable", "results", "table", "api_version"}
     assert (answer["unknown"], answer["unit"], answer["api_version"]) == ("y0", "m", "1")
@@ -40,7 +42,7 @@ def test_a_root_gives_its_target_back(client):
     assert root["low"] < root["value"] < root["high"] < (1.0 + 1e-9) * root["low"]
 
 
-def test_a_frequency_is_solved_for_by_a_ratio_with_what_is_included(client):
+def test_a_frequency_is_solved_for_by_a_ratio_with_what_is_included(client: Any) -> None:
     ratio = {**SOLVE, "unknown": "f", "y0": 2e-6, "omega": ..., "target": 0.8, "quantity": "mu_ratio"}
     answer = answered(client, "solve-for", ratio, include=["power"])
     assert (answer["unit"], answer["quantity"]) == ("Hz", "mu_ratio")
@@ -51,7 +53,7 @@ def test_a_frequency_is_solved_for_by_a_ratio_with_what_is_included(client):
     assert root["low"] < root["value"] < root["high"]
 
 
-def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client):
+def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any) -> None:
     targets = [0.25, 0.1, 0.29, 0.4]
     answer = answered(client, "solve-for", SOLVE, unknown="v0", target=targets, y0=CASE["y0"], v0=None)
     assert [result["target"] for result in answer["results"]] == targets
@@ -66,7 +68,7 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client):
     assert "no influence" in result["reason"]
 
 
-def test_folded_roots_are_all_returned_within_the_range(client):
+def test_folded_roots_are_all_returned_within_the_range(client: Any) -> None:
     request = {**SOLVE, "unknown": "k", "target": 0.3 * 0.0023, "v0": 1e-4, "y0": CASE["y0"], "k": None}
     values = [root["value"] for root in answered(client, "solve-for", request)["results"][0]["roots"]]
     assert len(values) == 3
@@ -79,7 +81,7 @@ def test_folded_roots_are_all_returned_within_the_range(client):
 # --- law ------------------------------------------------------------------------------------------------
 
 
-def test_a_law_is_single_answers_in_a_row(client):
+def test_a_law_is_single_answers_in_a_row(client: Any) -> None:
     law = answered(client, "law", LAW, points=33.0)  # an integer may be written so
     assert (law["along"], law["unit"]) == ("v0", "m/s")
     assert (law["values"][0], law["values"][-1], len(law["values"])) == (1e-4, 10.0, 33)
@@ -97,7 +99,7 @@ def test_a_law_is_single_answers_in_a_row(client):
 
 
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega", "f"])
-def test_a_law_goes_along_any_input_and_has_approximations(client, along):
+def test_a_law_goes_along_any_input_and_has_approximations(client: Any, along: Any) -> None:
     name, per = ("omega", 2 * math.pi) if along == "f" else (along, 1.0)
     middle = CASE[name] / per
     asked = {"along": along, "start": 0.1 * middle, "stop": 10 * middle, "scale": "linear", name: None}
@@ -113,7 +115,7 @@ def test_a_law_goes_along_any_input_and_has_approximations(client, along):
         assert at["limits"]["v0_crit"] == close(CASE["v0"], rel=1e-6)
 
 
-def test_the_table_for_spreadsheets_is_the_law(client):
+def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
     law = answered(client, "law", LAW, y0=1e-5, include=["approximations"])
     assert set(law["approximations"]["small_amplitude"]) == {None}  # outside its range
     response = client.get("/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "approximations"})
@@ -135,7 +137,7 @@ def test_the_table_for_spreadsheets_is_the_law(client):
     assert (head.status_code, head.content) == (200, b"")
 
 
-def test_the_table_for_spreadsheets_has_what_is_included(client):
+def test_the_table_for_spreadsheets_has_what_is_included(client: Any) -> None:
     law = answered(client, "law", LAW, include=["power"])
     header, *rows = csv.reader(io.StringIO(client.get("/v1/law.csv", params={**LAW, "include": "power"}).text))
     assert [float(row[header.index("power.saved [W]")]) for row in rows] == law["power"]["saved"]
@@ -151,13 +153,13 @@ BODIES = [
 
 
 @pytest.mark.parametrize(("geometry", "given"), BODIES)
-def test_a_stiffness_is_the_librarys(client, geometry, given):
+def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> None:
     found = contact_of(geometry, **STEEL, **{name: np.inf if x == "rigid" else x for name, x in given.items()})
     answer = answered(client, "stiffness", {"geometry": geometry, **STEEL, **given})
     assert answer == {"geometry": geometry, **vars(found), "api_version": "1"}
 
 
-def test_a_fit_is_the_librarys(client, surrogate):
+def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-3, 1.0, 20)
     mu = surrogate.evaluate({**CASE, "v0": v0}, contact="ball").mu_macro + 1e-3 * np.cos(17.0 * np.arange(20))
     rig = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
@@ -174,7 +176,7 @@ def test_a_fit_is_the_librarys(client, surrogate):
     assert answered(client, "fit", body, Fz=[10.0] * 19 + [11.0])["curve"] is None
 
 
-def test_stiff_points_fit_a_rigid_contact_in_words(client, surrogate):
+def test_stiff_points_fit_a_rigid_contact_in_words(client: Any, surrogate: Surrogate) -> None:
     v0 = np.geomspace(0.05, 2.0, 12)
     mu = surrogate.evaluate({**CASE, "k": np.inf, "v0": v0}).mu_macro
     body = {"v0": v0.tolist(), "mu_macro": mu.tolist(), "Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}

@@ -1,12 +1,13 @@
 """What is refused, by its place and with a reason: one table for all questions; bodies that cannot be read."""
 
 import json
+from typing import Any
 from urllib.parse import urlencode
 
 import pyarrow as pa
 import pytest
 
-from forms import BATCH, as_arrow, as_csv, as_table, asked, posted, stream_of
+from tests.forms import BATCH, as_arrow, as_csv, as_table, asked, posted, stream_of
 from tests.serving import CASE
 
 SINGLE = "/v1/mu-macro"
@@ -140,7 +141,9 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("request_line", "changed", "place", "words"), REFUSED)
-def test_a_bad_field_is_refused_by_its_place(client, problem, request_line, changed, place, words):
+def test_a_bad_field_is_refused_by_its_place(
+    client: Any, problem: Any, request_line: Any, changed: Any, place: Any, words: Any
+) -> None:
     method, _, path = request_line.partition(" ")
     path, _, query = path.partition("?")
     given = {name: value for name, value in {**ASKED[path], **changed}.items() if value is not ...}
@@ -168,7 +171,7 @@ BEYOND = {
 
 @pytest.mark.parametrize("text", BEYOND, ids=lambda text: text[:12])
 @pytest.mark.parametrize("name", CASE)
-def test_a_number_out_of_bounds_is_refused_and_shown(client, problem, name, text):
+def test_a_number_out_of_bounds_is_refused_and_shown(client: Any, problem: Any, name: str, text: str) -> None:
     body = json.dumps({**CASE, name: "@"}).replace('"@"', text)
     bound = f"finite and {'>' if name in ('mu0', 'Fz', 'k') else '>='} 0"
     reason = f"must be {bound}{', or rigid' if name == 'k' else ''}"
@@ -190,7 +193,7 @@ def test_a_number_out_of_bounds_is_refused_and_shown(client, problem, name, text
     assert (fault["pointer"], fault["bound"]) == (f"#/{name}", bound)
 
 
-def test_all_faults_are_reported_at_once_and_their_list_is_bounded(client, problem):
+def test_all_faults_are_reported_at_once_and_their_list_is_bounded(client: Any, problem: Any) -> None:
     body = {"mu0": -1, "Fz": "10", "amplitude": 3, "omega": None}
     faults = problem(client.post(SINGLE, json=body), 422)["errors"]
     assert sorted(fault["field"] for fault in faults) == ["Fz", "amplitude", "k", "mu0", "omega", "v0", "y0"]
@@ -213,7 +216,7 @@ TWICE = (
 
 
 @pytest.mark.parametrize("text", TWICE)
-def test_a_name_given_twice_is_refused(client, problem, text):
+def test_a_name_given_twice_is_refused(client: Any, problem: Any, text: str) -> None:
     bodies = {text % "0.1": SINGLE, text % "[0.1, 0.2]": BATCH, f"[{text % '0.1'},{text % '1'}]": BATCH}
     for body, path in bodies.items():
         (fault,) = problem(client.post(path, content=body), 422)["errors"]
@@ -225,7 +228,7 @@ def test_a_name_given_twice_is_refused(client, problem, text):
         assert "more than once" in problem(client.post(path, content=options), 422)["errors"][0]["reason"]
 
 
-def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_name(client, problem):
+def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_name(client: Any, problem: Any) -> None:
     case = {**CASE, "f": 1.7e308}
     del case["omega"]
     for answer in (client.post(SINGLE, json=case), client.get(SINGLE, params=case),
@@ -249,7 +252,7 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
      ("csv", "k [N/s]", "unit that k cannot have; known are N/m"), ("csv", "mu0,mu0", "mu0: is given more than once"),
      ("csv", "mu0,Fz,k,y0,omega,f,v0", "f: omega is given, too: give exactly one of omega")],
 )  # fmt: skip
-def test_columns_that_do_not_fit_are_refused(client, problem, form, columns, words):
+def test_columns_that_do_not_fit_are_refused(client: Any, problem: Any, form: Any, columns: Any, words: Any) -> None:
     body = f"{columns}\r\n1\r\n"
     if form == "arrow":
         given = {**{name: [value] for name, value in CASE.items()}, **columns}
@@ -265,7 +268,7 @@ CASES = "must be an object of columns or a list of rows"
 
 @pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law", "stiffness", "fit"])
 @pytest.mark.parametrize("body", ["[]", "3", "null", '"text"', "true"])
-def test_json_of_another_kind_is_refused(client, problem, path, body):
+def test_json_of_another_kind_is_refused(client: Any, problem: Any, path: Any, body: Any) -> None:
     response = client.post(f"/v1/{path}", content=body)
     if path == "mu-macro/batch" and body == "[]":  # no rows
         assert response.json()["results"] == []
@@ -280,11 +283,11 @@ NO_JSON = (b"", b" ", b"{", b"[1,]", b"{'mu0': 1}", b"\xff\xfe", b"{} {}", b"[" 
 
 @pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law"])
 @pytest.mark.parametrize("body", NO_JSON, ids=range(9))
-def test_a_body_that_is_not_json_is_malformed(client, problem, path, body):
+def test_a_body_that_is_not_json_is_malformed(client: Any, problem: Any, path: Any, body: Any) -> None:
     assert problem(client.post(f"/v1/{path}", content=body), 400)["type"].endswith("malformed-body")
 
 
-def test_a_body_that_is_no_plain_arrow_stream_or_no_csv_is_malformed(client, problem):
+def test_a_body_that_is_no_plain_arrow_stream_or_no_csv_is_malformed(client: Any, problem: Any) -> None:
     good = stream_of(as_table([CASE]))
     named = stream_of(pa.record_batch({**{name: [value] for name, value in CASE.items()}, "friction": [1.0]}))
     for body in (b"nonsense", b"\xff" * 100, good[:100], good[: len(good) // 2],
@@ -299,7 +302,7 @@ def test_a_body_that_is_no_plain_arrow_stream_or_no_csv_is_malformed(client, pro
 
 
 @pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law"])
-def test_other_media_types_and_a_compressed_body_are_refused(client, problem, path):
+def test_other_media_types_and_a_compressed_body_are_refused(client: Any, problem: Any, path: Any) -> None:
     for kind in ("text/plain", "application/x-www-form-urlencoded", "application/json; charset=utf-16"):
         response = client.post(f"/v1/{path}", content="{}", headers={"Content-Type": kind})
         assert "application/json" in problem(response, 415)["detail"]
@@ -309,7 +312,7 @@ def test_other_media_types_and_a_compressed_body_are_refused(client, problem, pa
 
 
 @pytest.mark.parametrize("kind", ["Application/JSON; charset=UTF-8", 'application/json; charset="utf-8"', None])
-def test_json_is_read_whatever_the_case_of_its_type_and_without_one(client, kind):
+def test_json_is_read_whatever_the_case_of_its_type_and_without_one(client: Any, kind: Any) -> None:
     headers = {} if kind is None else {"Content-Type": kind}
     response = client.post(SINGLE, content=json.dumps(CASE), headers=headers)
     assert response.request.headers.get("content-type") == kind
@@ -317,7 +320,7 @@ def test_json_is_read_whatever_the_case_of_its_type_and_without_one(client, kind
 
 
 @pytest.fixture(scope="module")
-def few(started):
+def few(started: Any) -> Any:
     """A client of an application for batches of three cases."""
     with started(max_batch=3) as client:
         yield client
@@ -333,14 +336,14 @@ FORMS = {
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_a_batch_over_the_limit_is_refused_in_every_form(few, problem, name):
+def test_a_batch_over_the_limit_is_refused_in_every_form(few: Any, problem: Any, name: str) -> None:
     form, written = FORMS[name]
     fine, over = (posted(few, form, written([CASE] * many)) for many in (3, 4))
     assert (fine.status_code, b"max_batch" in fine.content) == (200, False)
     assert (over.json() if form == "ndjson" else problem(over, 413))["max_batch"] == 3
 
 
-def test_values_are_counted_before_they_are_made(few, problem):
+def test_values_are_counted_before_they_are_made(few: Any, problem: Any) -> None:
     for body in ("[" + "0," * 20_000 + "0]", "[" + "[]," * 400 + "0]"):
         problem(few.post(BATCH, content=body), 413)
     members = ",".join(f'"a{i}":1' for i in range(200))

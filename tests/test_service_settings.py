@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -33,25 +34,25 @@ BAD = {
 
 
 @pytest.fixture(autouse=True)
-def _clean_environment(monkeypatch):
+def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in list(os.environ):
         if name.startswith("MUMACRO_"):
             monkeypatch.delenv(name)
 
 
-def names():
+def names() -> Any:
     return {f"MUMACRO_{name.upper()}" for name in Settings.model_fields}
 
 
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in BAD.items() for value in values])
-def test_a_bad_setting_is_named_in_one_line(monkeypatch, name, value):
+def test_a_bad_setting_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch, name: str, value: Any) -> None:
     monkeypatch.setenv(name, value)
     with pytest.raises(SettingsError, match=rf"^{name} must be [^\n]*$") as error:
         load_settings()
     assert name != "MUMACRO_API_KEY" or not value or value not in str(error.value)
 
 
-def test_settings_come_from_the_environment(monkeypatch, tmp_path):
+def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name, value in (("TABLES", f"{tmp_path}{os.pathsep}other.nc"), ("PORT", "81"), ("LOG_LEVEL", "WARNING")):
         monkeypatch.setenv(f"MUMACRO_{name}", value)
     settings = load_settings(host="::1")
@@ -63,7 +64,9 @@ def test_settings_come_from_the_environment(monkeypatch, tmp_path):
         load_settings()
 
 
-def test_a_misspelt_variable_is_noticed(started, monkeypatch, caplog):
+def test_a_misspelt_variable_is_noticed(
+    started: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setenv("MUMACRO_TABLE", "x")
     monkeypatch.setenv("MUMACRO_PORT", "81")
     with started():
@@ -71,7 +74,7 @@ def test_a_misspelt_variable_is_noticed(started, monkeypatch, caplog):
     assert told == ["MUMACRO_TABLE is not a setting and has no effect"]
 
 
-def test_the_key_is_never_shown(monkeypatch):
+def test_the_key_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUMACRO_API_KEY", "s3cret")
     monkeypatch.setenv("MUMACRO_API_KEYS", "alice=s3cret-too")
     assert "s3cret" not in repr(load_settings())
@@ -80,7 +83,7 @@ def test_the_key_is_never_shown(monkeypatch):
 @pytest.mark.parametrize(
     ("host", "asked"), [("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")]  # noqa: S104
 )  # fmt: skip
-def test_the_health_check_asks_this_machine(monkeypatch, host, asked):
+def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch, host: Any, asked: Any) -> None:
     seen = []
     monkeypatch.setattr("urllib.request.OpenerDirector.open", lambda _self, url, **_: seen.append(url) or 1 / 0)
     with pytest.raises(ZeroDivisionError):
@@ -88,7 +91,7 @@ def test_the_health_check_asks_this_machine(monkeypatch, host, asked):
     assert seen == [f"http://{asked}:8000/readyz"]
 
 
-def test_the_manual_and_the_settings_agree(repository):
+def test_the_manual_and_the_settings_agree(repository: Path) -> None:
     assert set(BAD) | {"MUMACRO_CORS_ORIGINS", "MUMACRO_TRUSTED_PROXIES"} == names()  # any text is allowed
     text = (repository / "docs" / "operations.md").read_text()
     assert set(re.findall(r"^### (MUMACRO_\w+)$", text, re.MULTILINE)) == names()
@@ -108,7 +111,7 @@ def test_the_manual_and_the_settings_agree(repository):
     [(["--port", "70000"], "MUMACRO_PORT must be"), (["--workers=0"], "MUMACRO_WORKERS must be"),
      (["--log-level", "x"], "MUMACRO_LOG_LEVEL must be"), (["--nonsense"], "usage"), (["fly"], "usage")],
 )  # fmt: skip
-def test_a_bad_argument_ends_the_process_without_a_traceback(repository, option, told):
+def test_a_bad_argument_ends_the_process_without_a_traceback(repository: Path, option: Any, told: Any) -> None:
     words = [sys.executable, "-m", "service", *option]
     process = subprocess.run(words, cwd=repository, capture_output=True, text=True, check=False)
     assert (process.returncode, process.stdout) == (2, "")

@@ -2,13 +2,16 @@
 
 import json
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from comparing import close
+from mumacro import Surrogate
 from mumacro.settling import settling
+from tests.cases import Case
+from tests.comparing import close
 
 DEFAULT = {"mu_macro", "mu_ratio", "regime", "error_bound", "source", "table", "api_version"}
 PATH = "/v1/mu-macro"
@@ -22,7 +25,7 @@ cases = st.fixed_dictionaries(
 )  # fmt: skip
 
 
-def ask(client, case, **options):
+def ask(client: Any, case: Case, **options: Any) -> Any:
     response = client.post(PATH, json={**case, **options})
     assert response.status_code == 200, response.text
     return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
@@ -30,7 +33,7 @@ def ask(client, case, **options):
 
 @settings(max_examples=200, deadline=None)
 @given(given_case=cases)
-def test_the_answer_is_the_surrogates_and_always_json(client, surrogate, given_case):
+def test_the_answer_is_the_surrogates_and_always_json(client: Any, surrogate: Surrogate, given_case: Any) -> None:
     answer = ask(client, given_case, include=["groups", "limits"])
     expected = surrogate.evaluate(**given_case)
     assert answer["error_bound"] == (expected.error_bound if math.isfinite(expected.error_bound) else None)
@@ -51,7 +54,7 @@ def test_the_answer_is_the_surrogates_and_always_json(client, surrogate, given_c
      {"omega": 1e300, "mu0": 1e300}, {"v0": 1e308, "omega": 1e-300}, {"v0": 5e-324}, {"omega": 5e-324},
      {"Fz": 1e300, "k": 1e-20, "y0": 1e-200}],
 )  # fmt: skip
-def test_products_beyond_double_range_are_answered(client, case, extreme):
+def test_products_beyond_double_range_are_answered(client: Any, case: Case, extreme: Any) -> None:
     answer = ask(client, {**case, **extreme}, include=["groups", "limits", "stick_fraction"])
     assert 0.0 <= answer["mu_ratio"] <= 1.0
     if answer["groups"]["y_tilde"] == 0.0:  # the groups do not show whether it sticks
@@ -63,7 +66,9 @@ def test_products_beyond_double_range_are_answered(client, case, extreme):
 
 @pytest.mark.parametrize("include", ["groups,limits", "limits, groups,groups", "groups&include=limits"])
 @pytest.mark.parametrize("k", ["1e+6", "1000000", "rigid", "Rigid"])
-def test_a_query_may_be_written_in_other_words(client, case, surrogate, include, k):
+def test_a_query_may_be_written_in_other_words(
+    client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any
+) -> None:
     expected = ask(client, {**case, "k": 1e6 if "1" in k else None}, include=["limits", "groups"])
     assert expected["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
     query = "&".join(f"{name}={value}" for name, value in {**case, "k": k, "include": include}.items())
@@ -71,7 +76,7 @@ def test_a_query_may_be_written_in_other_words(client, case, surrogate, include,
     assert "1" in k or ask(client, {**case, "k": k}, include=["groups", "limits"]) == expected
 
 
-def test_a_frequency_and_its_deviation_are_given_in_either_unit(client, case):
+def test_a_frequency_and_its_deviation_are_given_in_either_unit(client: Any, case: Case) -> None:
     by_omega = ask(client, case, include=["std"], std={"omega": 2e3 * math.pi})
     named = {**case, "f": case["omega"] / (2 * math.pi)}
     del named["omega"]
@@ -81,7 +86,7 @@ def test_a_frequency_and_its_deviation_are_given_in_either_unit(client, case):
     assert client.get(PATH, params={**named, "include": "std", "std_f": 1e3}).json() == by_f
 
 
-def test_one_value_is_returned_as_text_and_answers_may_be_cached(client, case):
+def test_one_value_is_returned_as_text_and_answers_may_be_cached(client: Any, case: Case) -> None:
     answer = ask(client, case, include=["power"])
     plain = client.get(f"{PATH}.txt", params=case)
     assert (float(plain.text), plain.headers["content-type"]) == (answer["mu_macro"], "text/plain; charset=utf-8")
@@ -98,7 +103,9 @@ def test_one_value_is_returned_as_text_and_answers_may_be_cached(client, case):
     [*(({name: 0, **rest}, (0.3, 0.0, 0.3), 0.0) for name in ("y0", "omega") for rest in ({}, {"k": None})),
      ({"k": None}, (0.0, 0.0, 0.0), None)],
 )  # fmt: skip
-def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, limits, power):
+def test_without_oscillation_or_stiffness_nothing_sticks(
+    client: Any, case: Case, change: Any, limits: Any, power: Any
+) -> None:
     answer = ask(client, {**case, **change}, include=["limits", "power", "stick_fraction"])
     assert tuple(answer["limits"].values()) == limits
     assert (answer["mu_macro"] == 0.3) == (limits[0] == 0.3)
@@ -109,7 +116,7 @@ def test_without_oscillation_or_stiffness_nothing_sticks(client, case, change, l
 
 
 @pytest.mark.parametrize("y0", [3e-8, 2e-6, 3e-6, 3e-5, 3e-3])
-def test_the_static_limit_and_the_border_lie_on_the_friction_law(client, case, y0):
+def test_the_static_limit_and_the_border_lie_on_the_friction_law(client: Any, case: Case, y0: Any) -> None:
     limits = ask(client, {**case, "y0": y0}, include=["limits"])["limits"]
     at_rest = ask(client, {**case, "y0": y0, "v0": 0})
     assert at_rest["regime"] == "static"
@@ -126,7 +133,7 @@ def test_the_static_limit_and_the_border_lie_on_the_friction_law(client, case, y
 
 
 @pytest.mark.parametrize("k", [1e6, None])
-def test_the_standard_deviation_is_the_root_of_squares(client, case, k):
+def test_the_standard_deviation_is_the_root_of_squares(client: Any, case: Case, k: Any) -> None:
     case["k"] = k
     answer = ask(client, case, include=["gradient", "std"], std=STD)
     slopes = {name: slope for name, slope in answer["gradient"].items() if slope is not None}
@@ -141,7 +148,7 @@ def test_the_standard_deviation_is_the_root_of_squares(client, case, k):
 @pytest.mark.parametrize(
     "change", [{}, {"v0": 1e-4, "y0": 1e-7}, {"v0": 5.0, "y0": 1e-4}, {"omega": 0}, {"k": None}, {"v0": 0}]
 )
-def test_settling_is_the_librarys(client, case, surrogate, change):
+def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate, change: Any) -> None:
     at = {**case, **change}
     answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
     for name, value in {**answer["settling"], "error_bound": answer["settling_bound"]["periods"]}.items():

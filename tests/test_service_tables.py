@@ -2,21 +2,23 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from mumacro import TableError
+from mumacro import Surrogate, TableError
+from tests.cases import Case
 
 HEALTH = ("/readyz", "/healthz")
 
 
 @pytest.fixture
-def table_copy(surrogate, tmp_path):
+def table_copy(surrogate: Surrogate, tmp_path: Path) -> Any:
     """A copy of a table that a test may damage."""
     return Path(shutil.copy(surrogate.path, tmp_path / surrogate.path.name))
 
 
-def test_the_table_describes_itself(client, surrogate):
+def test_the_table_describes_itself(client: Any, surrogate: Surrogate) -> None:
     answer = client.get("/v1/table").json()
     label = {"id": surrogate.id, "tolerance": surrogate.tolerance}
     expected = {
@@ -35,7 +37,7 @@ def test_the_table_describes_itself(client, surrogate):
     [(None, "1e-12"), (1e-12, "1e-12"), (9e-11, "1e-12"), (1e-10, "1e-10"), (2e-8, "1e-10"), (1e-7, "1e-7"),
      (1, "1e-4")],
 )  # fmt: skip
-def test_the_smallest_table_that_is_tight_enough_is_picked(client, case, tolerance, name):
+def test_the_smallest_table_that_is_tight_enough_is_picked(client: Any, case: Case, tolerance: Any, name: str) -> None:
     picked = client.get("/v1/table", params={} if tolerance is None else {"tolerance": tolerance}).json()
     assert picked["id"] == f"mumacro-{name}"
     for path, more in (("mu-macro", {}), ("law", {"v0": None, "start": 0.1, "stop": 1.0}),
@@ -45,7 +47,7 @@ def test_the_smallest_table_that_is_tight_enough_is_picked(client, case, toleran
     assert [label["tolerance"] for label in picked["loaded"]] == [1e-12, 1e-10, 1e-7, 1e-4]
 
 
-def test_the_file_is_the_table(client, surrogate):
+def test_the_file_is_the_table(client: Any, surrogate: Surrogate) -> None:
     response = client.get("/v1/table.nc")
     assert response.content == surrogate.path.read_bytes()
     assert response.headers["content-type"] == "application/x-netcdf"
@@ -57,7 +59,7 @@ def test_the_file_is_the_table(client, surrogate):
 
 
 @pytest.mark.parametrize("path", HEALTH)
-def test_ready_means_loaded(client, surrogate, path):
+def test_ready_means_loaded(client: Any, surrogate: Surrogate, path: Any) -> None:
     response = client.get(path)
     assert (response.status_code, response.json()["status"]) == (200, "ready")
     assert {"id": surrogate.id, "tolerance": surrogate.tolerance} in response.json()["tables"]
@@ -65,7 +67,7 @@ def test_ready_means_loaded(client, surrogate, path):
     assert client.head(path).status_code == 200
 
 
-def flip_a_bit(path):
+def flip_a_bit(path: Any) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 3] ^= 1
     path.write_bytes(content)
@@ -81,7 +83,9 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("kind", SPOILT)
-def test_an_unusable_table_leaves_the_process_alive_and_not_ready(started, table_copy, case, problem, kind):
+def test_an_unusable_table_leaves_the_process_alive_and_not_ready(
+    started: Any, table_copy: Any, case: Case, problem: Any, kind: Any
+) -> None:
     SPOILT[kind](table_copy)
     with started(tables=(table_copy,)) as client:
         alive = client.get("/livez")
@@ -95,7 +99,9 @@ def test_an_unusable_table_leaves_the_process_alive_and_not_ready(started, table
         problem(client.post("/v1/mu-macro/batch", json=[case]), 503)
 
 
-def test_a_file_that_goes_or_changes_after_loading_is_noticed(started, table_copy, case, problem):
+def test_a_file_that_goes_or_changes_after_loading_is_noticed(
+    started: Any, table_copy: Any, case: Case, problem: Any
+) -> None:
     with started(tables=(table_copy,)) as client:
         assert client.get("/readyz").status_code == 200
         table_copy.write_bytes(table_copy.read_bytes() + b"\0")
@@ -113,8 +119,10 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("error", "told"), WRONG)
-def test_a_wrong_known_answer_is_not_ready(started, surrogate, problem, monkeypatch, error, told):
-    def wrong(_self):
+def test_a_wrong_known_answer_is_not_ready(
+    started: Any, surrogate: Surrogate, problem: Any, monkeypatch: pytest.MonkeyPatch, error: Any, told: Any
+) -> None:
+    def wrong(_self: Any) -> None:
         raise error
 
     monkeypatch.setattr("mumacro.Surrogate.self_check", wrong)
@@ -126,7 +134,9 @@ def test_a_wrong_known_answer_is_not_ready(started, surrogate, problem, monkeypa
     assert "secret" not in detail
 
 
-def test_tables_are_found_by_file_and_by_directory(started, tmp_path, table_copy, surrogate, problem):
+def test_tables_are_found_by_file_and_by_directory(
+    started: Any, tmp_path: Path, table_copy: Any, surrogate: Surrogate, problem: Any
+) -> None:
     for name in (".hidden.nc", "notes.txt"):
         (tmp_path / name).write_bytes(b"")
     other = tmp_path / "other"

@@ -1,22 +1,24 @@
 """How fast a disturbance decays: the multiplier and the bound against marching, limits, bad input."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from builder.steady import solve, solve_raw, workspace
-from comparing import close
-from mumacro import InputError
+from mumacro import InputError, Surrogate
 from mumacro.settling import settling
+from tests import naive
 from tests.cases import CASE, UNIT
+from tests.comparing import close
 
 STEPS = 40_000
 SLIDING = [(0.3, 0.3), (0.1, 0.2), (0.6, 1.0), (1.0, 0.5)]
 STICKING = [(0.02, 0.3), (0.1, 0.6), (0.05, 1.2), (0.3, 1.0), (0.2, 2.0)]
 
 
-def of(surrogate, v, y, **more):
+def of(surrogate: Surrogate, v: Any, y: Any, **more: Any) -> Any:
     return settling(surrogate, **UNIT, y0=y, v0=v, **more)
 
 
@@ -31,7 +33,7 @@ def at_rest_angles(v: float, y: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
-def test_the_slip_path_is_the_solvers(surrogate, v, y) -> None:
+def test_the_slip_path_is_the_solvers(surrogate: Surrogate, v: Any, y: Any) -> None:
     found = of(surrogate, v, y)
     exact = 2.0 * math.pi * solve(v, y).slip_speed
     assert found.slip_path == close(exact, rel=1e-10)
@@ -42,7 +44,7 @@ def test_the_slip_path_is_the_solvers(surrogate, v, y) -> None:
 
 
 @pytest.mark.parametrize(("v", "y"), SLIDING + STICKING)
-def test_a_small_disturbance_decays_as_derived(surrogate, naive, v, y) -> None:
+def test_a_small_disturbance_decays_as_derived(surrogate: Surrogate, v: Any, y: Any) -> None:
     start = naive.march(v, y, STEPS, naive.periods_until_steady(v, y))[-1]
     size = 1e-5
     here = start / np.hypot(*start) if np.hypot(*start) > 1.0 - 1e-9 else start
@@ -59,7 +61,7 @@ def test_a_small_disturbance_decays_as_derived(surrogate, naive, v, y) -> None:
 
 
 @pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (0.004, 0.5), (0.01, 0.95)])
-def test_any_disturbance_is_gone_in_time(surrogate, naive, v, y) -> None:
+def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -> None:
     found = of(surrogate, v, y)
     steady = naive.march(v, y, 4000, naive.periods_until_steady(v, y))[-1]
     rng = np.random.default_rng(1)
@@ -81,7 +83,9 @@ def test_any_disturbance_is_gone_in_time(surrogate, naive, v, y) -> None:
         ({"k": None, "v0": 0.0, "y0": 0.0}, math.inf), ({"k": None}, 0.0), ({"k": math.inf}, 0.0),
     ],
 )  # fmt: skip
-def test_without_slip_nothing_settles_and_rigid_contact_at_once(surrogate, changed, periods) -> None:
+def test_without_slip_nothing_settles_and_rigid_contact_at_once(
+    surrogate: Surrogate, changed: Any, periods: Any
+) -> None:
     found = settling(surrogate, **{**CASE, **changed})
     assert (found.periods, found.time, found.slip_path) == (
         periods,
@@ -90,7 +94,7 @@ def test_without_slip_nothing_settles_and_rigid_contact_at_once(surrogate, chang
     )
 
 
-def test_without_oscillation_the_drag_decides(surrogate) -> None:
+def test_without_oscillation_the_drag_decides(surrogate: Surrogate) -> None:
     l0 = 3e-6
     for changed in ({"y0": 0.0}, {"omega": 0.0}):
         found = settling(surrogate, **{**CASE, **changed})
@@ -101,14 +105,14 @@ def test_without_oscillation_the_drag_decides(surrogate) -> None:
     assert settling(surrogate, **{**CASE, "y0": 1e-12}).periods == close(dragged.periods, rel=1e-5)
 
 
-def test_at_zero_speed_only_large_amplitudes_settle(surrogate) -> None:
+def test_at_zero_speed_only_large_amplitudes_settle(surrogate: Surrogate) -> None:
     for y, slips in ((0.5, False), (1.0, False), (1.5, True)):
         found = of(surrogate, 0.0, y)
         # slip in every half period is the stroke 2 y~ minus the diameter
         assert found.slip_path == close(4.0 * (y - 1.0) if slips else 0.0, rel=1e-9)
 
 
-def test_arrays_broadcast_and_extremes_give_no_warning(surrogate) -> None:
+def test_arrays_broadcast_and_extremes_give_no_warning(surrogate: Surrogate) -> None:
     found = settling(
         surrogate, **{**CASE, "v0": np.array([[0.0], [1e-300], [0.01], [1e300]]), "y0": np.array([0.0, 2e-6, 1e300])}
     )
@@ -123,12 +127,12 @@ def test_arrays_broadcast_and_extremes_give_no_warning(surrogate) -> None:
     [*(({"remaining": x}, "remaining must be") for x in (0.0, 1.0, -1.0, math.nan, 2.0)), ({"Fz": -1.0}, "Fz must be"),
      *(({"direction": x}, "across: how a disturbance decays is derived for no other") for x in ("along", "normal"))],
 )  # fmt: skip
-def test_bad_input_is_named_with_the_reason(surrogate, changed, said) -> None:
+def test_bad_input_is_named_with_the_reason(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         settling(surrogate, **{**CASE, **changed})
 
 
-def test_an_illegal_case_affects_only_itself(surrogate) -> None:
+def test_an_illegal_case_affects_only_itself(surrogate: Surrogate) -> None:
     found = settling(surrogate, **{**CASE, "v0": np.array([0.01, -1.0, math.nan]), "mu0": np.full(3, 0.3)})
     assert found.periods[0] == settling(surrogate, **CASE).periods
     for column in (found.periods, found.periods_any, found.time, found.slip_path, found.error_bound):
@@ -136,7 +140,7 @@ def test_an_illegal_case_affects_only_itself(surrogate) -> None:
 
 
 @pytest.mark.parametrize(("v", "y"), [*SLIDING, *STICKING, (1e-3, 30.0), (3.0, 0.1)])
-def test_a_ball_settles_as_its_slowest_spring(surrogate, v, y) -> None:
+def test_a_ball_settles_as_its_slowest_spring(surrogate: Surrogate, v: Any, y: Any) -> None:
     found = of(surrogate, v, y, contact="ball")
     # a spring with the share s of the middle one's load has l0 that is 1.5 s as long
     springs = [

@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from comparing import close
 from mumacro import InputError, Surrogate, TableError, batch
 from mumacro.processors import processors
 from mumacro.table import read_table
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 

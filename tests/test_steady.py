@@ -5,7 +5,6 @@ Energy balance, monotony and error estimate over the whole range are in test_ext
 
 import math
 from collections.abc import Callable
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,10 @@ from builder.limits import V_RANGE, Y_RANGE
 from builder.model import ANGLE, CHART, MIN_SPEED, NO_SLIP, OK, PATH, SIGMA, SUM_UX, WORK, slip
 from builder.steady import ADVICE, border, solve, solve_raw, workspace
 from builder.sweep import Sweep
-from comparing import close
 from mumacro import InputError
 from mumacro.closed_forms import outer, second_order
+from tests import naive
+from tests.comparing import close
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def test_reference_points_are_met_to_rounding(case: str, reference: Any, sweep: 
 
 
 @pytest.mark.parametrize(("v", "y"), ORDINARY)
-def test_a_naive_solver_that_does_not_use_the_symmetry_agrees(v: float, y: float, naive: ModuleType) -> None:
+def test_a_naive_solver_that_does_not_use_the_symmetry_agrees(v: float, y: float) -> None:
     mu = solve(v, y).mu_ratio
     coarse, fine = (naive.mu_ratio(v, y, steps) - mu for steps in (8_000, 16_000))
     assert abs(fine) < 1e-4

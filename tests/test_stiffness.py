@@ -2,14 +2,15 @@
 
 import inspect
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from comparing import close
-from mumacro import InputError, stiffness
+from mumacro import InputError, Surrogate, stiffness
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
+from tests.comparing import close
 
 STEEL, RUBBER, RIGID = Material(210e9, 0.3), Material(5e6, 0.5), Material(math.inf, 0.3)
 
@@ -59,7 +60,9 @@ def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_l
 
 
 @pytest.mark.parametrize(("across", "along"), [(1.3, 1.0), (1.0, 1.3)])
-def test_of_two_stiffnesses_the_one_of_the_oscillation_belongs_in_the_model(surrogate, across, along) -> None:
+def test_of_two_stiffnesses_the_one_of_the_oscillation_belongs_in_the_model(
+    surrogate: Surrogate, across: Any, along: Any
+) -> None:
     """Eqs. (9) to (12) with two springs, marched: ``across`` along the sliding, ``along`` along the oscillation."""
     v, y = (x.ravel() for x in np.meshgrid([0.2, 0.6, 2.0], [0.3, 0.8, 1.2, 3.0, 10.0], indexing="ij"))
     steps, springs = 1000, np.array([[across], [along]])
@@ -105,7 +108,7 @@ def test_stiffness_has_its_scaling_laws_and_adds_in_series() -> None:
         ("mu0", Contact(1.0, 1.0, 1.0, 1.0).length_scale, (0.0, 1.0)),
     ],
 )  # fmt: skip
-def test_a_bad_value_is_named(field, function, arguments) -> None:
+def test_a_bad_value_is_named(field: str, function: Any, arguments: Any) -> None:
     with pytest.raises(InputError) as caught:
         function(*arguments)
     assert caught.value.field == field
@@ -143,7 +146,7 @@ def test_a_named_geometry_is_its_function() -> None:
         ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0"),
     ],
 )
-def test_a_bad_argument_is_named_with_the_remedy(geometry, given, said) -> None:
+def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         contact_of(geometry, **given)
 
@@ -158,7 +161,7 @@ def test_arguments_are_read_with_units() -> None:
         read_argument("nu", "0,3")
 
 
-def test_a_result_can_be_passed_on(surrogate) -> None:
+def test_a_result_can_be_passed_on(surrogate: Surrogate) -> None:
     case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
     punch, ball = flat_punch(1e-3, 10.0, STEEL, STEEL), ball_on_flat(5e-3, 10.0, STEEL, STEEL)
     assert surrogate.evaluate(**punch, **case).mu_macro == surrogate.evaluate(k=punch.k, **case).mu_macro

@@ -14,11 +14,11 @@ from builder.assemble import ABS_TO_REL
 from builder.measure import SEAMS
 from builder.quantities import SOLVER_NOISE
 from builder.sweep import Sweep
-from comparing import close
 from mumacro import InputError, Surrogate
 from mumacro.charts import NAMES, SIGMA_CUT, SOURCES, Y_STICK_HI, Y_STICK_LO
 from mumacro.closed_forms import outer
 from tests.cases import CASE, Array, log_uniform, opened, tables
+from tests.comparing import close
 
 table = tables()
 

@@ -15,13 +15,13 @@ from builder.measure import fast_from
 from builder.quantities import solver_noise
 from builder.sweep import Sweep
 from builder.verify import CASES, draw
-from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, NAMES, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
 from mumacro.contact import rules
 from mumacro.inverse import solve_for
 from mumacro.settling import settling
 from tests.cases import UNIT, Array, opened
+from tests.comparing import close
 
 KINDS = [kind for kind, _, _ in CASES]
 Ask = Callable[[Surrogate, Array, Array], tuple[Any, Any]]  # values and bounds

@@ -13,10 +13,11 @@ from builder.measure import SEAMS, block_errors, fast_from
 from builder.quantities import SOLVED, solver_noise
 from builder.sweep import Sweep
 from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, uncovered, verify
-from comparing import close
 from mumacro import Surrogate
 from mumacro.charts import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
 from mumacro.table import read_table
+from tests.cases import Case
+from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
@@ -70,7 +71,7 @@ def test_the_builder_knows_every_quantity_of_the_kernel(sweep: Sweep) -> None:
 # --- the report -----------------------------------------------------------------------------------------
 
 
-def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(report: dict[str, Any], sound: Surrogate) -> None:
+def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(report: Case, sound: Surrogate) -> None:
     assert report["points"] >= 1000
     assert 0.0 < report["max_abs_error"] <= sound.tolerance
     assert set(report["cases"]) == {name for name, _, _ in CASES}

@@ -12,6 +12,7 @@ import sys
 import tomllib
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from packaging.tags import platform_tags
@@ -41,7 +42,7 @@ class Installed:
         pip = ("-m", "pip", "--disable-pip-version-check", "install", "-q", "--only-binary=:all:")
         self.run("python", *pip, "-c", str(pins), str(wheel))
 
-    def run(self, *words, code=0):
+    def run(self, *words: Any, code: int = 0) -> Any:
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
         done = subprocess.run(
             [str(self.bin / words[0]), *words[1:]], cwd=self.folder, capture_output=True, text=True, timeout=600,
@@ -84,17 +85,19 @@ def build(folder: Path, platform: str | None = None) -> Path:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return build(tmp_path_factory.mktemp("wheel"))
 
 
 @pytest.fixture(scope="module")
-def installed(wheel, tmp_path_factory):
+def installed(wheel: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return Installed(tmp_path_factory.mktemp("bare"), wheel)
 
 
 @pytest.mark.parametrize("version", PYTHONS)
-def test_one_wheel_gives_every_python_the_bits_of_the_checkout(wheel, installed, tmp_path, version):
+def test_one_wheel_gives_every_python_the_bits_of_the_checkout(
+    wheel: Any, installed: Any, tmp_path: Path, version: Any
+) -> None:
     own = version == "{}.{}".format(*sys.version_info)
     python = installed if own else Installed(tmp_path, wheel, find_python(version))
     answer = json.loads(python.run("mumacro", CASE, "--json"))
@@ -103,7 +106,7 @@ def test_one_wheel_gives_every_python_the_bits_of_the_checkout(wheel, installed,
     assert answer["table"]["id"] == Surrogate.open().id
 
 
-def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(wheel, repository):
+def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(wheel: Any, repository: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         (metadata,) = (archive.read(name).decode() for name in names if name.endswith(".dist-info/WHEEL"))
@@ -117,7 +120,9 @@ def test_the_wheel_holds_the_sources_and_one_shared_object_for_every_python(whee
 
 
 @pytest.mark.parametrize("platform", [name for name in PLATFORMS if "linux" in name])
-def test_a_linux_wheel_asks_for_no_newer_system_and_calls_nothing_whose_last_digit_depends_on_it(tmp_path, platform):
+def test_a_linux_wheel_asks_for_no_newer_system_and_calls_nothing_whose_last_digit_depends_on_it(
+    tmp_path: Path, platform: Any
+) -> None:
     for package in ("ziglang", "auditwheel", "elftools"):
         pytest.importorskip(package, reason=f"the package {package} is not installed")
     wheel = build(tmp_path, platform)
@@ -139,12 +144,12 @@ def test_a_linux_wheel_asks_for_no_newer_system_and_calls_nothing_whose_last_dig
     assert {name for name, place in symbols if place != "SHN_UNDEF"} == offered
 
 
-def _parts(tag):
+def _parts(tag: Any) -> Any:
     system, major, minor, processor = re.fullmatch(r"(\w+linux)_(\d+)_(\d+)_(\w+)", tag).groups()
     return system, int(major), int(minor), processor
 
 
-def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(installed):
+def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(installed: Any) -> None:
     found = json.loads(installed.run("mumacro", "table", "--json"))
     site = Path(found["path"]).parents[2]
     assert site.name == "site-packages"
@@ -161,7 +166,7 @@ def test_the_tables_are_inside_the_package_and_nothing_generic_is_beside_it(inst
      ("mumacro export --format csv", "builder"), ("python -m mumacro.service", "service"),
      ("python -m mumacro.builder solve --v 0.1 --y 0.5", "builder")],
 )  # fmt: skip
-def test_without_an_extra_one_line_says_what_to_install(installed, words, extra):
+def test_without_an_extra_one_line_says_what_to_install(installed: Any, words: Any, extra: Any) -> None:
     message = installed.run(*words.split(), code=1)
     assert len(message.splitlines()) == 1
     assert f"pip install 'mumacro[{extra}]'" in message
