@@ -11,13 +11,14 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def run(*words: str | Path, platform: str = "") -> None:
-    """One command, which must succeed."""
+def run(platform: str, *words: str | Path) -> None:
+    """One command, which must succeed; ``platform``: of the wheel that it builds."""
     print("---", *words, platform, flush=True)
     subprocess.run(words, cwd=ROOT, env={**os.environ, "MUMACRO_BUILD_PLATFORM": platform}, check=True)  # noqa: S603
 
@@ -25,14 +26,14 @@ def run(*words: str | Path, platform: str = "") -> None:
 def build(folder: Path, platforms: Iterable[str]) -> None:
     """Everything in the folder is new."""
     shutil.rmtree(folder, ignore_errors=True)
-    run("hatchling", "build", "-t", "sdist", "-d", folder)
-    for platform in platforms:
-        run("hatchling", "build", "-t", "wheel", "-d", folder, platform=platform)
-    run("twine", "check", "--strict", *folder.iterdir())
-    run("check-wheel-contents", *folder.glob("*.whl"))
+    run("", "hatchling", "build", "-t", "sdist", "-d", folder)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # each compiles in a folder of its own
+        list(pool.map(lambda platform: run(platform, "hatchling", "build", "-t", "wheel", "-d", folder), platforms))
+    run("", "twine", "check", "--strict", *folder.iterdir())
+    run("", "check-wheel-contents", *folder.glob("*.whl"))
     for wheel in folder.glob("*linux*.whl") if sys.platform == "linux" else ():
         # a folder without libraries: those of this machine must not count
-        run("auditwheel", "show", "--ldpaths", folder, wheel)
+        run("", "auditwheel", "show", "--ldpaths", folder, wheel)
 
 
 if __name__ == "__main__":
