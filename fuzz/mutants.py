@@ -101,13 +101,16 @@ FAULTS = [Fault(*row) for row in (
 def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
     """A command in the copy, with the copy first on the path."""
     variables = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
-    return subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False, timeout=900)
 
 
 def tested(folder: Path, tests: str) -> int:
-    """Exit code of pytest: 0 all passed, 1 some failed."""
+    """Exit code of pytest: 0 all passed, 1 some failed or did not end."""
     options = ("-q", "-x", "-p", "no:cacheprovider", "-n", "0")
-    return run(folder, sys.executable, "-m", "pytest", *options, *shlex.split(tests)).returncode
+    try:
+        return run(folder, sys.executable, "-m", "pytest", *options, *shlex.split(tests)).returncode
+    except subprocess.TimeoutExpired:
+        return 1
 
 
 def in_a_copy(tests: str, fault: Fault | None = None) -> str:
