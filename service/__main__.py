@@ -89,7 +89,6 @@ def _serve(settings: Settings) -> int:
                 root_path=settings.root_path,
                 proxy_headers=bool(settings.trusted_proxies),
                 forwarded_allow_ips=settings.trusted_proxies,
-                timeout_keep_alive=settings.keep_alive_s,
                 timeout_graceful_shutdown=settings.shutdown_grace_s,
             )
     except SystemExit as stop:

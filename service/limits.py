@@ -31,7 +31,7 @@ QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
-_ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
+_ONCE = (b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
 
 
 def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
@@ -50,6 +50,8 @@ def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
     """Refuse a head that says two things, or asks for another protocol, as which its body would be read."""
+    if b"host" not in headers and scope["http_version"] == "1.1":
+        raise RequestError(Kind.MALFORMED_HTTP, "a request has one Host")
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
