@@ -83,8 +83,10 @@ async def read_body(
     headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
 ) -> bytearray:
     """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
-
-    def check(size: int) -> None:
+    length = headers.get(b"content-length", b"0")
+    size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
+    body, more = bytearray(), True
+    while True:
         if size > limit:
             told = (
                 f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
@@ -93,18 +95,14 @@ async def read_body(
             raise RequestError(Kind.BODY_TOO_LARGE, told, max_bytes=limit)
         if size > SMALL_BODY:
             large()
-
-    length = headers.get(b"content-length", b"0")
-    check(int(length) if length.isdigit() and len(length) < 19 else limit + 1)
-    body, more = bytearray(), True
-    while more:
+        if not more:
+            return body
         message = await receive()
         if message["type"] != "http.request":
             raise ClientDisconnect
         body += message.get("body", b"")
         more = message.get("more_body", False)
-        check(len(body))
-    return body
+        size = len(body)
 
 
 async def drained(receive: Receive) -> None:

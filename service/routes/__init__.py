@@ -19,7 +19,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..case import Asked
+from ..answers import Wanted
 from ..limits import SMALL_BODY, media_type_of, read_body
 from ..options import NAMES, Options, query_of, read_form
 from ..problems import FieldFault, Kind, RequestError, refuse
@@ -131,20 +131,20 @@ def path_of(scope: Scope) -> str:
 
 
 class Asking(NamedTuple):
-    """What a request asks: the table, the options, the case, and what it is."""
+    """What a request asks: the table, the options, the case, and what is asked of it."""
 
     table: LoadedTable
     form: Any
     case: dict[str, Any]
-    asked: Asked
+    wanted: Wanted
 
     @classmethod
     async def of(cls, request: Request, model: type[Options], wanted: str = "", one: bool = False) -> "Asking":
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
-        given = await given_in_body(request) if request.method == "POST" else given_in_query(request)
+        given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
         name = given.get(wanted, model.model_fields[wanted].default) if wanted else None
         found = read_form(model, given, [name] if name in NAMES else [], one=one)
-        return cls(request.app.state.tables.pick(found[0].tolerance), *found)
+        return cls(request.app.tables.pick(found[0].tolerance), *found)
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:
@@ -152,7 +152,7 @@ async def given_in_body(request: Request) -> dict[str, Any]:
     headers = dict(request.scope["headers"])
     if headers.get(b"content-type") != _JSON.encode() or b"content-encoding" in headers:
         media_type_of(headers, {_JSON: _JSON})
-    limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
+    limit = min(SMALL_BODY, request.app.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):
         refuse([FieldFault((), "must be a JSON object", found)])
@@ -210,14 +210,25 @@ def _number(text: str) -> Any:
 # --- responses ------------------------------------------------------------------------------------------
 
 
+class Reply(Response):
+    """A complete answer; Starlette's own looks for what the headers may lack, which takes as long as a case."""
+
+    background = None
+
+    def __init__(self, content: bytes, headers: Mapping[str, str], media_type: str) -> None:
+        self.status_code, self.body = 200, content
+        self.raw_headers = [(b"content-length", b"%d" % len(content)), (b"content-type", media_type.encode())]
+        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+
+
 def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> Response:
     """A complete answer."""
-    return Response(content, headers=headers, media_type=media_type)
+    return Reply(content, headers or {}, media_type)
 
 
 async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
     """The answer to the question of a person, made in a thread."""
-    answer: Response = await request.app.state.work.question(work)
+    answer: Response = await request.app.work.question(work)
     return answer
 
 

@@ -22,7 +22,7 @@ async def livez(_request: Request) -> Response:
 
 async def readyz(request: Request) -> Response:
     """Check that every table is loaded, has the right checksum, gives its known answer and has an unchanged file."""
-    tables = request.app.state.tables
+    tables = request.app.tables
     tables.check()
     return reply(dump({"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}), _NO_STORE)
 
@@ -34,7 +34,7 @@ async def healthz(request: Request) -> Response:
 
 async def get_metrics(request: Request) -> Response:
     """Return the counters of all worker processes, in the text form of Prometheus."""
-    text = await request.app.state.work.question(request.app.state.metrics.text)
+    text = await request.app.work.question(request.app.metrics.text)
     return Response(text, headers={**_NO_STORE, "Content-Type": CONTENT_TYPE_LATEST})
 
 
