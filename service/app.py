@@ -91,7 +91,7 @@ class Application(FastAPI):
             self.add_route("/guide", lambda _: RedirectResponse("guide/"))
             self.mount("/guide", StaticFiles(directory=settings.guide, html=True))
             opened.add("/guide")
-        self._front: ASGIApp = Observe(Routes(ENDPOINTS, super().__call__), self.metrics, settings.keys(), opened)
+        self._front: ASGIApp = Observe(Routes(ENDPOINTS), super().__call__, self.metrics, settings, opened)
         if settings.cors_origins:
             self._front = CORSMiddleware(
                 self._front,

@@ -143,9 +143,10 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
 
     def wanted(self, asked: Asked, one: bool = False) -> Wanted:
         """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one`` case."""
-        if (asked, one) not in self._wanted:
-            self._wanted[asked, one] = self._checked(asked, one)
-        return self._wanted[asked, one]
+        found = self._wanted.get((asked, one))
+        if found is None:
+            found = self._wanted[asked, one] = self._checked(asked, one)
+        return found
 
     @cached_property
     def _wanted(self) -> dict[tuple[Asked, bool], Wanted]:

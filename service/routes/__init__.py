@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 from ..answers import Wanted
 from ..limits import SMALL_BODY, media_type_of, read_body
@@ -31,6 +31,7 @@ __all__ = [
 ]  # fmt: skip
 
 _JSON = "application/json"
+_AS_JSON = _JSON.encode()
 _WHY = {
     400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
     401: "The service needs an API key, and none or a wrong one was sent",
@@ -49,13 +50,16 @@ _RETRY = {"description": "Seconds after which to send the request again", "schem
 _STD = frozenset(f"std_{name}" for name in NAMES)
 
 
+Answer = Callable[[Request], Awaitable[Response]]
+
+
 @dataclass(frozen=True)
 class Endpoint:
     """One path and method, and its description; without a summary it is not described."""
 
     path: str
     method: str  # GET answers HEAD, too
-    answer: Callable[[Request], Awaitable[Response]]  # its name is the operation's id
+    answer: Answer  # its name is the operation's id
     summary: str = ""
     form: type[BaseModel] | None = None  # what is asked: a body; of GET, and beside a ``request``, its query
     model: Any = None  # of the answer
@@ -97,29 +101,25 @@ class Endpoint:
 
 
 class Routes:
-    """Finds the endpoint of a path, which has no parameters, and of a method; other paths go to ``others``."""
+    """Finds the endpoint of a path, which has no parameters, and of a method."""
 
-    def __init__(self, endpoints: Iterable[Endpoint], others: ASGIApp) -> None:
-        self._others = others
-        self._found: dict[str, dict[str, Callable[[Request], Awaitable[Response]]]] = {}
+    def __init__(self, endpoints: Iterable[Endpoint]) -> None:
+        self._found: dict[str, dict[str, Answer]] = {}
         for endpoint in endpoints:
             methods = self._found.setdefault(endpoint.path, {})
             for method in ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,):
                 methods[method] = endpoint.answer
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        methods = self._found.get(path_of(scope))
+    def __call__(self, path: str, method: str) -> Answer | None:
+        """The function that answers; None for a path of no endpoint."""
+        methods = self._found.get(path)
         if methods is None:
-            await self._others(scope, receive, send)
-            return
-        answer = methods.get(scope["method"])
-        if answer is None:
-            allowed = ", ".join(sorted(methods))
-            told = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
-            raise HTTPException(405, told, {"Allow": allowed})
-        response = await answer(Request(scope, receive, send))
-        await response(scope, receive, send)
+            return None
+        if method in methods:
+            return methods[method]
+        allowed = ", ".join(sorted(methods))
+        told = f"{method[:20]} is not allowed here; allowed: {allowed}"
+        raise HTTPException(405, told, {"Allow": allowed})
 
 
 def path_of(scope: Scope) -> str:
@@ -150,7 +150,7 @@ class Asking(NamedTuple):
 async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
-    if headers.get(b"content-type") != _JSON.encode() or b"content-encoding" in headers:
+    if headers.get(b"content-type") != _AS_JSON or b"content-encoding" in headers:
         media_type_of(headers, {_JSON: _JSON})
     limit = min(SMALL_BODY, request.app.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
