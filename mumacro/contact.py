@@ -10,7 +10,6 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -116,8 +115,10 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
     """
-    with suppress(KeyError, TypeError):
+    try:
         return _KINDS[contact, direction]
+    except (KeyError, TypeError):
+        pass  # the reason follows
     for name, value, known in (("contact", contact, CONTACTS), ("direction", direction, DIRECTIONS)):
         if not isinstance(value, str) or value not in known:
             raise InputError(name, value, f"one of {', '.join(known)}")

@@ -178,8 +178,8 @@ def options_of(
     """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
     fields, own, rest = _names(model)[0], {}, given
     if not fields.isdisjoint(given):
-        own = {name: value for name, value in given.items() if name in fields}
-        rest = {name: value for name, value in given.items() if name not in fields}
+        rest = dict(given)
+        own = {name: rest.pop(name) for name in given if name in fields}
     key = model, repr(own)
     form = _valid.get(key)
     if form is None:

@@ -142,8 +142,8 @@ class Asking(NamedTuple):
     async def of(cls, request: Request, model: type[Options], wanted: str = "", one: bool = False) -> "Asking":
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
         given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
-        name = given.get(wanted, model.model_fields[wanted].default) if wanted else None
-        found = read_form(model, given, [name] if name in NAMES else [], one=one)
+        name = wanted and given.get(wanted, model.model_fields[wanted].default)
+        found = read_form(model, given, [name] if name and name in NAMES else [], one=one)
         return cls(request.app.tables.pick(found[0].tolerance), *found)
 
 
@@ -219,6 +219,11 @@ class Reply(Response):
         self.status_code, self.body = 200, content
         self.raw_headers = [(b"content-length", b"%d" % len(content)), (b"content-type", media_type.encode())]
         self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        del scope, receive
+        await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+        await send({"type": "http.response.body", "body": self.body})
 
 
 def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> Response:
