@@ -5,6 +5,7 @@ promise of stability: pyproject.toml bounds the version, and the tests try every
 """
 
 import math
+from contextlib import suppress
 from itertools import chain
 from typing import Any, ClassVar
 
@@ -19,6 +20,38 @@ MAX_FIELDS = 100  # fields of a head
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
 _LOOK_EVERY_S = 0.25  # whether the time of a connection is over
 _TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+
+
+class _Transport:
+    """A transport that sends the head of an answer together with what follows at once: one packet, not two."""
+
+    def __init__(self, transport: Any, loop: Any) -> None:
+        self._transport, self._loop, self._kept = transport, loop, b""
+        self.is_closing = transport.is_closing
+
+    def write(self, data: bytes) -> None:
+        """Keep the first piece until the next one, or until the loop goes on."""
+        if self._kept:
+            self._transport.write(self._kept + data)
+            self._kept = b""
+        else:
+            self._kept = data
+            self._loop.call_soon(self.flush)
+
+    def flush(self) -> None:
+        """Send what is kept."""
+        if self._kept:
+            with suppress(RuntimeError):  # the client has left meanwhile
+                self._transport.write(self._kept)
+            self._kept = b""
+
+    def close(self) -> None:
+        """Close when all is sent."""
+        self.flush()
+        self._transport.close()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
 
 
 class Connection(HttpToolsProtocol):
@@ -74,6 +107,7 @@ class Connection(HttpToolsProtocol):
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
         super().connection_made(transport)
+        self.transport: Any = _Transport(transport, self.loop)
         if len(self.connections) > self._settings.max_connections and self.waiting:
             oldest = next(iter(self.waiting))
             del self.waiting[oldest]
@@ -90,6 +124,7 @@ class Connection(HttpToolsProtocol):
 
     def eof_received(self) -> bool:  # type: ignore[override]
         """Answer a whole request of a client that has closed its own side."""
+        self.transport.flush()
         if not self._busy or self.cycle.more_body:
             return False
         self.cycle.keep_alive = False
