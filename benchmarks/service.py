@@ -13,6 +13,7 @@ from benchmarks.measuring import FINEST, main, markdown  # isort: split
 import http.client
 import json
 import math
+import os
 import socket
 import statistics
 import sys
@@ -29,7 +30,7 @@ import orjson
 from tests.serving import CASE, Server, running, serving
 
 BATCH = "/v1/mu-macro/batch"
-FIRST = ("taskset", "-c", "0")  # the processor of the servers
+FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
 KINDS = {
     "columns": "application/json", "rows": "application/json", "lines": "application/x-ndjson", "csv": "text/csv",
@@ -104,6 +105,7 @@ def peer(name: str, folder: str) -> AbstractContextManager[Server]:
 
 def single() -> str:
     """The seven forms and FastAPI, beside raw ASGI."""
+    os.sched_setaffinity(0, CLIENT)  # else it interrupts the servers whenever they answer
     found: dict[str, list[tuple[float, float]]] = {}
     with (
         tempfile.TemporaryDirectory() as folder, service() as own, peer("raw", folder) as raw,

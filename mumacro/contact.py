@@ -10,7 +10,6 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -30,6 +29,7 @@ DirectionName = Literal["across", "along", "normal"]
 CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
 DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
+_FORCED = tuple(AMPLITUDE if name == "y0" else name for name in FIELDS)  # the fields of direction normal
 LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of that amplitude
 
 
@@ -42,12 +42,12 @@ class Kind(NamedTuple):
     @property
     def normal(self) -> bool:
         """Whether the normal force oscillates."""
-        return self.direction == DIRECTIONS.index("normal")
+        return DIRECTIONS[self.direction] == "normal"
 
     @property
     def fields(self) -> tuple[str, ...]:
         """The six inputs by name, :data:`mumacro.inputs.FIELDS` with Fz_amplitude in place of y0 for normal."""
-        return tuple(AMPLITUDE if name == "y0" and self.normal else name for name in FIELDS)
+        return _FORCED if self.normal else FIELDS
 
     @property
     def names(self) -> dict[str, Any]:
@@ -115,8 +115,10 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
     """
-    with suppress(KeyError, TypeError):
+    try:
         return _KINDS[contact, direction]
+    except (KeyError, TypeError):
+        pass  # the reason follows
     for name, value, known in (("contact", contact, CONTACTS), ("direction", direction, DIRECTIONS)):
         if not isinstance(value, str) or value not in known:
             raise InputError(name, value, f"one of {', '.join(known)}")

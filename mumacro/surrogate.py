@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, overload
 
@@ -371,12 +370,13 @@ class Surrogate:
         if name not in charts.QUANTITY_NAMES:
             raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
         kind = kind_of(contact, direction)
-        point: Any = v_tilde, y_tilde
-        if kind == SPRING and set(map(type, point)) <= _NUMBERS:
-            with suppress(OverflowError):  # a whole number beyond double range
-                one = _ONE.value(self._with(name), _CODES[name], *point)
-                if one[2] >= 0:
-                    return one
+        if kind == SPRING and type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
+            try:
+                one = _ONE.value(self._with(name), _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+            except OverflowError:  # a whole number beyond double range
+                one = None
+            if one is not None and one[2] >= 0:
+                return one
         if kind.normal and name == "power":
             raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
         self._data_of(kind)

@@ -87,9 +87,7 @@ def _serve(settings: Settings) -> int:
                 server_header=False,
                 ws="none",
                 root_path=settings.root_path,
-                proxy_headers=bool(settings.trusted_proxies),
-                forwarded_allow_ips=settings.trusted_proxies,
-                timeout_keep_alive=settings.keep_alive_s,
+                proxy_headers=False,  # the application reads them
                 timeout_graceful_shutdown=settings.shutdown_grace_s,
             )
     except SystemExit as stop:

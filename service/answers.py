@@ -8,6 +8,8 @@ first entry, service/quantities.py has the others.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -22,13 +24,12 @@ from mumacro.interval import middle
 from .case import PLAIN, Asked
 
 __all__ = [
-    "DEFAULT", "INTERVAL", "QUANTITIES", "REGIME_NAMES", "SOURCES", "Cases", "Part", "Quantity", "answer_case",
-    "answer_columns", "cost_of", "nested", "of_amplitude", "parts_of", "register", "said", "where",
+    "DEFAULT", "INTERVAL", "QUANTITIES", "REGIME_NAMES", "SOURCES", "Cases", "Part", "Quantity", "Wanted",
+    "answer_case", "answer_columns", "nested", "of_amplitude", "register", "said", "where",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-_USED = ("mu_macro", "error_bound", "v_tilde", "y_tilde", "length_scale")  # of an answer, by the quantities
 #: name of the regime of every source code
 REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
 
@@ -59,7 +60,7 @@ class Part:
 
 @dataclass
 class Cases:
-    """Cases that quantities are computed for: arrays (n,), or numbers of numpy for one; k = inf is rigid contact.
+    """Cases that quantities are computed for: arrays (n,), or plain numbers for one; k = inf is rigid contact.
 
     The slopes, by name of the input, are there if a requested quantity needs them.  What is not legal is NaN.
     """
@@ -71,30 +72,27 @@ class Cases:
     kind: Kind = SPRING
 
     def __post_init__(self) -> None:
-        self.columns = {name: _of_numpy(column) for name, column in self.columns.items()}
-        found = (_of_numpy(getattr(self.answer, name)) for name in _USED)
-        self.mu_macro, self.error_bound, self.v_tilde, self.y_tilde, self.length_scale = found
-        self.at_rest = (self.columns[self.kind.fields[3]] == 0.0) | (self.columns["omega"] == 0.0)
-        self.rigid = np.isinf(self.columns["k"])
+        answer, columns = self.answer, self.columns
+        self.mu_macro, self.error_bound = answer.mu_macro, answer.error_bound
+        self.v_tilde, self.y_tilde, self.length_scale = answer.v_tilde, answer.y_tilde, answer.length_scale
+        self.moving = (columns[self.kind.fields[3]] != 0.0) & (columns["omega"] != 0.0)
+        self.rigid = columns["k"] == math.inf
         #: elastic, oscillating, with groups within double range
-        self.usable = np.isfinite(self.y_tilde) & ~self.at_rest
+        self.usable = (self.y_tilde < math.inf) & self.moving
         self.words: dict[str, Any] = self.kind.names
 
     def at_speed(self, v0: Any) -> Array:
         """mu_macro at another v0, in the same shape; NaN where that is not legal."""
         columns = {name: np.atleast_1d(column) for name, column in {**self.columns, "v0": v0}.items()}
         found = self.surrogate.evaluate(columns, **self.words).mu_macro
-        return np.broadcast_to(found, self.mu_macro.shape or (1,)).reshape(self.mu_macro.shape)
+        shape = np.shape(self.mu_macro)
+        return np.broadcast_to(found, shape or (1,)).reshape(shape)
 
     def slopes(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """d mu_macro / d input and the bounds, NaN along k where contact is rigid."""
         no_slope = where(self.rigid, np.nan, 0.0)
         slopes, bounds = self.answer.gradient, self.answer.gradient_bound
         return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}
-
-
-def _of_numpy(column: Any) -> Any:
-    return np.float64(column) if isinstance(column, float) else column
 
 
 def where(condition: Any, one: Any, other: Any) -> Any:
@@ -131,6 +129,7 @@ INTERVAL = (
     Part("mu_macro_high", "-", "Largest mu_macro over the interval of k"),
 )
 _NAMES = tuple(part.path for part in DEFAULT)
+_six = itemgetter(*FIELDS)
 _COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 40.0}  # in times of one spring, across, at one k
 QUANTITIES: dict[str, Quantity] = {}
 
@@ -146,10 +145,41 @@ def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> C
     return add
 
 
-def parts_of(include: Sequence[str], asked: Asked = PLAIN) -> list[Part]:
-    """The columns of an answer with these quantities, in order."""
-    parts = [*DEFAULT, *(INTERVAL if asked.interval else ()), *(p for name in include for p in QUANTITIES[name].parts)]
-    return [of_amplitude(part) for part in parts] if asked.kind.normal else parts
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked of cases: what they are, the quantities beside the default outputs, and deviations for ``std``."""
+
+    asked: Asked = PLAIN
+    include: tuple[str, ...] = ()
+    std: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether it is nothing but the default outputs of one spring, across, at one k."""
+        return self.asked == PLAIN and not self.include
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """The columns of an answer, in order."""
+        more = [part for name in self.include for part in QUANTITIES[name].parts]
+        parts = [*DEFAULT, *(INTERVAL if self.asked.interval else ()), *more]
+        return [of_amplitude(part) for part in parts] if self.asked.kind.normal else parts
+
+    @cached_property
+    def more(self) -> list[str]:
+        """The paths of the columns beside the default ones."""
+        return [part.path for part in self.parts[len(DEFAULT) :]]
+
+    @cached_property
+    def slopes(self) -> bool:
+        """Whether a quantity needs the gradient."""
+        return any(QUANTITIES[name].slopes for name in self.include)
+
+    @cached_property
+    def cost(self) -> float:
+        """Time of a case, in times of a plain answer."""
+        cost = 1.0 + sum(QUANTITIES[name].cost for name in self.include)
+        return cost * math.prod(_COSTS[word] for word in said(self.asked))
 
 
 def of_amplitude(part: Part) -> Part:
@@ -164,12 +194,6 @@ def said(asked: Asked) -> list[str]:
     """What is asked beside one spring, across, at one k."""
     words = [word for word in asked.kind.names.values() if word in _COSTS]
     return [*words, "k_range"] if asked.interval else words
-
-
-def cost_of(include: Sequence[str], asked: Asked = PLAIN) -> float:
-    """Time of a case with these quantities, in times of a plain answer."""
-    cost = 1.0 + sum(QUANTITIES[name].cost for name in include)
-    return cost if asked == PLAIN else cost * math.prod(_COSTS[word] for word in said(asked))
 
 
 def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -187,51 +211,42 @@ def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
 # --- evaluation ---------------------------------------------------------------------------------------
 
 
-def answer_case(
-    surrogate: Surrogate, case: Mapping[str, Any], include: Sequence[str] = (),
-    std: Mapping[str, float] | None = None, asked: Asked = PLAIN,
-) -> tuple[dict[str, Any], int]:  # fmt: skip
+def answer_case(surrogate: Surrogate, case: Mapping[str, Any], wanted: Wanted) -> tuple[dict[str, Any], int]:
     """The answer to one case as plain Python values, and the code of its source; InputError where it is not legal."""
-    if not include and asked is PLAIN:
-        macro, ratio, bound, code = surrogate.evaluate_case(*(case[name] for name in FIELDS))
+    if wanted.plain:
+        macro, ratio, bound, code = surrogate.evaluate_case(*_six(case))
         return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)), code
-    found, more = _evaluated(surrogate, case, include, std, asked)
+    found, more = _evaluated(surrogate, case, wanted)
     code = found.source_code
     values = found.mu_macro, found.mu_ratio, REGIME_NAMES[code], found.error_bound, SOURCES[code]
-    return dict(zip(_NAMES, values, strict=True)) | nested({path: float(value) for path, value in more.items()}), code
+    return dict(zip(_NAMES, values, strict=True)) | nested(dict(zip(wanted.more, map(float, more), strict=True))), code
 
 
 def answer_columns(
-    surrogate: Surrogate, six: Sequence[Array], n: int, include: Sequence[str] = (),
-    std: Mapping[str, float] | None = None, asked: Asked = PLAIN,
+    surrogate: Surrogate, six: Sequence[Array], n: int, wanted: Wanted
 ) -> tuple[dict[str, Any], Codes]:  # fmt: skip
     """The columns of the answers by path, and the source codes: NaN and -1 for a case that is not legal.
 
     ``six`` has n cases in columns of shape (n,) or (1,), in the order of the fields; k = inf is rigid contact.
     """
-    cases = {name: x if x.size == n else x.item() for name, x in zip(asked.fields, six, strict=True)}
-    found, more = _evaluated(surrogate, cases, include, std, asked)
+    cases = {name: x if x.size == n else x.item() for name, x in zip(wanted.asked.fields, six, strict=True)}
+    with np.errstate(all="ignore"):
+        found, more = _evaluated(surrogate, cases, wanted)
     codes = found.source_code
-    values = found.mu_macro, found.mu_ratio, codes, found.error_bound, codes
+    values = dict(zip(_NAMES, (found.mu_macro, found.mu_ratio, codes, found.error_bound, codes), strict=True))
     legal = codes >= 0
-    more = {path: np.where(legal, column, np.nan) for path, column in more.items()}
-    return {**dict(zip(_NAMES, values, strict=True)), **more}, codes
+    return values | {path: np.where(legal, x, np.nan) for path, x in zip(wanted.more, more, strict=True)}, codes
 
 
-def _evaluated(
-    surrogate: Surrogate, cases: Mapping[str, Any], include: Sequence[str], std: Mapping[str, float] | None,
-    asked: Asked,
-) -> tuple[Any, dict[str, Any]]:  # fmt: skip
-    """The library's answer, and the columns beside the default ones by path."""
-    slopes = any(QUANTITIES[name].slopes for name in include)
+def _evaluated(surrogate: Surrogate, cases: Mapping[str, Any], wanted: Wanted) -> tuple[Any, list[Any]]:
+    """The library's answer, and the columns beside the default ones."""
+    asked, include = wanted.asked, wanted.include
     words: dict[str, Any] = asked.kind.names
-    found = surrogate.evaluate(**cases, **words, gradient=slopes, groups=bool(include))
+    found = surrogate.evaluate(**cases, **words, gradient=wanted.slopes, groups=bool(include))
     more = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
     if include:
         if asked.interval:
-            cases = {**cases, "k": middle(cases, "nan")[2]}
-        known = Cases(surrogate, {name: cases[name] for name in asked.kind.fields}, found, std or {}, asked.kind)
-        with np.errstate(all="ignore"):
-            more += [column for name in include for column in QUANTITIES[name].compute(known)]
-    parts = parts_of(include, asked)[len(DEFAULT) :]
-    return found, {part.path: column for part, column in zip(parts, more, strict=True)}
+            cases = {name: cases[name] for name in asked.kind.fields if name != "k"} | {"k": middle(cases, "nan")[2]}
+        known = Cases(surrogate, cases, found, wanted.std, asked.kind)
+        more += [column for name in include for column in QUANTITIES[name].compute(known)]
+    return found, more

@@ -54,13 +54,13 @@ _log = logging.getLogger("mumacro.app")
 async def _lifespan(app: Any) -> AsyncIterator[dict[str, Any]]:
     for name in unknown_variables():
         _log.warning("%s is not a setting and has no effect", name)
-    app.state.tables.load()
-    app.state.metrics.start(app.state.tables)
+    app.tables.load()
+    app.metrics.start(app.tables)
     # A full collection visits a hundred thousand objects of the libraries, and no request is answered meanwhile.
     gc.collect()
     gc.freeze()
-    yield {"settings": app.state.settings}
-    app.state.work.close()
+    yield {"settings": app.settings}
+    app.work.close()
 
 
 async def _problem(request: Request, error: Exception) -> Response:
@@ -68,7 +68,7 @@ async def _problem(request: Request, error: Exception) -> Response:
 
 
 class Application(FastAPI):
-    """The whole service; ``state`` is what the endpoints share: settings, tables, metrics, work, openapi.
+    """The whole service; the endpoints share its settings, tables, metrics and work.
 
     FastAPI describes the endpoints, starts and ends the application, and answers what is none of them (the guide).
     Requests to endpoints do not pass its layers (docs/decisions.md).
@@ -80,19 +80,18 @@ class Application(FastAPI):
             openapi_url=None, redirect_slashes=False, lifespan=_lifespan, exception_handlers={HTTPException: _problem},
             servers=[{"url": settings.root_path}] if settings.root_path else None,
         )  # fmt: skip
-        state = self.state
-        state.settings, state.tables, state.work = settings, Tables(settings.tables), Work(settings)
-        state.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
+        self.settings, self.tables, self.work = settings, Tables(settings.tables), Work(settings)
+        self.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
         for endpoint in ENDPOINTS:
             endpoint.describe_to(self)
-        state.openapi = dump(self.openapi())
+        self.described = dump(self.openapi())
         # The pages are the same for everyone and hold no number.  They ask for the key and send it with every request.
         opened = {endpoint.path for endpoint in ENDPOINTS if endpoint.open}
         if settings.guide is not None:
             self.add_route("/guide", lambda _: RedirectResponse("guide/"))
             self.mount("/guide", StaticFiles(directory=settings.guide, html=True))
             opened.add("/guide")
-        self._front: ASGIApp = Observe(Routes(ENDPOINTS, super().__call__), state.metrics, settings.keys(), opened)
+        self._front: ASGIApp = Observe(Routes(ENDPOINTS), super().__call__, self.metrics, settings, opened)
         if settings.cors_origins:
             self._front = CORSMiddleware(
                 self._front,
@@ -112,7 +111,7 @@ class Application(FastAPI):
             described = super().openapi()
             _, more = models_json_schema(_MORE, ref_template="#/components/schemas/{model}")
             described["components"]["schemas"] |= more["$defs"]
-            if self.state.settings.keys():
+            if self.settings.keys():
                 described["components"]["securitySchemes"] = _KEYS
                 described["security"] = [{name: []} for name in _KEYS]
         return super().openapi()

@@ -31,7 +31,7 @@ QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
-_ONCE = (b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
+_ONCE = (b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
 
 
 def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
@@ -50,6 +50,8 @@ def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
     """Refuse a head that says two things, or asks for another protocol, as which its body would be read."""
+    if b"host" not in headers and scope["http_version"] == "1.1":
+        raise RequestError(Kind.MALFORMED_HTTP, "a request has one Host")
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
@@ -81,8 +83,10 @@ async def read_body(
     headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
 ) -> bytearray:
     """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
-
-    def check(size: int) -> None:
+    length = headers.get(b"content-length", b"0")
+    size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
+    body, more = bytearray(), True
+    while True:
         if size > limit:
             told = (
                 f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
@@ -91,18 +95,14 @@ async def read_body(
             raise RequestError(Kind.BODY_TOO_LARGE, told, max_bytes=limit)
         if size > SMALL_BODY:
             large()
-
-    length = headers.get(b"content-length", b"0")
-    check(int(length) if length.isdigit() and len(length) < 19 else limit + 1)
-    body, more = bytearray(), True
-    while more:
+        if not more:
+            return body
         message = await receive()
         if message["type"] != "http.request":
             raise ClientDisconnect
         body += message.get("body", b"")
         more = message.get("more_body", False)
-        check(len(body))
-    return body
+        size = len(body)
 
 
 async def drained(receive: Receive) -> None:

@@ -12,32 +12,34 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
 from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
-from functools import cache
-from typing import Any
+from functools import cache, partial
+from typing import Any, ClassVar
 
 import numpy as np
 import orjson
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics, generate_latest
 from prometheus_client.multiprocess import MultiProcessCollector
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
+from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from mumacro.errors import MumacroError
 
 from .answers import REGIME_NAMES, SOURCES
 from .limits import check_head, drained, holder_of
 from .problems import Kind, RequestError, problem_of
-from .routes import path_of
+from .routes import Routes, path_of
+from .settings import Settings
 from .tables import LoadedTable, Tables
 
-__all__ = ["JsonFormatter", "LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
+__all__ = ["LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
 
-HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
+HEALTH_PATHS = frozenset({"/livez", "/readyz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 _SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
 _BUCKETS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
@@ -52,53 +54,53 @@ _access = logging.getLogger("mumacro.access")
 _errors = logging.getLogger("mumacro.error")
 
 
-class JsonFormatter(logging.Formatter):
-    """One record, one line of JSON: time, level, logger, message, the record's ``fields``."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        """Return the record as JSON.  Line breaks in it are escaped, so that a client cannot forge a line."""
-        line: dict[str, Any] = {
-            "time": datetime.fromtimestamp(record.created, UTC),
-            "level": record.levelname.lower(),
-            "logger": record.name,
-            "message": record.getMessage(),
-            **getattr(record, "fields", {}),
-        }
-        if record.exc_info:
-            line["exception"] = self.formatException(record.exc_info)
-        return orjson.dumps(line, default=str).decode()
-
-
 class LogLines(logging.Handler):
-    """Keeps records for a thread that writes them twenty times a second: a stalled reader delays no request.
+    """Keeps lines for a thread that writes them twenty times a second: a stalled reader delays no request.
 
-    ``logging.handlers.QueueListener`` would wake its thread for every record.
+    ``logging.handlers.QueueListener`` would wake its thread for every record.  Lines of requests come from
+    :class:`Observe` at once: a record of ``logging`` takes a tenth of the time of a request.
     """
+
+    #: the one of this process; without it, under another server, that server says what it answered
+    running: ClassVar["LogLines | None"] = None
 
     def __init__(self) -> None:
         super().__init__()
-        self.setFormatter(JsonFormatter())
-        self._waiting, self._dropped, self._writes = deque[logging.LogRecord](), 0, False
+        self._waiting, self._dropped, self._writes = deque[dict[str, Any]](), 0, False
         threading.Thread(target=self._write, name="log", daemon=True).start()
+        LogLines.running = self
 
-    def emit(self, record: logging.LogRecord) -> None:
-        """Keep a record if there is room."""
+    def put(self, line: dict[str, Any]) -> None:
+        """Keep a line if there is room."""
         if len(self._waiting) < _MOST_WAITING:
-            self._waiting.append(record)
+            self._waiting.append(line)
         else:
             self._dropped += 1
 
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a record: its time, level, logger, message and ``fields``."""
+        line: dict[str, Any] = {
+            "time": datetime.fromtimestamp(record.created, UTC), "level": record.levelname.lower(),
+            "logger": record.name, "message": record.getMessage(), **getattr(record, "fields", {}),
+        }  # fmt: skip
+        if record.exc_info:
+            line["exception"] = logging.Formatter().formatException(record.exc_info)
+        self.put(line)
+
     def _write(self) -> None:
-        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls."""
-        told = 0
+        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe stalls.
+
+        Line breaks within a line are escaped, so that a client cannot forge one.
+        """
+        told, form = 0, partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
         while True:
             time.sleep(_WRITE_EVERY_S)
             self._writes = True
-            records = [self._waiting.popleft() for _ in range(len(self._waiting))]
+            lines = [self._waiting.popleft() for _ in range(len(self._waiting))]
             if more := self._dropped - told:
                 told += more
                 _log.warning("%d lines of the log were dropped: standard output was not read in time", more)
-            rest = memoryview("".join(f"{self.format(record)}\n" for record in records).encode())
+            rest = memoryview(b"".join(map(form, lines)))
             with suppress(OSError):  # the reader is gone
                 while rest:
                     rest = rest[os.write(1, rest) :]
@@ -109,19 +111,6 @@ class LogLines(logging.Handler):
         until = time.monotonic() + 1.0
         while (self._waiting or self._writes) and time.monotonic() < until:
             time.sleep(0.01)
-
-
-class AccessRecord(logging.LogRecord):
-    """The record of a request.  It has no place in a source file: finding that takes longer than all the rest."""
-
-    def __init__(self, level: int, fields: dict[str, Any]) -> None:
-        self.__dict__ = {**_SAME[level], "created": time.time(), "fields": fields}
-
-
-_SAME = {
-    level: vars(logging.LogRecord("mumacro.access", level, "", 0, "request", None, None))
-    for level in (logging.DEBUG, logging.INFO)
-}
 
 
 def log_config(level: str) -> dict[str, Any]:
@@ -164,7 +153,7 @@ class Metrics:
         labels = ["id", "tolerance"]
         self._info = Gauge("mumacro_table_info", "Loaded tables", labels, registry=own, multiprocess_mode="mostrecent")
         # a look-up of labels takes longer than counting
-        self._of_request = cache(lambda *labels: (requests.labels(*labels), seconds.labels(labels[0])))
+        self._of_request = cache(lambda *labels: (requests.labels(*labels).inc, seconds.labels(labels[0]).observe))
         self._of_source = cache(
             lambda table, code: (
                 bad.labels(table) if code < 0 else cases.labels(table, SOURCES[code], REGIME_NAMES[code])
@@ -180,9 +169,9 @@ class Metrics:
     def request(self, path: str, method: str, status: int, seconds: float) -> None:
         """Count one request."""
         path, method = path if path in self._paths else "other", method if method in _METHODS else "other"
-        count, durations = self._of_request(path, method, status)
-        count.inc()
-        durations.observe(seconds)
+        count, observe = self._of_request(path, method, status)
+        count()
+        observe(seconds)
 
     def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
         """Count answered cases of one source code; -1 are bad ones."""
@@ -203,15 +192,23 @@ class Metrics:
         return generate_latest(registry)
 
 
-class Observe:
-    """Middleware: id, key, log line, counters, and problem details for every exception.
+async def _nothing(*_: object) -> None:
+    """Behind uvicorn's middleware, which changes the scope."""
 
-    ``open_paths``, and what is below ``/guide/``, need no key.
+
+class Observe:
+    """Around every answer: id, key, log line, counters, and problem details for every exception.
+
+    Endpoints are found by ``routes``, ``others`` answers what is none.  ``open_paths``, and what is below ``/guide/``,
+    need no key.
     """
 
-    def __init__(self, app: ASGIApp, metrics: Metrics, keys: Mapping[str, str], open_paths: AbstractSet[str]) -> None:
-        self.app = app
-        self._metrics, self._keys, self._open_paths = metrics, keys, open_paths
+    def __init__(
+        self, routes: Routes, others: ASGIApp, metrics: Metrics, settings: Settings, open_paths: AbstractSet[str]
+    ) -> None:
+        self._routes, self._others, self._metrics = routes, others, metrics
+        self._keys, self._open_paths = settings.keys(), open_paths
+        self._proxies: Any = ProxyHeadersMiddleware(_nothing, settings.trusted_proxies)
         self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -221,6 +218,8 @@ class Observe:
         offered = headers.get(b"x-request-id", b"")
         identity = offered.decode() if _ID.fullmatch(offered) else f"{self._stem}{next(self._numbers):016x}"
         scope["request_id"] = identity
+        if b"x-forwarded-for" in headers or b"x-forwarded-proto" in headers:
+            await self._proxies(scope, receive, send)
         path, status, holder = path_of(scope), 0, None
 
         async def send_marked(message: Message) -> None:
@@ -236,7 +235,9 @@ class Observe:
             check_head(scope, headers)
             if self._keys and path not in self._open_paths and not path.startswith("/guide/"):
                 holder = holder_of(headers, self._keys)
-            await self.app(scope, receive, send_marked)
+            answer = self._routes(path, scope["method"])
+            response = self._others if answer is None else await answer(Request(scope, receive))
+            await response(scope, receive, send_marked)
         except ClientDisconnect:
             status = 499  # the usual status for a client that disconnected before the answer
         except Exception as error:
@@ -246,20 +247,23 @@ class Observe:
             if status:  # the answer has begun: end the connection without its end
                 status = 499
                 raise ClientDisconnect from error
-            answer = problem_of(error, scope)
+            problem = problem_of(error, scope)
             late = getattr(error, "kind", None) in (Kind.SLOW_CLIENT, Kind.TOOK_TOO_LONG)
-            if "connection" in answer.headers and not late and b"expect" not in headers:
+            if "connection" in problem.headers and not late and b"expect" not in headers:
                 await drained(receive)
-            await answer(scope, receive, send_marked)
+            await problem(scope, receive, send_marked)
         finally:
             seconds = time.perf_counter() - started
             self._metrics.request(path, scope["method"], status, seconds)
-            level = logging.DEBUG if status == 200 and path in HEALTH_PATHS else logging.INFO
-            if _access.isEnabledFor(level):
+            quiet, lines = status == 200 and path in HEALTH_PATHS, LogLines.running
+            if lines is not None and _access.isEnabledFor(logging.DEBUG if quiet else logging.INFO):
                 client = scope.get("client")
-                fields = {
-                    "request_id": identity, "method": scope["method"], "path": path, "status": status,
-                    "duration_ms": round(1e3 * seconds, 3), "client": client[0][:_MOST_SHOWN] if client else None,
-                    **({} if holder is None else {"key": holder}),
+                line = {
+                    "time": datetime.now(UTC), "level": "debug" if quiet else "info", "logger": "mumacro.access",
+                    "message": "request", "request_id": identity, "method": scope["method"], "path": path,
+                    "status": status, "duration_ms": round(1e3 * seconds, 3),
+                    "client": client[0][:_MOST_SHOWN] if client else None,
                 }  # fmt: skip
-                _access.handle(AccessRecord(level, fields))
+                if holder is not None:
+                    line["key"] = holder
+                lines.put(line)

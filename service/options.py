@@ -19,7 +19,7 @@ from mumacro.inputs import BOUNDS, LIKE, MOST_HZ, RAD_PER_CYCLE, RIGID, unit_of
 from mumacro.inputs import NAMES as INPUTS
 from mumacro.interval import BOUND, ENDS
 
-from .answers import QUANTITIES, said
+from .answers import QUANTITIES, Wanted, said
 from .case import LEAST, PLAIN, Asked, asked_of, bound_of, checked
 from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
@@ -141,29 +141,32 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
             raise relation("std", f"has {wrong}, which direction {self.direction} does not have")
         return self
 
-    def check(self, asked: Asked, one: bool = False) -> None:
-        """Refuse what ``include`` asks for and such cases do not have; ``model`` is for ``one`` case."""
-        faults = []
+    def wanted(self, asked: Asked, one: bool = False) -> Wanted:
+        """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one`` case."""
+        found = self._wanted.get((asked, one))
+        if found is None:
+            found = self._wanted[asked, one] = self._checked(asked, one)
+        return found
+
+    @cached_property
+    def _wanted(self) -> dict[tuple[Asked, bool], Wanted]:
+        return {}
+
+    def _checked(self, asked: Asked, one: bool) -> Wanted:
+        faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))  # once each, in order
         if not one and MODEL in (self.include or ()):
             faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))
         for word in said(asked) if asked != PLAIN else ():
-            for name in self.names():
+            for name in include:
                 if word in QUANTITIES[name].lacks:
                     told = f"{name} is not computed for {word}: {QUANTITIES[name].lacks[word]}"
                     faults.append(FieldFault.of("include", told, name))
         if faults:
             refuse(faults)
-
-    def names(self) -> tuple[str, ...]:
-        """Included quantities once each, in the order of the registry."""
-        return tuple(name for name in INCLUDES if name in self.include) if self.include else ()
-
-    def deviations(self) -> dict[str, float]:
-        """Standard deviations by field, omega in place of f; empty if there are none."""
-        given: dict[str, float] = {} if self.std is None else self.std.model_dump()
-        if given:
-            given["omega"] += RAD_PER_CYCLE * given.pop("f")
-        return given
+        std: dict[str, float] = {} if self.std is None else self.std.model_dump()
+        if std:
+            std["omega"] += RAD_PER_CYCLE * std.pop("f")
+        return Wanted(asked, include, std)
 
 
 OPTIONS = tuple(Options.model_fields)
@@ -173,24 +176,32 @@ def options_of(
     model: type[Model], given: Mapping[str, Any], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
     """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
-    fields, _, without = _of_model(model)
-    if without is not None and fields.isdisjoint(given):
-        return without, given, []
-    own = {name: value for name, value in given.items() if name in fields}
-    rest = {name: value for name, value in given.items() if name not in own}
-    try:
-        return model.model_validate(own), rest, []
-    except ValidationError as error:
-        return None, rest, faults_of(error, model, (), parameter)
+    fields, own, rest = _names(model)[0], {}, given
+    if not fields.isdisjoint(given):
+        rest = dict(given)
+        own = {name: rest.pop(name) for name in given if name in fields}
+    key = model, repr(own)
+    form = _valid.get(key)
+    if form is None:
+        try:
+            form = model.model_validate(own)
+        except ValidationError as error:
+            return None, rest, faults_of(error, model, (), parameter)
+        if len(_valid) >= _KEPT:
+            _valid.clear()
+        if len(key[1]) < _LONG:
+            _valid[key] = form
+    return form, rest, []
+
+
+_KEPT, _LONG = 256, 1024
+_valid: dict[tuple[Any, str], Any] = {}  # most requests have the options of another one
 
 
 @cache
-def _of_model(model: Any) -> tuple[frozenset[str], tuple[str, ...], Any]:
-    """The names of the options; of all that a request may have; the options of a request that has none, if it may."""
-    without = None
-    with suppress(ValidationError):
-        without = model()
-    return frozenset(model.model_fields), (*NAMES, "k_range", *ENDS, *model.model_fields), without
+def _names(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
+    """The names of the options, and of all that a request may have."""
+    return frozenset(model.model_fields), (*NAMES, "k_range", *ENDS, *model.model_fields)
 
 
 def kind_in(given: Mapping[str, Any]) -> Kind:
@@ -201,8 +212,8 @@ def kind_in(given: Mapping[str, Any]) -> Kind:
 def read_form(
     model: type[Asking], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True,
     one: bool = False,
-) -> tuple[Asking, dict[str, Any], Asked]:  # fmt: skip
-    """The options and the case of a request, and what it is; ``left_out`` are the inputs that it asks for."""
+) -> tuple[Asking, dict[str, Any], Wanted]:  # fmt: skip
+    """The options and the case of a request, and what is asked of it; ``left_out`` are the inputs that it asks for."""
     form, rest, faults = options_of(model, given)
     if left_out:  # a null says the same
         rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
@@ -211,11 +222,10 @@ def read_form(
         with suppress(InputError):  # which is among the faults
             kind = kind_in(given)
     asked = asked_of(rest, kind)
-    values, more = checked(rest, left_out, null_is_rigid, _of_model(model)[1], asked)  # type: ignore[arg-type]
+    values, more = checked(rest, left_out, null_is_rigid, _names(model)[1], asked)  # type: ignore[arg-type]
     if form is None or more:
         refuse([*faults, *more])
-    form.check(asked, one)
-    return form, values, asked
+    return form, values, form.wanted(asked, one)
 
 
 # --- models of cases ----------------------------------------------------------------------------------

@@ -42,7 +42,7 @@ def limits(cases: Cases) -> Sequence[Array]:
     else:  # rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0
         crit = cases.surrogate.v_tilde_crit(where(cases.usable, cases.y_tilde, 0.0), **cases.words)
         speed = where(cases.usable, cases.length_scale * crit * cases.columns["omega"], np.nan)
-        speed = where(cases.at_rest | cases.rigid, 0.0, speed)
+        speed = where(cases.moving, where(cases.rigid, 0.0, speed), 0.0)
     return cases.at_speed(0.0), speed, cases.at_speed(speed)
 
 
@@ -79,8 +79,9 @@ def std(cases: Cases) -> Sequence[Array]:
     terms, doubts = (
         [where(exact[name], 0.0, found[name] * spread) for name, spread in given.items()] for found in cases.slopes()
     )
-    total, doubt = (reduce(np.hypot, found) for found in (terms, doubts))
-    return [total, doubt, *(where(total > 0.0, (term / total) ** 2, 0.0) for term in terms)]
+    with np.errstate(all="ignore"):
+        total, doubt = (reduce(np.hypot, found) for found in (terms, doubts))
+        return [total, doubt, *(where(total > 0.0, (term / total) ** 2, 0.0) for term in terms)]
 
 
 # --- stick fraction, power and settling -----------------------------------------------------------------
@@ -95,7 +96,7 @@ def stick_fraction(cases: Cases) -> Sequence[Array]:
     """Share of the period during which the contact sticks."""
     value, bound = cases.surrogate.stick_fraction_with_bound(cases.v_tilde, cases.y_tilde, **cases.words)
     # y~ below double range: the groups do not show whether such a contact sticks
-    lost = (cases.y_tilde == 0.0) & (cases.v_tilde < np.inf) & ~cases.at_rest
+    lost = (cases.y_tilde == 0.0) & (cases.v_tilde < np.inf) & cases.moving
     return value, where(lost, 1.0, bound)
 
 
@@ -113,9 +114,9 @@ def power(cases: Cases) -> Sequence[Array]:
     unit = where(cases.usable, mu0 * load * (cases.length_scale * omega), np.nan)
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
     found = cases.surrogate.power_with_bound(v, y, **cases.words)
-    shaker, bound = (where(cases.at_rest, 0.0, number * unit) for number in found)
+    shaker, bound = (where(cases.moving, number * unit, 0.0) for number in found)
     saved = (mu0 - cases.mu_macro) * load * v0
-    return shaker, saved, bound, cases.error_bound * load * v0 + ROUNDING * np.abs(saved)
+    return shaker, saved, bound, cases.error_bound * load * v0 + ROUNDING * abs(saved)
 
 
 _DERIVED = "how a disturbance decays is derived for across only"

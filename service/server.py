@@ -5,6 +5,7 @@ promise of stability: pyproject.toml bounds the version, and the tests try every
 """
 
 import math
+from contextlib import suppress
 from itertools import chain
 from typing import Any, ClassVar
 
@@ -19,6 +20,38 @@ MAX_FIELDS = 100  # fields of a head
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
 _LOOK_EVERY_S = 0.25  # whether the time of a connection is over
 _TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
+
+
+class _Transport:
+    """A transport that sends the head of an answer together with what follows at once: one packet, not two."""
+
+    def __init__(self, transport: Any, loop: Any) -> None:
+        self._transport, self._loop, self._kept = transport, loop, b""
+        self.is_closing = transport.is_closing
+
+    def write(self, data: bytes) -> None:
+        """Keep the first piece until the next one, or until the loop goes on."""
+        if self._kept:
+            self._transport.write(self._kept + data)
+            self._kept = b""
+        else:
+            self._kept = data
+            self._loop.call_soon(self.flush)
+
+    def flush(self) -> None:
+        """Send what is kept."""
+        if self._kept:
+            with suppress(RuntimeError):  # the client has left meanwhile
+                self._transport.write(self._kept)
+            self._kept = b""
+
+    def close(self) -> None:
+        """Close when all is sent."""
+        self.flush()
+        self._transport.close()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
 
 
 class Connection(HttpToolsProtocol):
@@ -38,6 +71,7 @@ class Connection(HttpToolsProtocol):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
         self._settings = self.app_state["settings"]
+        self.headers = []
 
     @property
     def _busy(self) -> bool:
@@ -45,6 +79,10 @@ class Connection(HttpToolsProtocol):
 
     def _watch(self) -> None:
         self._due = min(self._due, self.loop.time() + self._settings.client_timeout_s)
+
+    def _in_batch(self) -> bool:
+        """Whether the application limits every wait."""
+        return self.url.partition(b"?")[0].endswith(b"/batch")
 
     def _look(self) -> None:
         """End the connection if its time is over: with 408 where a request has begun and its answer has not."""
@@ -69,6 +107,7 @@ class Connection(HttpToolsProtocol):
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
         super().connection_made(transport)
+        self.transport: Any = _Transport(transport, self.loop)
         if len(self.connections) > self._settings.max_connections and self.waiting:
             oldest = next(iter(self.waiting))
             del self.waiting[oldest]
@@ -85,6 +124,7 @@ class Connection(HttpToolsProtocol):
 
     def eof_received(self) -> bool:  # type: ignore[override]
         """Answer a whole request of a client that has closed its own side."""
+        self.transport.flush()
         if not self._busy or self.cycle.more_body:
             return False
         self.cycle.keep_alive = False
@@ -96,9 +136,9 @@ class Connection(HttpToolsProtocol):
             return
         self._bytes += len(data)
         super().data_received(data)
-        if self._in_head or not self._busy:
+        if self._in_head or not self._busy or (self.cycle.more_body and not self._in_batch()):
             self._watch()
-        if self._in_head and self._bytes > MAX_HEAD:
+        if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):  # also behind a body
             self._refuse(_TOO_LARGE)
 
     def send_400_response(self, msg: str) -> None:
@@ -121,34 +161,21 @@ class Connection(HttpToolsProtocol):
         if self._busy:
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
-        self._in_head = True
+        self._in_head, self._due = True, math.inf
         super().on_message_begin()
-
-    def on_header(self, name: bytes, value: bytes) -> None:
-        """Take a field of the head, or one that follows a body."""
-        super().on_header(name, value)
-        if len(self.headers) > MAX_FIELDS:
-            self._refusal = _TOO_LARGE
-            raise _TOO_LARGE
 
     def on_headers_complete(self) -> None:
         """Begin a request."""
-        hosts = [name for name, _ in self.headers].count(b"host")
-        if self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD:
+        large = self._bytes > MAX_HEAD and sum(map(len, (self.url, *chain(*self.headers)))) > MAX_HEAD
+        if large or len(self.headers) > MAX_FIELDS:
             self._refusal = _TOO_LARGE
-        elif hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):
-            self._refusal = RequestError(Kind.MALFORMED_HTTP, "a request has one Host")
-        if self._refusal:
-            raise self._refusal
-        self._in_head = False
+            raise _TOO_LARGE
+        self._in_head, self._due = False, math.inf
         self.waiting.pop(self, None)
         if len(self.connections) > self._settings.max_connections:
             self.scope["state"]["full"] = True
         super().on_headers_complete()
-        now = self.loop.time()
-        self._end = now + self._settings.time_limit_s + _MARGIN_S
-        in_batch = self.url.partition(b"?")[0].endswith(b"/batch")  # there the application limits every wait
-        self._due = math.inf if in_batch else now + self._settings.client_timeout_s
+        self._end = self.loop.time() + self._settings.time_limit_s + _MARGIN_S
 
     def on_message_complete(self) -> None:
         """The client has sent its request."""
@@ -156,7 +183,9 @@ class Connection(HttpToolsProtocol):
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        """Wait for the next request."""
-        self._due, self._end, self._bytes = math.inf, math.inf, 0
-        self.waiting[self] = None
-        super().on_response_complete()
+        """Wait for the next request; in place of uvicorn, which starts a timer of its own for that."""
+        self.server_state.total_requests += 1
+        if not self.transport.is_closing():
+            self.flow.resume_reading()
+            self._due, self._end, self._bytes = self.loop.time() + self._settings.keep_alive_s, math.inf, 0
+            self.waiting[self] = None

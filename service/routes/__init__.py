@@ -17,9 +17,9 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
-from ..case import Asked
+from ..answers import Wanted
 from ..limits import SMALL_BODY, media_type_of, read_body
 from ..options import NAMES, Options, query_of, read_form
 from ..problems import FieldFault, Kind, RequestError, refuse
@@ -31,6 +31,7 @@ __all__ = [
 ]  # fmt: skip
 
 _JSON = "application/json"
+_AS_JSON = _JSON.encode()
 _WHY = {
     400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
     401: "The service needs an API key, and none or a wrong one was sent",
@@ -49,13 +50,16 @@ _RETRY = {"description": "Seconds after which to send the request again", "schem
 _STD = frozenset(f"std_{name}" for name in NAMES)
 
 
+Answer = Callable[[Request], Awaitable[Response]]
+
+
 @dataclass(frozen=True)
 class Endpoint:
     """One path and method, and its description; without a summary it is not described."""
 
     path: str
     method: str  # GET answers HEAD, too
-    answer: Callable[[Request], Awaitable[Response]]  # its name is the operation's id
+    answer: Answer  # its name is the operation's id
     summary: str = ""
     form: type[BaseModel] | None = None  # what is asked: a body; of GET, and beside a ``request``, its query
     model: Any = None  # of the answer
@@ -97,29 +101,25 @@ class Endpoint:
 
 
 class Routes:
-    """Finds the endpoint of a path, which has no parameters, and of a method; other paths go to ``others``."""
+    """Finds the endpoint of a path, which has no parameters, and of a method."""
 
-    def __init__(self, endpoints: Iterable[Endpoint], others: ASGIApp) -> None:
-        self._others = others
-        self._found: dict[str, dict[str, Callable[[Request], Awaitable[Response]]]] = {}
+    def __init__(self, endpoints: Iterable[Endpoint]) -> None:
+        self._found: dict[str, dict[str, Answer]] = {}
         for endpoint in endpoints:
             methods = self._found.setdefault(endpoint.path, {})
             for method in ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,):
                 methods[method] = endpoint.answer
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        methods = self._found.get(path_of(scope))
+    def __call__(self, path: str, method: str) -> Answer | None:
+        """The function that answers; None for a path of no endpoint."""
+        methods = self._found.get(path)
         if methods is None:
-            await self._others(scope, receive, send)
-            return
-        answer = methods.get(scope["method"])
-        if answer is None:
-            allowed = ", ".join(sorted(methods))
-            told = f"{scope['method'][:20]} is not allowed here; allowed: {allowed}"
-            raise HTTPException(405, told, {"Allow": allowed})
-        response = await answer(Request(scope, receive, send))
-        await response(scope, receive, send)
+            return None
+        if method in methods:
+            return methods[method]
+        allowed = ", ".join(sorted(methods))
+        told = f"{method[:20]} is not allowed here; allowed: {allowed}"
+        raise HTTPException(405, told, {"Allow": allowed})
 
 
 def path_of(scope: Scope) -> str:
@@ -131,28 +131,28 @@ def path_of(scope: Scope) -> str:
 
 
 class Asking(NamedTuple):
-    """What a request asks: the table, the options, the case, and what it is."""
+    """What a request asks: the table, the options, the case, and what is asked of it."""
 
     table: LoadedTable
     form: Any
     case: dict[str, Any]
-    asked: Asked
+    wanted: Wanted
 
     @classmethod
     async def of(cls, request: Request, model: type[Options], wanted: str = "", one: bool = False) -> "Asking":
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
-        given = await given_in_body(request) if request.method == "POST" else given_in_query(request)
-        name = given.get(wanted, model.model_fields[wanted].default) if wanted else None
-        found = read_form(model, given, [name] if name in NAMES else [], one=one)
-        return cls(request.app.state.tables.pick(found[0].tolerance), *found)
+        given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
+        name = wanted and given.get(wanted, model.model_fields[wanted].default)
+        found = read_form(model, given, [name] if name and name in NAMES else [], one=one)
+        return cls(request.app.tables.pick(found[0].tolerance), *found)
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
-    if headers.get(b"content-type") != _JSON.encode() or b"content-encoding" in headers:
+    if headers.get(b"content-type") != _AS_JSON or b"content-encoding" in headers:
         media_type_of(headers, {_JSON: _JSON})
-    limit = min(SMALL_BODY, request.app.state.settings.max_body_bytes)
+    limit = min(SMALL_BODY, request.app.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):
         refuse([FieldFault((), "must be a JSON object", found)])
@@ -210,14 +210,30 @@ def _number(text: str) -> Any:
 # --- responses ------------------------------------------------------------------------------------------
 
 
+class Reply(Response):
+    """A complete answer; Starlette's own looks for what the headers may lack, which takes as long as a case."""
+
+    background = None
+
+    def __init__(self, content: bytes, headers: Mapping[str, str], media_type: str) -> None:
+        self.status_code, self.body = 200, content
+        self.raw_headers = [(b"content-length", b"%d" % len(content)), (b"content-type", media_type.encode())]
+        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        del scope, receive
+        await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+        await send({"type": "http.response.body", "body": self.body})
+
+
 def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> Response:
     """A complete answer."""
-    return Response(content, headers=headers, media_type=media_type)
+    return Reply(content, headers or {}, media_type)
 
 
 async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
     """The answer to the question of a person, made in a thread."""
-    answer: Response = await request.app.state.work.question(work)
+    answer: Response = await request.app.work.question(work)
     return answer
 
 

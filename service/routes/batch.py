@@ -14,7 +14,7 @@ from starlette.types import Receive, Scope, Send
 
 from mumacro.errors import MumacroError
 
-from ..answers import answer_case, cost_of
+from ..answers import answer_case
 from ..case import Columns
 from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
 from ..options import Options, options_of, read_form
@@ -36,11 +36,11 @@ class _Answer(Response):
     background = None
 
     def __init__(self, request: Request) -> None:
-        self._request, self._state = request, request.app.state
+        self._request, self._app = request, request.app
         self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
-        self._work: Work = request.app.state.work
-        self._limit: int = self._state.settings.max_body_bytes
-        self._most: int = self._state.settings.max_batch
+        self._work: Work = request.app.work
+        self._limit: int = self._app.settings.max_body_bytes
+        self._most: int = self._app.settings.max_batch
         self._placed = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -76,9 +76,9 @@ class _Answer(Response):
         options, _, faults = options_of(Options, self._both(given))
         if options is None:
             refuse(faults)
-        options.check(columns.asked)
-        table = self._state.tables.pick(options.tolerance, "tolerance" in self._query)
-        return Batch(table, columns, options.names(), options.deviations(), count=self._state.metrics.cases)
+        wanted = options.wanted(columns.asked)
+        table = self._app.tables.pick(options.tolerance, "tolerance" in self._query)
+        return Batch(table, columns, wanted, count=self._app.metrics.cases)
 
     def _both(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """What the query and the body give, each name once."""
@@ -97,7 +97,7 @@ class _Answer(Response):
         columns, given = await self._run(lambda: form.read(text, self._most, self._query), cost)
         text = bytearray()  # freed, unless the columns are views of it
         batch = self._batch(columns, given)
-        cost += columns.size * cost_of(batch.include, columns.asked)
+        cost += columns.size * batch.wanted.cost
         pieces = _gathered(form.write(batch))
         piece, following = await self._run(lambda: (next(pieces, b""), next(pieces, None)), cost)
         headers = [(b"content-type", form.media_type.encode()), (b"x-table", batch.table.id.encode("latin-1"))]
@@ -119,7 +119,7 @@ class _Answer(Response):
         text = bytearray()
         if not more:
             text = await self._work.client(read_body(self._given, receive, self._limit, self._place))
-        self._state.tables.pick(self._query.get("tolerance"), parameter=True)
+        self._app.tables.pick(self._query.get("tolerance"), parameter=True)
         head = [(b"content-type", form.media_type.encode()), (b"x-accel-buffering", b"no")]
         await send({"type": "http.response.start", "status": 200, "headers": head})
         number = 0
@@ -165,10 +165,10 @@ class _Answer(Response):
         """The answer to one case of a stream, where a null is a gap."""
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
-        options, case, asked = read_form(Options, self._both(given), null_is_rigid=False)
-        table = self._state.tables.pick(options.tolerance)
-        values, source = answer_case(table.surrogate, case, options.names(), options.deviations(), asked)
-        self._state.metrics.case(table, source)
+        options, case, wanted = read_form(Options, self._both(given), null_is_rigid=False)
+        table = self._app.tables.pick(options.tolerance)
+        values, source = answer_case(table.surrogate, case, wanted)
+        self._app.metrics.case(table, source)
         return dump({**values, **table.signature})
 
 

@@ -7,7 +7,7 @@ from starlette.responses import Response
 
 from mumacro.validity import digits, k_effect, model_rows
 
-from ..answers import answer_case, cost_of
+from ..answers import answer_case
 from ..models import CaseAnswer, model
 from ..options import MODEL, CaseRequest, Options, bounded
 from ..problems import FieldFault, refuse
@@ -28,20 +28,20 @@ class TextOptions(Options):
 
 async def _answered(request: Request, asking: type[Options] = Options) -> tuple[Any, dict[str, Any]]:
     """The options and the answer."""
-    table, form, case, asked = await Asking.of(request, asking, one=True)
-    include, state, told = form.names(), request.app.state, MODEL in (form.include or ())
+    table, form, case, wanted = await Asking.of(request, asking, one=True)
+    app, told = request.app, MODEL in (form.include or ())
 
     def answer() -> tuple[dict[str, Any], int]:
-        values, source = answer_case(table.surrogate, case, include, form.deviations(), asked)
+        values, source = answer_case(table.surrogate, case, wanted)
         if told:  # rows of docs/validity.md, and the digits that k supports
-            words, surrogate = asked.kind.names, table.surrogate
+            words, surrogate = wanted.asked.kind.names, table.surrogate
             values["model"] = model_rows(surrogate, case, **words)
             values["digits"] = digits(k_effect(surrogate, case, **words))
         return values, source
 
-    large = told or cost_of(include, asked) > _LARGE
-    values, source = await state.work.question(answer) if large else answer()
-    state.metrics.case(table, source)
+    large = told or wanted.cost > _LARGE
+    values, source = await app.work.question(answer) if large else answer()
+    app.metrics.case(table, source)
     return form, {**values, **table.signature}
 
 
@@ -52,7 +52,7 @@ async def post_mu_macro(request: Request) -> Response:
 
 async def get_mu_macro(request: Request) -> Response:
     """Answer one case given as a query.  The answer can be cached."""
-    return reply(dump((await _answered(request))[1]), request.app.state.settings.cache_fields)
+    return reply(dump((await _answered(request))[1]), request.app.settings.cache_fields)
 
 
 async def get_mu_macro_text(request: Request) -> Response:
@@ -65,7 +65,7 @@ async def get_mu_macro_text(request: Request) -> Response:
         told = f"is not in the answer; there are: {', '.join(answer)}; more with include"
         refuse([FieldFault.of("value", told, form.value)])
     text = found.encode() if isinstance(found, str) else dump(found)
-    return reply(text, request.app.state.settings.cache_fields, "text/plain; charset=utf-8")
+    return reply(text, request.app.settings.cache_fields, "text/plain; charset=utf-8")
 
 
 _KEPT = {"description": "How long, and by whom, it may be cached", "schema": {"type": "string"}}

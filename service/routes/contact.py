@@ -102,7 +102,7 @@ async def post_fit(request: Request) -> Response:
         faults += [FieldFault.of(wrong, stranger(wrong, Asked(form.kind), ()))] if wrong in columns else []
     if form is None or faults:
         refuse(faults)
-    table = request.app.state.tables.pick(form.tolerance)
+    table = request.app.tables.pick(form.tolerance)
     return await in_thread(request, lambda: reply(dump(_answer(table, form, columns))))
 
 

@@ -33,7 +33,7 @@ async def _docs(request: Request) -> Response:
 
 
 async def _description(request: Request) -> Response:
-    return await in_thread(request, lambda: reply(request.app.state.openapi))
+    return await in_thread(request, lambda: reply(request.app.described))
 
 
 ENDPOINTS = [

@@ -32,7 +32,7 @@ def asset(path: Path, media_type: str, url: str, headers: dict[str, str]) -> End
 
 async def _names(request: Request) -> Response:
     """The library's inputs, units and bounds, the geometries of a contact, and what this service can do."""
-    guide = ["guide"] if request.app.state.settings.guide is not None else []
+    guide = ["guide"] if request.app.settings.guide is not None else []
     paths = {getattr(route, "path", "").removeprefix("/v1/") for route in request.app.routes}
     panels = [name for name in ("stiffness", "fit") if name in paths]
     return reply(dump(names(["service", *CaseRequest.model_fields, *panels, *guide])), _FRESH)
@@ -40,7 +40,7 @@ async def _names(request: Request) -> Response:
 
 async def _map(request: Request) -> Response:
     """The data of the map: mu~ on a grid, rows of constant y~ from below, and the border."""
-    surrogate = request.app.state.tables.pick().surrogate
+    surrogate = request.app.tables.pick().surrogate
     etag = f'"{surrogate.checksum[:32]}-{__version__}"'
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):

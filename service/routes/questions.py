@@ -14,7 +14,7 @@ from mumacro.inputs import field_of, unit_of
 from mumacro.inverse import Solution, solve_for
 from mumacro.law import APPROXIMATIONS, BORDERS, Law, approximations, border_speeds, friction_law, sweep_values
 
-from ..answers import DEFAULT, REGIME_NAMES, Part, answer_columns, nested, parts_of
+from ..answers import REGIME_NAMES, Part, answer_columns, nested
 from ..models import Answered, default, grouped, included, many, model, optional, told
 from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes, relation
 from ..wire.json import dump
@@ -75,12 +75,13 @@ async def get_law_csv(request: Request) -> Response:
 
 def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     """The library's law and all columns beside the swept input."""
-    (table, form, case, asked), (along, per) = found, field_of(found.form.along)
+    (table, form, case, wanted), (along, per) = found, field_of(found.form.along)
+    asked = wanted.asked
     values = sweep_values(along, form.start * per, form.stop * per, form.points, form.scale)
     law = friction_law(table.surrogate, along, values, case, **asked.kind.names)
     six = [values if name == along else np.array([case[name]]) for name in asked.fields]
-    answer, _ = answer_columns(table.surrogate, six, values.size, form.names(), form.deviations(), asked)
-    answer[_STATIC.path], parts = law.mu_static, [*parts_of(form.names(), asked), _STATIC]
+    answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
+    answer[_STATIC.path], parts = law.mu_static, [*wanted.parts, _STATIC]
     if _APPROXIMATIONS in (form.include or ()):
         for group, made in ((_APPROXIMATIONS, approximations), (_SPEEDS, border_speeds)):
             answer |= {f"{group}.{name}": column for name, column in made(table.surrogate, law).items()}
@@ -150,12 +151,14 @@ async def post_solve_for(request: Request) -> Response:
 
 
 def _solved(found: Asking) -> dict[str, Any]:
-    (table, form, case, asked), (name, per) = found, field_of(found.form.unknown)
+    (table, form, case, wanted), (name, per) = found, field_of(found.form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    if asked.interval:  # which is refused, by the name that the user gave
+    if wanted.asked.interval:  # which is refused, by the name that the user gave
         case = {**case, "k_range": (case["k_low"], case["k_high"])}
-    solution = solve_for(table.surrogate, name, [x * unit for x in form.target], case, within, **asked.kind.names)
+    solution = solve_for(
+        table.surrogate, name, [x * unit for x in form.target], case, within, **wanted.asked.kind.names
+    )
     reach, more = solution.reach, iter(_included(found, name, solution))
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
@@ -180,15 +183,14 @@ def _solved(found: Asking) -> dict[str, Any]:
 
 def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:
     """The included quantities of every root, in order."""
-    (table, form, case, asked), include = found, found.form.names()
+    table, _, case, wanted = found
     values = np.array([root.value for roots in solution.roots for root in roots])
-    if not include or not values.size:
+    if not wanted.include or not values.size:
         return [{}] * values.size
-    six = [values if name == unknown else np.array([case[name]]) for name in asked.fields]
-    answer, _ = answer_columns(table.surrogate, six, values.size, include, form.deviations(), asked)
-    paths = [part.path for part in parts_of(include, asked)[len(DEFAULT) :]]
-    rows = zip(*(answer[path].tolist() for path in paths), strict=True)
-    return [nested(dict(zip(paths, row, strict=True))) for row in rows]
+    six = [values if name == unknown else np.array([case[name]]) for name in wanted.asked.fields]
+    answer, _ = answer_columns(table.surrogate, six, values.size, wanted)
+    rows = zip(*(answer[path].tolist() for path in wanted.more), strict=True)
+    return [nested(dict(zip(wanted.more, row, strict=True))) for row in rows]
 
 
 def _reason(form: SolveForOptions, target: float, solution: Solution, unit: float) -> str:

@@ -28,7 +28,7 @@ def _chosen(request: Request) -> LoadedTable:
         choice = Table.model_validate(given_in_query(request))
     except ValidationError as error:
         refuse(faults_of(error, Table, Table.model_fields))
-    table: LoadedTable = request.app.state.tables.pick(choice.tolerance)
+    table: LoadedTable = request.app.tables.pick(choice.tolerance)
     return table
 
 
@@ -40,7 +40,7 @@ async def get_table(request: Request) -> Response:
     others = {
         "file": surrogate.path.name,
         "size_bytes": table.size_bytes,
-        "loaded": [other.label for other in request.app.state.tables.loaded],
+        "loaded": [other.label for other in request.app.tables.loaded],
         "service_version": __version__,
     }
     return reply(dump({**answer, **others, **table.signature}))

@@ -13,7 +13,7 @@ import numpy as np
 
 from mumacro.contact import Kind as ContactKind
 
-from ..answers import Codes, Part, answer_columns, parts_of
+from ..answers import Codes, Part, Wanted, answer_columns
 from ..case import MAX_ERRORS, Columns, asked_of, faults_in, names_of, stranger
 from ..problems import FieldFault, refuse
 from ..tables import LoadedTable
@@ -39,8 +39,7 @@ class Batch:
 
     table: LoadedTable
     columns: Columns
-    include: Sequence[str] = ()
-    std: Mapping[str, float] = field(default_factory=dict)
+    wanted: Wanted
     errors: list[dict[str, Any]] = field(default_factory=list)
     n_errors: int = 0
     count: Callable[[LoadedTable, Codes], None] = lambda _table, _source: None
@@ -48,7 +47,7 @@ class Batch:
     @property
     def parts(self) -> list[Part]:
         """The columns of the answers."""
-        return parts_of(self.include, self.columns.asked)
+        return self.wanted.parts
 
     def slices(self, step: int) -> Iterator[tuple[dict[str, Any], Codes, list[str | None]]]:
         """Columns by path, source codes and faults of ``step`` cases after another; a bad case has NaN and -1.
@@ -59,7 +58,7 @@ class Batch:
         for start in range(0, max(size, 1), step):
             n = min(step, size - start)
             six = self.columns.part(start, start + n)
-            found, source = answer_columns(self.table.surrogate, six, n, self.include, self.std, self.columns.asked)
+            found, source = answer_columns(self.table.surrogate, six, n, self.wanted)
             self.count(self.table, source)
             faults: list[str | None] = [None] * n
             for index in np.flatnonzero(source < 0).tolist():

@@ -63,12 +63,13 @@ def decode(text: bytes | bytearray, large: bool = False) -> Any:
     """A JSON text as Python objects.  NaN and Infinity are read; their fields are refused later."""
     if not text:
         raise RequestError(Kind.MALFORMED_BODY, "the body is empty")
-    if not large:
-        with suppress(ValueError):
-            quick = orjson.loads(text)
-            # One colon for each member: none is named twice, and none stands in an object within.
-            if type(quick) is dict and text.count(b":") == len(quick):
-                return quick
+    try:
+        quick = None if large else orjson.loads(text)
+        # One colon for each member: none is named twice, and none stands in an object within.
+        if type(quick) is dict and text.count(b":") == len(quick):
+            return quick
+    except ValueError:
+        pass  # _DECODER gives the reason
     try:
         return _DECODER.decode(text.decode())
     except RecursionError:
