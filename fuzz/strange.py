@@ -240,7 +240,7 @@ FIELDS = (
     (b"expect", (b"x",)),
 )
 PATHS = (
-    *GETS, "/", "/docs", "/livez", "/readyz", "/metrics", "/openapi.json", "/Info", "/nowhere", "/v1/",
+    *GETS, "/", "/docs", "/livez", "/readyz", "/healthz", "/metrics", "/openapi.json", "/Info", "/nowhere", "/v1/",
     "//", "/static/page/main.js", "/static/page/map.json", "/static/page/../x", "/v1/mu-macro/batch/csv", "/%00",
     "/\u00e9",
 )  # fmt: skip

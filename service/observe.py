@@ -39,7 +39,7 @@ from .tables import LoadedTable, Tables
 
 __all__ = ["LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
 
-HEALTH_PATHS = frozenset({"/livez", "/readyz"})
+HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 _SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
 _BUCKETS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)

@@ -16,7 +16,7 @@ FILES = {
 }  # fmt: skip
 PATHS = {
     **dict.fromkeys(("/v1/mu-macro/batch", "/v1/solve-for", "/v1/law", "/v1/stiffness", "/v1/fit"), "POST"),
-    **dict.fromkeys(("/v1/mu-macro.txt", "/v1/law.csv", "/v1/table", "/v1/table.nc", "/livez", "/readyz",
+    **dict.fromkeys(("/v1/mu-macro.txt", "/v1/law.csv", "/v1/table", "/v1/table.nc", "/livez", "/readyz", "/healthz",
                      "/metrics", "/docs", "/openapi.json"), "GET, HEAD"),
     "/v1/mu-macro": "GET, HEAD, POST",
 }  # fmt: skip
@@ -91,7 +91,7 @@ NO_KEY = [
 
 
 def test_every_route_but_the_pages_and_the_probes_needs_the_key(closed: Any, problem: Any) -> None:
-    open_to_all = {"/livez", "/readyz", "/", "/docs", "/static/page/names.json", *FILES}
+    open_to_all = {"/livez", "/readyz", "/healthz", "/", "/docs", "/static/page/names.json", *FILES}
     described = closed.get("/openapi.json", headers=KEY).json()
     assert described["security"] == [{"key": []}, {"bearer": []}]
     assert set(described["paths"]) <= set(PATHS)

@@ -9,6 +9,8 @@ import pytest
 from mumacro import Surrogate, TableError
 from tests.cases import Case
 
+HEALTH = ("/readyz", "/healthz")
+
 
 @pytest.fixture
 def table_copy(surrogate: Surrogate, tmp_path: Path) -> Any:
@@ -56,12 +58,13 @@ def test_the_file_is_the_table(client: Any, surrogate: Surrogate) -> None:
     assert client.head("/v1/table.nc").headers["content-length"] == str(len(response.content))
 
 
-def test_ready_means_loaded(client: Any, surrogate: Surrogate) -> None:
-    response = client.get("/readyz")
+@pytest.mark.parametrize("path", HEALTH)
+def test_ready_means_loaded(client: Any, surrogate: Surrogate, path: str) -> None:
+    response = client.get(path)
     assert (response.status_code, response.json()["status"]) == (200, "ready")
     assert {"id": surrogate.id, "tolerance": surrogate.tolerance} in response.json()["tables"]
     assert response.headers["cache-control"] == "no-store"
-    assert client.head("/readyz").status_code == 200
+    assert client.head(path).status_code == 200
 
 
 def flip_a_bit(path: Any) -> None:
@@ -87,7 +90,7 @@ def test_an_unusable_table_leaves_the_process_alive_and_not_ready(
     with started(tables=(table_copy,)) as client:
         alive = client.get("/livez")
         assert (alive.status_code, alive.json()["status"]) == (200, "alive")
-        for path in ("/readyz", "/v1/table", "/v1/table.nc"):
+        for path in (*HEALTH, "/v1/table", "/v1/table.nc"):
             response = client.get(path)
             assert table_copy.name in problem(response, 503)["detail"]
             assert response.headers["retry-after"] == "5"

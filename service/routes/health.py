@@ -1,4 +1,4 @@
-"""Health: ``/livez`` (the process answers), ``/readyz`` (answers are correct); and ``/metrics``."""
+"""Health: ``/livez`` (the process answers), ``/readyz`` and ``/healthz`` (answers are correct); and ``/metrics``."""
 
 from prometheus_client import CONTENT_TYPE_LATEST
 from starlette.requests import Request
@@ -27,6 +27,11 @@ async def readyz(request: Request) -> Response:
     return reply(dump({"status": "ready", "tables": [table.label for table in tables.loaded], **_VERSIONS}), _NO_STORE)
 
 
+async def healthz(request: Request) -> Response:
+    """Answer as /readyz."""
+    return await readyz(request)
+
+
 async def get_metrics(request: Request) -> Response:
     """Return the counters of all worker processes, in the text form of Prometheus."""
     text = await request.app.work.question(request.app.metrics.text)
@@ -40,5 +45,6 @@ _TEXT = {
 ENDPOINTS = [
     Endpoint("/livez", "GET", livez, "The process is alive", model=Health, tag="health", open=True),
     Endpoint("/readyz", "GET", readyz, "The service is ready", model=Health, statuses=(503,), tag="health", open=True),
+    Endpoint("/healthz", "GET", healthz, "As /readyz", model=Health, statuses=(503,), tag="health", open=True),
     Endpoint("/metrics", "GET", get_metrics, "Counters for Prometheus", content={200: _TEXT}, tag="health"),
 ]  # fmt: skip
