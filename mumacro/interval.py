@@ -98,7 +98,7 @@ def extremes(
     ``evaluate(k, places)`` gives (mu_macro, its bound, d mu_macro / d ln k) of cases ``places`` with stiffnesses ``k``.
     """
     places = np.arange(low.size)
-    ratio = np.log(high / low)
+    ratio = np.log(high) - np.log(low)  # high/low may be beyond double range
     largest = float(np.nanmax(ratio, initial=0.0))
     count = 1 + max(1, math.ceil(largest / SPACING)) if largest > 0.0 else 1
     least, most, bound = np.full(low.size, np.inf), np.full(low.size, -np.inf), np.zeros(low.size)
@@ -119,13 +119,14 @@ def extremes(
 
     before, (mu_before, slope_before) = low, take(low, places)
     for i in range(1, count):
-        here = high if i == count - 1 else low * np.exp(ratio * (i / (count - 1)))
+        share = i / (count - 1)
+        here = high if i == count - 1 else low ** (1.0 - share) * high**share
         mu, slope = take(here, places)
         turns = np.flatnonzero(slope_before * slope < 0.0)
         close_in(before[turns], here[turns], slope_before[turns], turns)
-        share = _between(mu - mu_before, slope_before * np.log(here / before), slope * np.log(here / before))
-        pairs = np.flatnonzero(share > 0.0)
-        inside = before[pairs] * (here[pairs] / before[pairs]) ** share[pairs]
+        place = _between(mu - mu_before, slope_before * np.log(here / before), slope * np.log(here / before))
+        pairs = np.flatnonzero(place > 0.0)
+        inside = before[pairs] * (here[pairs] / before[pairs]) ** place[pairs]
         turned = take(inside, pairs)[1] * slope[pairs] < 0.0 if pairs.size else pairs > 0
         pairs, inside = pairs[turned], inside[turned]
         close_in(before[pairs], inside, slope_before[pairs], pairs)

@@ -130,7 +130,7 @@ INTERVAL = (
 )
 _NAMES = tuple(part.path for part in DEFAULT)
 _six = itemgetter(*FIELDS)
-_COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 40.0}  # in times of one spring, across, at one k
+_COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}  # in times of one spring, across, at one k
 QUANTITIES: dict[str, Quantity] = {}
 
 
