@@ -9,9 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tests.cases import Case
+
 PATIENCE_S = 120  # a browser on a busy machine can be slow
 #: the case that the page starts with
-START = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
+START: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
 
 #: the service as it is; what it is asked is kept, for Page.asked
 RECORDED = """(path, options = {}) => {
@@ -54,7 +56,8 @@ class Opened:
     """Opens a state of the page by its address; loads a new document only if needed."""
 
     def __init__(self, browser: Any, url: Any) -> None:
-        self.browser, self.url, self.shown = browser, url, None
+        self.browser, self.url = browser, url
+        self.shown: Any = None
 
     def __call__(
         self,

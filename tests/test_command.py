@@ -18,11 +18,11 @@ from mumacro.__main__ import COMMANDS, main
 from mumacro.geometries import GEOMETRIES, contact_of
 from mumacro.inputs import NAMES, SI, UNITS_OF, read_number, scale_of, split_unit, suggestion
 from mumacro.validity import model_rows
-from tests.cases import Capture
+from tests.cases import Capture, Case
 from tests.comparing import close
 
 CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
-VALUES = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
+VALUES: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +213,13 @@ def test_a_law_along_the_frequency_is_one_along_omega(capsys: Capture) -> None:
 def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
     capsys: Capture, tightest: Surrogate
 ) -> None:
-    case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-5, "omega": 1e5, "v0": 0.02}  # r = 100: mu_macro rises and falls along k
+    case: Case = {
+        "mu0": 0.3,
+        "Fz": 10.0,
+        "y0": 2e-5,
+        "omega": 1e5,
+        "v0": 0.02,
+    }  # r = 100: mu_macro rises and falls along k
     words = "mu0=0.3 Fz=10N k=0.1..100 N/um y0=20um omega=1e5 v0=2cm/s"
     found = json.loads(said(capsys, 0, words, "--json"))
     k = np.geomspace(1e5, 1e8, 20_001)
@@ -230,7 +236,7 @@ def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
 
 
 NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
-KINDS = {
+KINDS: dict[str, tuple[str, Case, Case]] = {
     "ball": (CASE, {"contact": "ball"}, {}), "along": (CASE, {"direction": "along"}, {}),
     "ball along": (CASE, {"contact": "ball", "direction": "along"}, {}),
     "normal": (NORMAL, {"direction": "normal"}, {"Fz_amplitude": 1.0}),
@@ -336,7 +342,7 @@ def test_fit_is_that_of_the_library(
 ) -> None:
     pytest.importorskip("scipy")
     path, points = measured
-    known = {name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns}
+    known: Case = {name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns}
     words = [*RIG, *(f"{name}={value!r}" for name, value in known.items()), "--contact", "ball"]
     expected = fit(points, unknowns, contact="ball", Fz=10.0, y0=2e-6, f=20e3, **known)
     found = json.loads(said(capsys, 0, "fit", str(path), "--unknown", *unknowns, *words, "--json"))

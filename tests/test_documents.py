@@ -71,7 +71,7 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Sur
             ends = [*whole]
             if inner := re.search(r"(up to|from) \$\\tilde\{y\} = ([\d.]+)\$", told):
                 ends[inner[1] == "up to"] = float(inner[2])
-            y = np.geomspace(*ends, 4001)
+            y = np.geomspace(ends[0], ends[1], 4001)
             y[[0, -1]] = ends
             off = np.abs(borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0).max()
             figure = float(re.findall(r"\d[\d.e-]*", told)[0])  # "12.6 %" is 0.126
@@ -81,7 +81,8 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Sur
 
 def test_the_deviations_of_the_border_are_those_of_the_page_on_validation(surrogate: Surrogate) -> None:
     page = (DOCS / "validation.md").read_text("utf-8")
-    head, *lines = re.search(r"^\| deviation \[%\] at .*?\n\n", page, re.MULTILINE | re.DOTALL)[0].splitlines()
+    (found,) = re.findall(r"^\| deviation \[%\] at .*?\n\n", page, re.MULTILINE | re.DOTALL)
+    head, *lines = found.splitlines()
     y = np.array([float(cell) for cell in head.split("|")[2:-1]])
     formulas = {"(23)": "eq_23", "(24), (39)": "eq_24", "(26) with 4.5": "eq_26", "(27)": "eq_27",
                 "*two terms*": "small_amplitude", "*4.402914*": "large_amplitude", "*blend*": "blend"}  # fmt: skip
@@ -98,14 +99,15 @@ def test_the_deviations_of_the_border_are_those_of_the_page_on_validation(surrog
 def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: Surrogate) -> None:
     page = (DOCS / "validity.md").read_text("utf-8")
     pattern = r"the ball has ([\d.]+), one spring with \$k\$ ([\d.]+), with .* ([\d.]+): the ball"
-    ball, spring, softer = map(float, re.search(pattern, page).groups())
+    ball, spring, softer = map(float, re.findall(pattern, page)[0])
     assert surrogate.ratio_with_bound(0.05, 0.4, contact="ball")[0] == close(ball, abs=5e-5)
     assert surrogate.mu_ratio(0.05, 0.4) == close(spring, abs=5e-5)
     assert surrogate.mu_ratio(0.05 / 1.5, 0.4 / 1.5) == close(softer, abs=5e-5)
     heads, told = re.findall(r"^\| (?:\$\\tilde\{y\}\$|difference) \| (.*) \|$", page, re.MULTILINE)
     v = np.geomspace(1e-3, 1e3, 181)[:, None]
     for ends, difference in zip(heads.split(" | "), told.split(" | "), strict=True):
-        y = np.geomspace(*map(float, ends.split(" to ")), 41)
+        low, high = map(float, ends.split(" to "))
+        y = np.geomspace(low, high, 41)
         apart = np.abs(surrogate.ratio_with_bound(v, y, contact="ball")[0] - surrogate.mu_ratio(v, y)).max()
         assert float(difference) == close(apart, rel=0.15), ends
 

@@ -18,10 +18,10 @@ import pytest
 
 from mumacro import Surrogate
 from tests.comparing import close
+from tests.serving import CASE
 
 pytestmark = pytest.mark.slow
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 EXAMPLES = {
     "README.md", "curl.sh", "client.py", "spreadsheet.md", "octave.m", "octave_mat.m", "modelica.md", "uncertainty.py",
     "least_power.py", "casadi_least_power.py", "openmdao_component.py", "quasi_monte_carlo.py", "umbridge_server.py",
@@ -38,7 +38,7 @@ def run(repository: Path, *command: Any) -> Any:
     return done.stdout
 
 
-def need(name: str, *modules: Any) -> None:
+def need(name: str | None, *modules: Any) -> None:
     """Skip unless a program, or Python packages, are installed."""
     if name is not None and shutil.which(name) is None:
         pytest.skip(f"{name} is not installed")

@@ -14,8 +14,9 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 from mumacro import InputError, Surrogate  # noqa: E402 (after pyarrow was looked for)
 from mumacro.files import ANSWERS, FilesError, answer  # noqa: E402
 from mumacro.files.answering import find_columns  # noqa: E402
+from tests.cases import Case  # noqa: E402
+from tests.serving import CASE  # noqa: E402
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 NAMES = (*CASE,)
 GAP = "is missing; write rigid or a number"
 BEYOND = "is beyond double range"
@@ -185,7 +186,7 @@ def test_the_gradient_comes_with_the_answer(surrogate: Surrogate) -> None:
     columns["k"][3], columns["v0"][5] = math.inf, -1.0
     found, _ = answer(pa.RecordBatch.from_pydict(columns), surrogate, include=["gradient"])
     for i in (0, 3):
-        case = {name: float(column[i]) for name, column in columns.items()}
+        case: Case = {name: float(column[i]) for name, column in columns.items()}
         case["k"] = None if case["k"] == math.inf else case["k"]
         slopes = surrogate.evaluate(**case, gradient=True).gradient
         for name in NAMES:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from tests.cases import Capture
+from tests.cases import Capture, Case
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
@@ -25,7 +25,7 @@ from mumacro.files import ANSWERS, evaluate_files, reading  # noqa: E402
 NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
 HEADER = ",".join(NAMES)
 GOOD = "0.3,10,1e6,2e-6,1.3e5,0.01"
-CASE = dict(zip(NAMES, map(float, GOOD.split(",")), strict=True))
+CASE: Case = dict(zip(NAMES, map(float, GOOD.split(",")), strict=True))
 KINDS = ("csv", "csv.gz", "ndjson", "jsonl.gz", "parquet")
 MISSING_K = "is missing; write rigid or a number"
 
@@ -180,11 +180,12 @@ def test_standard_input_and_output(
     bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
     source, wanted = write(bad, tmp_path / f"cases.{kind}"), tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv")
     rejects = evaluate_files([source], wanted, surrogate).rejects
+    assert rejects
     with source.open("rb") as stream:
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(stream))
-        monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), write_through=True))
+        monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written := io.BytesIO(), write_through=True))
         assert main(["eval", "-", "-o", "-"]) == 3
-        assert sys.stdout.buffer.getvalue() == wanted.read_bytes()
+        assert written.getvalue() == wanted.read_bytes()
     assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
 
 
@@ -313,7 +314,7 @@ def test_a_field_that_begins_late_in_ndjson_is_not_lost(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reading, "ROWS", 10)
-    lines = [json.dumps({**CASE, **more}) for more in [{}] * 30 + [{"x": 1}]]
+    lines = [json.dumps(line) for line in [CASE] * 30 + [{**CASE, "x": 1}]]
     (tmp_path / "cases.ndjson").write_text("\n".join(lines))
     assert "'x' is in no earlier row" in ran(capsys, 1, tmp_path / "cases.ndjson", "-o", tmp_path / "out.csv")
     ran(capsys, 0, tmp_path / "cases.ndjson", "-o", tmp_path / "out.ndjson")
@@ -354,7 +355,7 @@ def test_folders_patterns_and_hive_names(tmp_path: Path, surrogate: Surrogate) -
 # --- contact, direction, an uncertain k -----------------------------------------------------------------
 
 ALIKE = {name: value for name, value in CASE.items() if name not in ("k", "y0", "omega")}
-KINDS = {
+ANSWERED: dict[str, tuple[Case, Case]] = {
     "ball": ({"contact": "ball"}, {"k": 1e6, "y0": 2e-6}), "along": ({"direction": "along"}, {"k": 1e6, "y0": 2e-6}),
     "normal": ({"direction": "normal"}, {"k": 1e6, "Fz_amplitude": 1.0}),
     "range": ({}, {"k_low": 0.8e6, "k_high": 1.2e6, "y0": 2e-6}),
@@ -364,11 +365,11 @@ KINDS = {
 
 @pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize("start", ["csv", "ndjson", "parquet"])
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", ANSWERED)
 def test_files_know_contact_direction_and_ends_of_k_as_the_library_does(
     tmp_path: Path, capsys: Capture, surrogate: Surrogate, start: Any, end: Any, name: str
 ) -> None:
-    kind, more = KINDS[name]
+    kind, more = ANSWERED[name]
     rng = np.random.default_rng(3)
     given = {field: value * rng.uniform(0.9, 1.1, 40) for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()}
     source, out, rows = tmp_path / f"cases.{start}", tmp_path / f"out.{end}", pa.table(given).to_pylist()

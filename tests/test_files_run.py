@@ -91,7 +91,7 @@ def assert_whole(out: Any, cases: Any) -> None:
 def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(
     tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, share: Any
 ) -> None:
-    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
+    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out, surrogate, share)
     assert not out.exists()
     summary = evaluate_files([source], out, surrogate, say=said.append)
@@ -106,7 +106,7 @@ def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(
 def test_finished_pieces_that_are_cut_or_changed_are_done_again(
     tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, harm: Any
 ) -> None:
-    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
+    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out, surrogate)
     part = tmp_path / f"out.{kind}.parts" / "log"
     data = part.read_bytes()
@@ -143,7 +143,7 @@ def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(
             return counted
 
         with monkeypatch.context() as patch:
-            for place, name in ((run, "put"), (run, "write_whole"), (run.Path, "unlink")):
+            for place, name in ((run, "put"), (run, "write_whole"), (Path, "unlink")):
                 patch.setattr(place, name, step(getattr(place, name)))
             try:
                 evaluate_files([source], out, surrogate)
@@ -263,7 +263,7 @@ def test_an_output_never_overwrites_an_input(
 def test_files_that_are_not_of_a_run_are_kept_and_a_second_run_to_one_output_is_refused(
     tmp_path: Path, surrogate: Surrogate, cases: Any, capsys: Capture
 ) -> None:
-    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", []
+    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", list[str]()
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
+from tests.cases import Case
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -58,7 +59,7 @@ print(json.dumps([
 
 def run(folder: Path, *command: Any) -> Any:
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    options = {"env": environment, "capture_output": True, "text": True, "timeout": 300, "check": False}
+    options: dict[str, Any] = {"env": environment, "capture_output": True, "text": True, "timeout": 300, "check": False}
     done = subprocess.run([sys.executable, *command], cwd=folder, **options)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -81,7 +82,7 @@ def test_it_is_typed(folder: Path) -> None:
 
 
 def test_its_answers_are_those_of_the_library(folder: Path, live_server: Any, surrogate: Surrogate) -> None:
-    case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+    case: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
     elastic, rigid = surrogate.evaluate(**case, v0=0.01), surrogate.evaluate(**{**case, "k": None}, v0=0.01).mu_macro
     law = surrogate.evaluate(**case, v0=np.geomspace(1e-3, 1.0, 7)).mu_macro.tolist()
     mu = elastic.mu_macro

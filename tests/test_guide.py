@@ -84,7 +84,8 @@ def environment(programs: Path) -> dict[str, str]:
 
 
 def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
-    return request.getfixturevalue("bare" if page.stem in BARE else "full")
+    found: Path = request.getfixturevalue("bare" if page.stem in BARE else "full")
+    return found
 
 
 def run(programs: Path, folder: Path, *words: str | Path) -> str:

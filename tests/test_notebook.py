@@ -11,9 +11,10 @@ import pytest
 
 from mumacro import MumacroError, Surrogate, fit
 from mumacro.fitted import Fit
+from tests.cases import Case
 from tests.comparing import close
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
 SPEEDS = np.geomspace(1e-3, 1.0, 30)
 
 
@@ -26,7 +27,7 @@ def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_fro
     monkeypatch.setenv("MPLBACKEND", "Agg")
     notebook = json.loads((repository / "examples" / "friction.ipynb").read_text("utf-8"))
     assert notebook["nbformat"] == 4
-    names = {}
+    names: dict[str, Any] = {}
     for i, cell in enumerate(notebook["cells"]):
         if cell["cell_type"] == "code":
             assert not cell["outputs"]

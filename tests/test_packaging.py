@@ -163,7 +163,7 @@ def test_the_development_command_sees_a_change_of_the_c_sources(
 
 @pytest.mark.slow
 def test_the_source_distribution_builds_and_its_tests_collect(repository: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path]
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
     subprocess.run(command, cwd=repository, check=True, capture_output=True)
     (archive,) = tmp_path.glob("*.tar.gz")
     with tarfile.open(archive) as opened:

@@ -16,11 +16,12 @@ from builder.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files
+from tests.cases import Case
 
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 from fuzz import answers, faults, tables
-from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE
+from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
 
 # --- untrusted tables --------------------------------------------------------------------------------
 
@@ -40,8 +41,8 @@ def test_a_hostile_file_is_refused_before_memory_is_taken(opened: dict[str, tabl
 
 @pytest.mark.parametrize("change", tables.CHANGES)
 def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
-    size = tables.SMALLEST.stat().st_size
-    images = {}
+    size = SMALLEST.stat().st_size
+    images: dict[int, bytes] = {}
     for start in range(0, size, 4096 if change == "cut" else 1201):
         images.update(tables.work(start, 1, change))
     assert len(images) > 30
@@ -79,7 +80,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate,
     def expected(v: float, y: float) -> float:
         r = np.sqrt(last) / (v / np.sqrt(y))
         layer = (solve(last / r, last).mu_ratio - float(outer(r))) * r
-        return float(outer(y / v)) + layer * (v / y)
+        return float(outer(y / v) + layer * (v / y))
 
     v = x * np.sqrt(y)
     found, bound, _ = table.ratio_with_bound(v, y)
@@ -93,7 +94,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate,
 
 def test_a_ratio_beyond_double_range_is_bounded(table: Surrogate) -> None:
     """y0 omega/v0 beyond double range: eq. (35) is 2.5e-306 there, not 0."""
-    case = {"mu0": 1.0, "Fz": 1.0, "k": None, "y0": 1.7976931348623157e308, "v0": 1e160}
+    case: Case = {"mu0": 1.0, "Fz": 1.0, "k": None, "y0": 1.7976931348623157e308, "v0": 1e160}
     inside, beyond = (table.evaluate(**case, omega=omega) for omega in (1e160, np.nextafter(1e160, 1e161)))
     assert inside.mu_ratio > 2.5e-306
     assert abs(inside.mu_ratio - beyond.mu_ratio) <= inside.error_bound + beyond.error_bound

@@ -117,7 +117,8 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client: Any
 
 
 def test_a_line_is_answered_like_a_batch_or_a_case(client: Any, case: Case) -> None:
-    columns, rows = {**case, "v0": [0.1, -1, 0.2]}, [case, 17]
+    columns: Case = {**case, "v0": [0.1, -1, 0.2]}
+    rows: Any = [case, 17]
     first, second, third = read("ndjson", posted(client, "ndjson", as_ndjson([columns, rows, case])))
     assert first == client.post(BATCH, json=columns).json()
     assert second == client.post(BATCH, json=rows).json()

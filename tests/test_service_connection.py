@@ -104,7 +104,7 @@ HEADS = [
 
 
 @pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
-def test_a_head_is_refused_with_its_status(raw: Any, text: str, status: Any) -> None:
+def test_a_head_is_refused_with_its_status(raw: Any, text: bytes, status: Any) -> None:
     raw.sendall(text)
     found, content = answer(raw)
     assert found == status
@@ -136,7 +136,7 @@ SLOW = {
 }
 
 
-def given_up(server: Any, text: str, drop: Any) -> Any:
+def given_up(server: Any, text: bytes, drop: Any) -> Any:
     """All that a client gets until it is disconnected."""
     received, until = b"", time.monotonic() + PATIENCE_S
     with connect(server) as raw, suppress(ConnectionError):
@@ -255,7 +255,7 @@ def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(
 def test_no_piece_of_a_stream_is_lost(raw: Any) -> None:
     # Lines end inside pieces and between pieces, and both directions are busy at the same time.
     lines = b"".join(json.dumps({**CASE, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))
-    answers = []
+    answers: list[Any] = []
     reader = threading.Thread(target=lambda: answers.extend(map(json.loads, answer(raw)[1].splitlines())))
     reader.start()
     raw.sendall(head(BATCH, None, NDJSON))
@@ -270,7 +270,8 @@ def test_no_piece_of_a_stream_is_lost(raw: Any) -> None:
 
 @pytest.mark.slow
 def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server: Any) -> None:
-    line, sizes, received = columns(1000) + b"\n", [], [0, b""]
+    line, sizes = columns(1000) + b"\n", []
+    received: list[Any] = [0, b""]
     with connect(live_server) as raw:
 
         def read() -> None:

@@ -8,17 +8,18 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.validity import digits, k_effect, model_rows
+from tests.cases import Case
 from tests.comparing import close
 from tests.forms import BATCH, as_csv, asked, posted, read
 
 PATH = "/v1/mu-macro"
 V0 = [0.0, 1e-3, 0.02, 0.26, 3.0]
-RIG = {"mu0": 0.3, "Fz": 10.0, "omega": 1.3e5}
+RIG: Case = {"mu0": 0.3, "Fz": 10.0, "omega": 1.3e5}
 NORMAL = {"k": 1e6, "Fz_amplitude": 4.0}
 ACROSS = {"k": 1e6, "y0": 2e-6}
 ENDS = {"k_low": 0.8e6, "k_high": 1.3e6}
 BALL = {"contact": "ball"}
-ASKED = {
+ASKED: dict[str, tuple[Case, Case]] = {
     "spring": ({}, ACROSS), "ball": (BALL, ACROSS), "rigid ball": (BALL, {"k": "rigid", "y0": 2e-6}),
     "along": ({"direction": "along"}, ACROSS), "ball along": ({**BALL, "direction": "along"}, ACROSS),
     "normal": ({"direction": "normal"}, NORMAL), "interval": ({}, {**ENDS, "y0": 2e-6}),

@@ -86,7 +86,7 @@ def test_cases_are_counted_by_source_and_regime(fresh: Any, case: Case, surrogat
     fresh.post(f"{PATH}/batch", content="\n".join(map(json.dumps, rows)), headers={"Content-Type": "application/jsonl"})
     fresh.post(f"{PATH}/batch", json={**case, "v0": [rows[4]["v0"]] * 1000})
     found = scrape(fresh)
-    expected = {}
+    expected: dict[tuple[str, ...], int] = {}
     for answer in [*answers * 3, answers[1], answers[2], *[answers[4]] * 1000]:
         key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
         expected[key] = expected.get(key, 0) + 1

@@ -135,8 +135,9 @@ def unread(repository: Path, surrogate: Surrogate) -> Any:
     words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
     process = subprocess.Popen(words, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert process.stdout is not None
     try:
-        lines = []
+        lines: list[bytes] = []
         while not (found := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")):
             lines.append(process.stdout.readline())
             assert lines[-1], b"".join(lines)

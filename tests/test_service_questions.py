@@ -13,6 +13,7 @@ import mumacro
 from mumacro import Surrogate
 from mumacro.geometries import contact_of
 from mumacro.law import APPROXIMATIONS, BORDERS
+from tests.cases import Case
 from tests.comparing import close
 from tests.serving import CASE
 
@@ -162,7 +163,7 @@ def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> 
 def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-3, 1.0, 20)
     mu = surrogate.evaluate({**CASE, "v0": v0}, contact="ball").mu_macro + 1e-3 * np.cos(17.0 * np.arange(20))
-    rig = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
+    rig: Case = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
     found = mumacro.fit({"v0": v0, "mu_macro": mu}, contact="ball", surrogate=surrogate, **rig)
     body = {"v0": v0.tolist(), "mu_macro": mu.tolist(), **rig, "contact": "ball"}
     answer = answered(client, "fit", body)

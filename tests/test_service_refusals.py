@@ -253,7 +253,7 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
      ("csv", "mu0,Fz,k,y0,omega,f,v0", "f: omega is given, too: give exactly one of omega")],
 )  # fmt: skip
 def test_columns_that_do_not_fit_are_refused(client: Any, problem: Any, form: Any, columns: Any, words: Any) -> None:
-    body = f"{columns}\r\n1\r\n"
+    body: Any = f"{columns}\r\n1\r\n"
     if form == "arrow":
         given = {**{name: [value] for name, value in CASE.items()}, **columns}
         body = stream_of(pa.record_batch({name: pa.array(x) for name, x in given.items() if x is not ...}))
@@ -326,7 +326,7 @@ def few(started: Any) -> Any:
         yield client
 
 
-FORMS = {
+FORMS: dict[str, tuple[str, Any]] = {
     "CSV": ("csv", as_csv), "CSV, CR": ("csv", lambda rows: as_csv(rows).replace("\r\n", "\r")),
     "CSV, LF": ("csv", lambda rows: as_csv(rows).replace("\r\n", "\n")), "rows": ("json", json.dumps),
     "rows with words": ("json", lambda rows: json.dumps([{**row, "k": "Rigid"} for row in rows])),

@@ -1,6 +1,7 @@
 """Tables behind the service: metadata, the file, choice by tolerance, health with and without them."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,7 @@ def flip_a_bit(path: Any) -> None:
     path.write_bytes(content)
 
 
-SPOILT = {
+SPOILT: dict[str, Callable[[Path], object]] = {
     "missing": Path.unlink,
     "truncated": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
     "empty": lambda path: path.write_bytes(b""),
