@@ -27,6 +27,11 @@ FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md"))
 
 
+def sections(*each: Callable[..., str]) -> dict[str, Callable[..., str]]:
+    """Sections for :func:`main` by the names of their functions."""
+    return {section.__name__: section for section in each}
+
+
 def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str) -> None:
     """The command line of a script: run its sections, print them, and with ``--write`` store them.
 

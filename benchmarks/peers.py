@@ -41,13 +41,8 @@ class Contender:
 
 def cache() -> Path:
     """Cache folder outside the source tree for solved grids; its name depends on the solver's source."""
-    folder = Path(builder.__file__).parent
-    digest = sha256(
-        b"".join(
-            (folder / f"{name}.py").read_bytes()
-            for name in ("model", "radau", "sections", "series", "steady", "stick", "sweep")
-        )
-    )
+    names = ("model", "radau", "sections", "series", "steady", "stick", "sweep")
+    digest = sha256(b"".join(Path(builder.__file__).with_name(f"{name}.py").read_bytes() for name in names))
     path = Path(tempfile.gettempdir()) / f"mumacro-benchmarks-{digest.hexdigest()[:16]}"
     path.mkdir(exist_ok=True)
     return path
@@ -62,13 +57,6 @@ def solve_grid(sweep: Sweep, n: int) -> Array:
     """mu~ on the plain grid of ``n`` x ``n`` nodes, axis 0 along v~."""
     axis = grid_axis(n)
     return sweep.solve("full", axis[:, None], axis[None, :])["mu_ratio"]
-
-
-def _pairs(v: Array, y: Array) -> Array:
-    out = np.empty((v.size, 2))
-    np.log(v, out=out[:, 0])
-    np.log(y, out=out[:, 1])
-    return out
 
 
 def _map_coordinates(x: Array, values: Array, order: Literal[1, 3]) -> Evaluate:

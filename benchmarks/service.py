@@ -8,7 +8,7 @@ in turn, so that other load slows all of them; figures are medians of the rounds
 
 from __future__ import annotations
 
-from benchmarks.measuring import FINEST, main, markdown  # isort: split
+from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
 
 import http.client
 import json
@@ -25,23 +25,21 @@ from typing import Any
 
 import numpy as np
 import orjson
+import pyarrow as pa
 
-from tests.serving import CASE, Server, running, serving
+from tests.forms import BATCH, TYPES, as_csv, stream_of
+from tests.serving import CASE, Server, asking, connect, head, running, serving
 
-BATCH = "/v1/mu-macro/batch"
 FIRST = ("taskset", "-c", "0")  # the processor of the servers
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
-KINDS = {
-    "columns": "application/json", "rows": "application/json", "lines": "application/x-ndjson", "csv": "text/csv",
-    "arrow": "application/vnd.apache.arrow.stream",
-}  # fmt: skip
+KINDS = {name: TYPES[form] for name, form in (
+    ("columns", "json"), ("rows", "json"), ("lines", "ndjson"), ("csv", "csv"), ("arrow", "arrow"))}  # fmt: skip
 
 
 def post(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
     """A request."""
     body = json.dumps(case).encode()
-    head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
-    return head.encode() + body
+    return head(path, len(body)) + body
 
 
 def get(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
@@ -64,8 +62,7 @@ FORMS = {
 def ask(server: Server, request: bytes, number: int, clients: int) -> None:
     """Send a request so many times on so many connections; every answer must be 200."""
     with ExitStack() as stack:
-        address = ("127.0.0.1", server.port)
-        made = [stack.enter_context(socket.create_connection(address, timeout=60)) for _ in range(clients)]
+        made = [stack.enter_context(connect(server)) for _ in range(clients)]
         for _ in range(number // clients):
             for raw in made:
                 raw.sendall(request)
@@ -84,9 +81,8 @@ def read(raw: socket.socket) -> None:
 
 def batch(server: Server, kind: str, body: bytes) -> None:
     """Send one batch and read the answer."""
-    with socket.create_connection(("127.0.0.1", server.port), timeout=120) as raw:
-        head = f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
-        sending = threading.Thread(target=raw.sendall, args=(head.encode() + body,))
+    with connect(server) as raw:
+        sending = threading.Thread(target=raw.sendall, args=(head(BATCH, len(body), kind) + body,))
         sending.start()
         read(raw)
         sending.join()
@@ -132,8 +128,6 @@ def single() -> str:
 
 def body_of(form: str, n: int) -> bytes:
     """A batch with all digits."""
-    import pyarrow as pa
-
     random = np.random.default_rng(n)
     table = {
         "mu0": random.uniform(0.1, 0.9, n), "Fz": 10 ** random.uniform(0, 2, n), "k": 10 ** random.uniform(5, 7, n),
@@ -146,14 +140,10 @@ def body_of(form: str, n: int) -> bytes:
         parts = ({name: column[i : i + 1000] for name, column in table.items()} for i in range(0, n, 1000))
         return b"".join(orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for part in parts)
     if form == "arrow":
-        sink, batch = pa.BufferOutputStream(), pa.record_batch(table)
-        with pa.ipc.new_stream(sink, batch.schema) as writer:
-            writer.write_batch(batch)
-        return bytes(sink.getvalue())
-    rows = zip(*(column.tolist() for column in table.values()), strict=True)
-    if form == "csv":
-        return "\r\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)]).encode()
-    return orjson.dumps([dict(zip(table, row, strict=True)) for row in rows])
+        return stream_of(pa.record_batch(table))
+    columns = (column.tolist() for column in table.values())
+    rows = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
+    return as_csv(rows).encode() if form == "csv" else orjson.dumps(rows)
 
 
 def batches() -> str:
@@ -177,21 +167,9 @@ def batches() -> str:
 
 def longest(server: Server, kind: str, body: bytes, number: int) -> float:
     """The longest of the waits for ``/livez`` on new connections while batches are answered [s]."""
-    waits: list[float] = []
-    stop = threading.Event()
-
-    def asking() -> None:
-        while not stop.wait(0.002):
-            started = time.perf_counter()
-            ask(server, b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n", 1, 1)
-            waits.append(time.perf_counter() - started)
-
-    thread = threading.Thread(target=asking)
-    thread.start()
-    for _ in range(number):
-        batch(server, kind, body)
-    stop.set()
-    thread.join()
+    with asking(server, 0.002) as waits:
+        for _ in range(number):
+            batch(server, kind, body)
     return max(waits)
 
 
@@ -207,8 +185,5 @@ def start() -> str:
     return markdown(("one worker, one table", ""), rows)
 
 
-SECTIONS = {"single": single, "batches": batches, "start": start}
-
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS)
+    main(__doc__, sections(single, batches, start))

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import json
 import resource
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
 from benchmarks.measuring import main, markdown
-from tests.serving import CASE, Server, connect, head, serving
+from tests.serving import CASE, Server, asking, connect, head, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
 EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
@@ -107,35 +106,12 @@ ATTACKS: dict[str, Callable[[Server, float], None]] = {
 }
 
 
-@contextmanager
-def asking(server: Server, waits: list[float]) -> Iterator[None]:
-    """Ask ``/livez`` again and again until the context ends; it must always answer 200."""
-    stop = threading.Event()
-
-    def ask() -> None:
-        while True:
-            started = time.perf_counter()
-            assert server.ask("GET", "/livez")[0] == 200
-            waits.append(time.perf_counter() - started)
-            if stop.wait(0.02):
-                return
-
-    with ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(ask)
-        try:
-            yield
-        finally:
-            stop.set()
-        asked.result()
-
-
 def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float, float]:
     """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve afterwards."""
-    waits: list[float] = []
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
     with serving() as server:
-        with asking(server, waits):
+        with asking(server) as waits:
             attack(server, share)
         assert server.ask("POST", "/v1/mu-macro", json.dumps(CASE))[0] == 200
         assert not server.errors(), server.errors()[:1]

@@ -9,14 +9,16 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-__all__ = ["CASE", "Server", "chunk", "connect", "head", "running", "serving", "to_end"]
+__all__ = ["CASE", "Server", "asking", "chunk", "connect", "head", "running", "serving", "to_end"]
 
 ROOT = Path(__file__).resolve().parent.parent
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -126,6 +128,26 @@ def running(command: Sequence[str], log: Path, **environment: str) -> Iterator[S
         yield server
     finally:
         server.kill()
+
+
+@contextmanager
+def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
+    """Ask ``/livez`` on new connections until the context ends; it must always answer 200.  The waits [s]."""
+    stop, waits = threading.Event(), list[float]()
+
+    def ask() -> None:
+        while not waits or not stop.wait(pause):
+            started = time.perf_counter()
+            assert server.ask("GET", "/livez")[0] == 200
+            waits.append(time.perf_counter() - started)
+
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(ask)
+        try:
+            yield waits
+        finally:
+            stop.set()
+        asked.result()
 
 
 # --- HTTP as bytes --------------------------------------------------------------------------------------
