@@ -147,38 +147,31 @@ def test_a_table_that_cannot_be_read_or_does_not_exist(capsys: Capture, tmp_path
     assert "tolerance" in said(capsys, 2, CASE, "--table", "-1")
 
 
+def ended(capsys: Capture, code: int, *words: str) -> str:
+    """What is said before the command line itself ends the process."""
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == code
+    return "".join(capsys.readouterr())
+
+
 @pytest.mark.parametrize("word", [*COMMANDS, ""])
 def test_every_command_explains_itself(capsys: Capture, word: Any) -> None:
     if word == "serve":
         pytest.importorskip("uvicorn")
-    with pytest.raises(SystemExit) as caught:
-        main([*([word] if word else []), "--help"])
-    assert caught.value.code == 0
-    text = capsys.readouterr().out
+    text = ended(capsys, 0, *word.split(), "--help")
     assert "usage: " in text
-    if word in ("", "law", "solve-for", "map"):
-        assert all(f"[{unit}]" in text for unit, _ in SI.values())
-    if word not in ("serve",):
-        assert "mumacro " + word in text
+    assert word == "serve" or f"mumacro {word}" in text
+    assert word not in ("", "law", "solve-for", "map") or all(f"[{unit}]" in text for unit, _ in SI.values())
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("--sideways",),
-        ("law", CASE, "--digits", "0"),
-        ("law", CASE, "--along", "v0", "1"),
-        ("law", CASE),
-        ("map", "--radius", "1"),
-        ("solve-for", "mass", CASE),
-        ("solve-for",),
-    ],
-)
+WRONG_OPTIONS = (("--sideways",), ("law", CASE, "--digits", "0"), ("law", CASE, "--along", "v0", "1"), ("law", CASE),
+                 ("map", "--radius", "1"), ("solve-for", "mass", CASE), ("solve-for",))  # fmt: skip
+
+
+@pytest.mark.parametrize("words", WRONG_OPTIONS)
 def test_wrong_options_are_reported_in_one_line(capsys: Capture, words: Any) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(words)
-    assert caught.value.code == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert len(ended(capsys, 2, *words).splitlines()) == 1
 
 
 def test_a_law_runs_along_any_input_and_marks_the_border(capsys: Capture, tightest: Surrogate) -> None:
@@ -200,14 +193,14 @@ def test_a_law_runs_along_any_input_and_marks_the_border(capsys: Capture, tighte
 
 def test_a_law_along_the_frequency_is_one_along_omega(capsys: Capture) -> None:
     known = CASE.replace("f=20690", "")
-    over_f = json.loads(said(capsys, 0, "law", known, "--along", "f", "100", "1e5", "--json"))
+    words = ("law", known, "--along", "f", "100", "1e5")
+    over_f = json.loads(said(capsys, 0, *words, "--json"))
     ends = (repr(math.tau * 100), repr(math.tau * 1e5))
     over_omega = json.loads(said(capsys, 0, "law", known, "--along", "omega", *ends, "--json"))
     assert over_f["mu_macro"] == over_omega["mu_macro"]
-    np.testing.assert_allclose(np.array(over_f["f"]) * math.tau, over_omega["omega"], rtol=1e-15)
+    assert np.array(over_f["f"]) * math.tau == close(np.array(over_omega["omega"]), rel=1e-15)
     assert over_f["border"][0]["f"] * math.tau == close(over_omega["border"][0]["omega"], rel=1e-14)
-    text = said(capsys, 0, "law", known, "--along", "f", "100", "1e5", "--approximations")
-    assert "small_amplitude" in text
+    assert "small_amplitude" in said(capsys, 0, *words, "--approximations")
 
 
 def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
@@ -222,8 +215,7 @@ def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
     }  # r = 100: mu_macro rises and falls along k
     words = "mu0=0.3 Fz=10N k=0.1..100 N/um y0=20um omega=1e5 v0=2cm/s"
     found = json.loads(said(capsys, 0, words, "--json"))
-    k = np.geomspace(1e5, 1e8, 20_001)
-    mu = tightest.evaluate(**case, k=k).mu_macro
+    mu = tightest.evaluate(**case, k=np.geomspace(1e5, 1e8, 20_001)).mu_macro
     low, high = (found["k_range"][f"mu_macro_{end}"] for end in ("low", "high"))
     assert (low, high) == (close(mu.min(), rel=1e-6), close(mu.max(), rel=1e-6))
     assert low <= mu.min() <= mu.max() <= high
@@ -260,9 +252,8 @@ def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(
     words, options, inputs = asked(name)
     expected = tightest.evaluate(**inputs, gradient=True)
     found = json.loads(said(capsys, 0, words, *options, "--json", "--gradient"))
-    assert {key: found[key] for key in ("mu_macro", "regime", "source", "error_bound", "gradient")} == {
-        key: getattr(expected, key) for key in ("mu_macro", "regime", "source", "error_bound", "gradient")
-    }
+    for key in ("mu_macro", "regime", "source", "error_bound", "gradient"):
+        assert found[key] == getattr(expected, key)
     assert {key: found[key] for key in ("contact", "direction") if key in found} == KINDS[name][1]
     if "k_range" in inputs:
         ends = {key: getattr(expected, key) for key in ("mu_macro_low", "mu_macro_high")}
@@ -318,9 +309,6 @@ def test_what_does_not_belong_to_a_contact_or_direction_is_named(capsys: Capture
     assert part in said(capsys, 2, *words)
 
 
-# --- fit ------------------------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def measured(tmp_path: Path, tightest: Surrogate) -> Any:
     """Thirty points of a ball, with scatter, in a file; and the same in SI."""
@@ -372,11 +360,9 @@ def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(
         rows = list(csv.DictReader(stream))
     assert [float(row["v0 [m/s]"]) for row in rows] == close(points["v0"].tolist(), rel=1e-15)
     fitted = fit(points, contact="ball", Fz=10.0, y0=2e-6, f=20e3)
-    assert [float(row["mu_macro fitted"]) for row in rows] == close(
-        (points["mu_macro"] - fitted.residuals).tolist(), rel=1e-9
-    )
-    two = "".join(path.read_text().splitlines(keepends=True)[:3])
-    path.write_text(two)
+    curve = (points["mu_macro"] - fitted.residuals).tolist()
+    assert [float(row["mu_macro fitted"]) for row in rows] == close(curve, rel=1e-9)
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:3]))
     assert "warning: as many points as unknowns" in said(capsys, 0, "fit", str(path), *RIG, "--contact", "ball")
 
 
@@ -415,9 +401,6 @@ def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measu
     assert german["values"] == json.loads(said(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
 
 
-# --- pictures and files ---------------------------------------------------------------------------------
-
-
 PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s", "1m/s"),
             "solve-for": ("solve-for", "y0", CASE.replace("y0=2e-6", ""), "--target", "0.15"),
             "rest": ("solve-for", "v0", CASE.replace("v0=0.01", ""), "--target", "0.25", "--between", "0", "1"),
@@ -435,9 +418,8 @@ def test_results_go_into_pictures_and_csv(capsys: Capture, tmp_path: Path, words
     head, *rows = (tmp_path / "out.csv").read_text().splitlines()
     assert rows
     assert {row.count(",") for row in rows} == {head.count(",")}
-    assert "ends in .png, .svg, .pdf, or for the command in .csv" in said(
-        capsys, 2, *words, "-o", str(tmp_path / "out.xyz")
-    )
+    wrong = said(capsys, 2, *words, "-o", str(tmp_path / "out.xyz"))
+    assert "ends in .png, .svg, .pdf, or for the command in .csv" in wrong
     assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
 
 
@@ -485,14 +467,10 @@ BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3"
 
 @pytest.mark.parametrize(
     ("words", "geometry", "given"),
-    [
-        (BALL, "ball", {}),
-        ((*BALL, "--E2", "3 MPa", "--nu2", "0.5"), "ball", {"E2": 3e6, "nu2": 0.5}),
-        ((*BALL, "--E2", "rigid"), "ball", {"E2": math.inf}),
-        (("flat", *BALL[1:]), "flat", {}),
-        (("cylinder", *BALL[1:], "--length", "1cm", "--oscillation", "along"), "cylinder",
-         {"length": 0.01, "oscillation": "along"}),
-    ],
+    [(BALL, "ball", {}), ((*BALL, "--E2", "3 MPa", "--nu2", "0.5"), "ball", {"E2": 3e6, "nu2": 0.5}),
+     ((*BALL, "--E2", "rigid"), "ball", {"E2": math.inf}), (("flat", *BALL[1:]), "flat", {}),
+     (("cylinder", *BALL[1:], "--length", "1cm", "--oscillation", "along"), "cylinder",
+      {"length": 0.01, "oscillation": "along"})],
 )  # fmt: skip
 def test_stiffness_from_materials_with_units_and_what_it_prints_goes_into_the_next_command(
     capsys: Capture, words: Any, geometry: Any, given: Any
@@ -514,13 +492,9 @@ def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture)
     assert "Fz=10V" in message
     assert "nu must be" in said(capsys, 2, "stiffness", *BALL[:-1], "0.7")
     for geometry, about in GEOMETRIES.items():
-        with pytest.raises(SystemExit):
-            main(["stiffness", geometry])
-        error = capsys.readouterr().err
+        error = ended(capsys, 2, "stiffness", geometry)
         assert all(f"--{name}" in error for name in (*about.arguments, "E", "nu"))
-    with pytest.raises(SystemExit):
-        main(["stiffness", *BALL, "--length", "1"])
-    assert "--length" in capsys.readouterr().err
+    assert "--length" in ended(capsys, 2, "stiffness", *BALL, "--length", "1")
 
 
 @pytest.mark.parametrize("unknown", ["mu0", "Fz", "k", "y0", "omega", "f", "v0"])
@@ -536,23 +510,19 @@ def test_solve_for_finds_what_gives_the_target(capsys: Capture, unknown: Any) ->
 
 def test_solve_for_reports_the_reachable_range(capsys: Capture) -> None:
     known = CASE.replace("v0=0.01", "")
-    message = said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
-    assert "out of reach" in message
-    assert "to 0.3" in message
+    assert "to 0.3" in said(capsys, 1, "solve-for", "v0", known, "--target", "0.5")
     assert "leave v0 out" in said(capsys, 2, "solve-for", "v0", CASE, "--target", "0.2")
     still = CASE.replace("y0=2e-6", "y0=0").replace("v0=0.01", "")
     assert "no influence" in said(capsys, 1, "solve-for", "v0", still, "--target", "0.2")
-    ratio = json.loads(said(capsys, 0, "solve-for", "v0", known, "--target", "0.8", "--ratio", "--json"))
-    assert ratio["target"] == close(0.24, rel=1e-15)
-    narrow = said(capsys, 1, "solve-for", "v0", known, "--target", "0.24", "--between", "1e-4", "1e-3")
-    assert "v0 from 0.0001 to 0.001 m/s" in narrow
+    words = ("solve-for", "v0", known, "--target")
+    assert json.loads(said(capsys, 0, *words, "0.8", "--ratio", "--json"))["target"] == close(0.24, rel=1e-15)
+    assert "v0 from 0.0001 to 0.001 m/s" in said(capsys, 1, *words, "0.24", "--between", "1e-4", "1e-3")
 
 
 def test_the_table_in_use_is_described(capsys: Capture, tightest: Surrogate) -> None:
     found = json.loads(said(capsys, 0, "table", "--json"))
-    assert found["path"] == str(tightest.path)
-    assert found["checksum"] == tightest.checksum
-    assert found["verified_max_abs_error"] == tightest.max_abs_error
+    expected = (str(tightest.path), tightest.checksum, tightest.max_abs_error)
+    assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
     text = said(capsys, 0, "table")
     assert tightest.checksum in text
     assert text.count(".nc") > len(found["bundled"])
@@ -568,19 +538,14 @@ def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_d
 @pytest.mark.slow
 def test_a_closed_output_pipe_is_no_error(repository: Path) -> None:
     command = [sys.executable, "-m", "mumacro", "law", CASE.replace("v0=0.01", ""), "--along", "v0", "1e-4", "1"]
-    process = subprocess.Popen(
-        [*command, "--points", "20000"], cwd=repository, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline().startswith(b"v0 [m/s]")
-    process.stdout.close()
-    assert process.wait(timeout=120) == 0
-    assert process.stderr is not None
-    assert b"Traceback" not in process.stderr.read()
-    process.stderr.close()
-
-
-# --- names and units ----------------------------------------------------------------------------------
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([*command, "--points", "20000"], cwd=repository, **pipes) as process:
+        assert process.stdout
+        assert process.stdout.readline().startswith(b"v0 [m/s]")
+        process.stdout.close()
+        assert process.wait(timeout=120) == 0
+        assert process.stderr
+        assert b"Traceback" not in process.stderr.read()
 
 
 @pytest.mark.parametrize("name", NAMES)

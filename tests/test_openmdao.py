@@ -9,10 +9,10 @@ import pytest
 
 from mumacro import InputError, Surrogate
 from mumacro.inputs import FIELDS
+from tests.serving import CASE
 
 om = pytest.importorskip("openmdao.api")
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 # stick-slip, continuous sliding, creep below y~ = 1, large amplitude
 POINTS = np.array([[0.1, 0.5], [2.0, 1.0], [1e-3, 0.7], [0.3, 30.0]])
 
