@@ -60,9 +60,11 @@ def test_every_form_gives_the_librarys_answer(client: Any, surrogate: Surrogate,
     assert float(client.get(f"{PATH}.txt", params=of_query).text) == of_one.mu_macro
 
 
-def test_an_end_of_an_interval_may_have_a_unit_in_csv(client: Any) -> None:
-    rows = [{**RIG, **ENDS, "y0": 2e-6, "v0": 0.02}]
+def test_columns_may_have_units_in_csv(client: Any) -> None:
+    rig = {name: x for name, x in RIG.items() if name != "omega"}
+    rows = [{**rig, "f": 20690.0, **ENDS, "y0": 2e-6, "v0": 0.02}]
     text = as_csv(rows).replace("k_low", "k_low [N/mm]").replace("800000.0", "800.0")
+    text = text.replace("f,", "f [kHz],").replace("20690.0", "20.69")
     assert read("csv", posted(client, "csv", text)) == asked(client, "csv", rows)
 
 
@@ -104,6 +106,9 @@ def test_included_quantities_are_the_librarys(client: Any, surrogate: Surrogate,
     for mark, speed in (("mu_static", 0.0), ("mu_crit", limits["v0_crit"])):
         there = surrogate.evaluate(**{**case, "v0": speed}, **options).mu_macro
         assert limits[mark] == (there if options else close(there, rel=1e-14))
+    for factor in (0.99, 1.01):
+        beside = surrogate.evaluate(**{**case, "v0": factor * limits["v0_crit"]}, **options)
+        assert (beside.regime == "continuous") == (factor > 1.0)
     if options.get("direction") == "along":  # there the contact begins to slide backwards
         assert limits["v0_crit"] == case["y0"] * case["omega"]
     if "power" in include:
