@@ -12,6 +12,7 @@ import importlib.util
 import subprocess
 import sys
 import tempfile
+import timeit
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -33,16 +34,6 @@ int ratio(const double **in, double **out, long long *iw, double *w, int mem) {
 long long ratio_n_in(void) { return 2; }
 """
 Way = tuple[Callable[..., Any], Callable[..., Any], Callable[[float], Any]]
-
-
-def repeated(number: int, call: Callable[..., Any], *arguments: Any) -> Callable[[], None]:
-    """The call that many times."""
-
-    def run() -> None:
-        for _ in range(number):
-            call(*arguments)
-
-    return run
 
 
 def loop(step: Callable[[Any], Any], start: Any) -> Any:
@@ -103,16 +94,14 @@ def interop(quick: bool) -> str:
     for i, (points, number, unit) in enumerate([(0, 2000, 1e6), (1000, 200, 1e6), (n, 1, 1e9 / n), (None, 1, 1e3)]):
         work = {}
         for name, (call, made, steps) in ways.items():
-            if points is None:
-                work[name] = repeated(number, steps, 0.1)
-            else:
-                work[name] = repeated(number, call, *(made(x[:points] if points else float(x[0])) for x in (v, y)))
+            given = [0.1] if points is None else [made(x[:points] if points else float(x[0])) for x in (v, y)]
+            once = functools.partial(steps if points is None else call, *given)
+            work[name] = functools.partial(timeit.timeit, once, number=number)
         for name, seconds in best_of(15, work, "processor").best.items():
             before = BEFORE.get((name, i))
             rows[name].append(quantity(seconds / number * unit) + (f" ({before})" if before else ""))
-    return markdown(
-        ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"], list(rows.values())
-    )
+    head = ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"]
+    return markdown(head, list(rows.values()))
 
 
 if __name__ == "__main__":

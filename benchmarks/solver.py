@@ -23,9 +23,7 @@ PEER_LOW = 0.01  # smallest v~ of the marched points, so that marching ends
 
 def points(n: int, seed: int, low: float = 1e-3) -> NDArray[np.float64]:
     """Rows of v~, y~, y~ - 1, log-uniform over v~ in [low, 1e3], y~ in [1e-3, 1e3]."""
-    rng = np.random.default_rng(seed)
-    v = np.exp(rng.uniform(np.log(low), np.log(1e3), n))
-    y = np.exp(rng.uniform(np.log(1e-3), np.log(1e3), n))
+    v, y = np.exp(np.random.default_rng(seed).uniform(np.log([[low], [1e-3]]), np.log(1e3), (2, n)))
     return np.stack([v, y, y - 1.0], axis=1)
 
 
@@ -35,10 +33,8 @@ def by_regime(n: int, rounds: int, clock: str) -> tuple[str, str]:
     slides = drawn[:, 0] >= solve_chunk("border", drawn)[:, 1]
     parts = {"all": drawn, REGIMES[0]: drawn[slides], REGIMES[1]: drawn[~slides]}
     timed = best_of(rounds, {name: partial(solve_chunk, "full", part) for name, part in parts.items()}, clock)
-    rows = [
-        [name.replace("_", "-"), f"{len(part):,}", quantity(timed.best[name] / len(part) * 1e6)]
-        for name, part in parts.items()
-    ]
+    mean = {name: quantity(timed.best[name] / len(part) * 1e6) for name, part in parts.items()}
+    rows = [[name.replace("_", "-"), f"{len(part):,}", mean[name]] for name, part in parts.items()]
     return markdown(("regime", "points", "mean, microseconds"), rows), timed.note()
 
 
@@ -57,9 +53,8 @@ def against_marching(n: int, clock: str) -> str:
         chosen = [(seconds, error) for ended, seconds, error in found if ended == agreed]
         if chosen:
             seconds, error = np.array(chosen).T
-            rows.append(
-                [f"marched, {name}", str(len(chosen)), quantity(1e6 * seconds.mean()), quantity(float(error.max()))]
-            )
+            told = quantity(1e6 * seconds.mean()), quantity(float(error.max()))
+            rows.append([f"marched, {name}", str(len(chosen)), *told])
     return markdown(("method", "points", "mean, microseconds", "max abs error"), rows)
 
 

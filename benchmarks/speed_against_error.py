@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from benchmarks import peers
 from benchmarks.peers import Contender
-from builder.differences import differences
 from builder.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
 
@@ -56,12 +55,10 @@ class Row:
         return [f"**{self.name}**" if self.kind == OURS else self.name, self.size, *numbers, *counts]
 
 
-def draw(n: int, seed: int, low: float = peers.SQUARE[0]) -> tuple[Array, Array]:
-    """``n`` points (v~ >= ``low``, y~), log-uniform over the square."""
-    rng = np.random.default_rng(seed)
-    high = peers.SQUARE[1]
-    v = np.exp(rng.uniform(np.log(low), np.log(high), n))
-    return v, np.exp(rng.uniform(np.log(peers.SQUARE[0]), np.log(high), n))
+def draw(n: int, seed: int) -> Array:
+    """``n`` points v~, y~, log-uniform over the square."""
+    low, high = np.log(peers.SQUARE)
+    return np.exp(np.random.default_rng(seed).uniform(low, high, (2, n)))
 
 
 def tables() -> list[Surrogate]:
@@ -126,54 +123,17 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     return rows, timed.note()
 
 
-def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
-    """Gradient, power and stick fraction: time, largest error, largest bound of every table."""
-    v, y = draw(points, seed=4)
-    few = 200 if quick else 5_000
-    v_few, y_few = draw(few, seed=5)
-    case = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0}
-    rows = []
-    with Sweep(1, checkpoint=peers.cache()) as sweep:
-        truth = sweep.solve("full", v_few, y_few)
-        for s in tables():
-            progress(f"other quantities of {s.id}")
-            slopes, noise = differences(s, sweep, "mu_ratio", v_few, y_few)
-            calls: dict[str, Callable[[], object]] = {
-                "gradient": partial(s.evaluate, y0=y, v0=v, **case, gradient=True),
-                "power": partial(s.power_with_bound, v, y),
-                "stick fraction": partial(s.stick_fraction_with_bound, v, y),
-            }
-            timed = best_of(rounds, calls, clock).best
-            _, along_v, along_y, *bounds = s.slopes(v_few, y_few, bounds=True)
-            off = np.maximum(np.abs(np.stack((along_v, along_y)) - slopes) - noise, 0.0)
-            power, of_power = s.power_with_bound(v_few, y_few)
-            stick, of_stick = s.stick_fraction_with_bound(v_few, y_few)
-            found = {
-                "gradient": ("slopes along ln v~, ln y~, absolute", off, np.stack(bounds)),
-                "power": ("relative", np.abs(power / truth["power"] - 1.0), of_power / truth["power"]),
-                "stick fraction": ("absolute", np.abs(stick - truth["stick_fraction"]), of_stick),
-            }
-            for name, (kind, error, bound) in found.items():
-                ns = quantity(timed[name] / points * 1e9)
-                rows.append([f"**{s.id}** {name}", kind, ns, quantity(error.max()), quantity(float(bound.max()))])
-    return markdown(("quantity", "error", "ns/point", "max error", "max bound"), rows, 2)
-
-
 def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> str:
-    """All methods, the other quantities; and the picture."""
+    """All methods; and the picture."""
     points = 20_000 if quick else points
     numba.set_num_threads(1)
     rows, note = compare(points, quick, rounds, clock)
     if not quick:
         plot(rows, RESULTS / "speed_against_error.png")
-    return "\n\n".join(
-        [
-            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread; "
-            f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves. Bytes are "
-            "those of the data in memory.",
-            markdown(HEADER, [r.cells() for r in rows], 2),
-            other_quantities(points, rounds, clock, quick),
-        ]
+    text = f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread; best of {rounds} rounds."
+    return (
+        f"{text} {note} Errors of mu~ are against fresh solves. Bytes are those of the data in memory.\n\n"
+        + markdown(HEADER, [row.cells() for row in rows], 2)
     )
 
 
@@ -191,9 +151,8 @@ def plot(rows: list[Row], path: Path) -> None:
     for name in dict.fromkeys("our tables" if row.kind == OURS else row.name for row in shown):
         line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.name)]
         width = 2.2 if line[0].kind == OURS else 1.0
-        axes.plot(
-            [row.max_abs for row in line], [row.ns for row in line], "o-", label=name, color=next(colors), lw=width
-        )
+        x, y = [row.max_abs for row in line], [row.ns for row in line]
+        axes.plot(x, y, "o-", label=name, color=next(colors), lw=width)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], minor=False)
     axes.minorticks_off()
