@@ -19,9 +19,6 @@ def one(client: Any, case: Case) -> Any:
     return client.post("/v1/mu-macro", json=case).json()
 
 
-# --- bad cases among good ones --------------------------------------------------------------------------
-
-
 BAD_ROWS = [
     ({"mu0": 0}, "mu0", "must be finite and > 0"), (17, None, "must be an object"), (None, None, "must be an object"),
     ({"Fz": ...}, "Fz", "is required"), ({"speed": 1}, "speed", "unknown"), ({"v0": True}, "v0", "must be a number"),
@@ -75,9 +72,6 @@ def test_explicit_nulls_are_read_like_absent_names(client: Any, case: Case) -> N
     assert [row["mu_macro"] for row in answer["results"]] == [one(client, row)["mu_macro"] for row in hertz]
 
 
-# --- order, sizes, options ------------------------------------------------------------------------------
-
-
 def test_a_large_batch_keeps_its_order(client: Any, case: Case, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-9, 1e9, 100_000)
     response = client.post(BATCH, json={**case, "v0": v0.tolist()}, params={"tolerance": surrogate.tolerance})
@@ -111,9 +105,6 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client: Any
     assert len(client.post(BATCH, json=case).json()["mu_macro"]) == 1
     response = posted(client, "ndjson", b"\n\n")
     assert (response.status_code, response.content) == (200, b"")
-
-
-# --- lines ----------------------------------------------------------------------------------------------
 
 
 def test_a_line_is_answered_like_a_batch_or_a_case(client: Any, case: Case) -> None:
@@ -185,9 +176,6 @@ def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started: Any, 
         pieces = iter([line.encode(), *[b" " * 600] * 3])
         cut = posted(client, "ndjson", pieces)  # the response had begun: it is cut off
         assert len(cut.text.splitlines()) <= 1
-
-
-# --- CSV and Arrow --------------------------------------------------------------------------------------
 
 
 def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client: Any, case: Case) -> None:

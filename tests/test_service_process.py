@@ -42,9 +42,6 @@ def accesses(lines: Any) -> Any:
     return [line for line in fields_of(lines) if line["logger"] == "mumacro.access"]
 
 
-# --- start and end --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGTERM), pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case: Case, number: Any) -> None:
     with serving(surrogate.path, MUMACRO_ROOT_PATH="/friction") as server:
@@ -93,9 +90,6 @@ def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure
     failed = command(repository, "--tables", str(surrogate.path), "--port", str(live_server.port))
     assert failed.returncode == 1
     assert "Traceback" not in failed.stdout + failed.stderr
-
-
-# --- the log --------------------------------------------------------------------------------------------
 
 
 def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
