@@ -59,16 +59,8 @@ class Opened:
         self.browser, self.url = browser, url
         self.shown: Any = None
 
-    def __call__(
-        self,
-        address: str = "",
-        width: int = 1400,
-        height: int = 1000,
-        url: Any = None,
-        path: str = "",
-        new: bool = False,
-        wait: bool = True,
-    ) -> Any:
+    def __call__(self, address: str = "", width: int = 1400, height: int = 1000, url: Any = None, path: str = "",
+                 new: bool = False, wait: bool = True) -> Any:  # fmt: skip
         wanted = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
         if new or wanted != self.shown or path:

@@ -37,9 +37,7 @@ def tables(text: str) -> list[list[Row]]:
 # --- results ------------------------------------------------------------------------------------------
 
 
-def test_a_result_is_stored_and_put_between_its_markers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
-) -> None:
+def test_a_result_is_put_between_its_markers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")
     monkeypatch.setattr(measuring, "PAGES", (page,))

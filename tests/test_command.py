@@ -59,9 +59,7 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(capsys: Capture
     assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
 
 
-def test_json_has_every_bit_but_no_infinity_and_the_inputs_may_be_separate_arguments(
-    capsys: Capture, tightest: Surrogate
-) -> None:
+def test_json_has_every_bit_but_no_infinity_and_inputs_may_be_apart(capsys: Capture, tightest: Surrogate) -> None:
     expected = tightest.evaluate(**VALUES, gradient=True)
     for words in ((CASE, "--json", "--gradient"), (*CASE.split()[:3], "--json", *CASE.split()[3:], "--gradient")):
         answer = json.loads(said(capsys, 0, *words))
@@ -203,9 +201,7 @@ def test_a_law_along_the_frequency_is_one_along_omega(capsys: Capture) -> None:
     assert "small_amplitude" in said(capsys, 0, *words, "--approximations")
 
 
-def test_a_range_of_k_gives_the_range_of_mu_macro_also_where_it_is_not_monotone(
-    capsys: Capture, tightest: Surrogate
-) -> None:
+def test_a_range_of_k_gives_that_of_mu_macro_also_where_not_monotone(capsys: Capture, tightest: Surrogate) -> None:
     case: Case = {
         "mu0": 0.3,
         "Fz": 10.0,
@@ -246,9 +242,7 @@ def asked(name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(
-    capsys: Capture, tightest: Surrogate, name: str
-) -> None:
+def test_contact_direction_and_range_are_the_librarys(capsys: Capture, tightest: Surrogate, name: str) -> None:
     words, options, inputs = asked(name)
     expected = tightest.evaluate(**inputs, gradient=True)
     found = json.loads(said(capsys, 0, words, *options, "--json", "--gradient"))
@@ -264,9 +258,7 @@ def test_contact_direction_and_an_uncertain_k_are_those_of_the_library(
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_law_and_solve_for_know_contact_direction_and_range(
-    capsys: Capture, tmp_path: Path, tightest: Surrogate, name: str
-) -> None:
+def test_law_and_solve_for_know_them_too(capsys: Capture, tmp_path: Path, tightest: Surrogate, name: str) -> None:
     words, options, inputs = asked(name)
     words = words.replace("v0=0.01", "")
     out = tmp_path / "law.csv"
@@ -325,9 +317,7 @@ RIG = ("Fz=10N y0=2um", "f=20kHz")
 
 
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)])
-def test_fit_is_that_of_the_library(
-    capsys: Capture, monkeypatch: pytest.MonkeyPatch, measured: Any, unknowns: Any
-) -> None:
+def test_fit_is_the_librarys(capsys: Capture, monkeypatch: pytest.MonkeyPatch, measured: Any, unknowns: Any) -> None:
     pytest.importorskip("scipy")
     path, points = measured
     known: Case = {name: value for name, value in {"k": 1e6, "mu0": 0.3}.items() if name not in unknowns}
@@ -346,9 +336,7 @@ def test_fit_is_that_of_the_library(
     assert "95 %" in text
 
 
-def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(
-    capsys: Capture, tmp_path: Path, measured: Any
-) -> None:
+def test_a_fit_goes_into_pictures_and_csv_with_warnings(capsys: Capture, tmp_path: Path, measured: Any) -> None:
     pytest.importorskip("scipy")
     pytest.importorskip("matplotlib")
     path, points = measured
@@ -384,9 +372,7 @@ def test_a_fit_goes_into_pictures_and_csv_and_tells_its_warnings(
         ("v0,mu_macro\n1,nan\n2,0.2\n", RIG, 1, ["row 1: mu_macro is missing"]),
     ],
 )  # fmt: skip
-def test_points_that_cannot_be_fitted_are_refused_with_the_remedy(
-    capsys: Capture, tmp_path: Path, text: str, words: Any, code: Any, parts: Any
-) -> None:
+def test_bad_points_are_refused(capsys: Capture, tmp_path: Path, text: str, words: Any, code: Any, parts: Any) -> None:
     (tmp_path / "points.csv").write_text(text)
     message = said(capsys, code, "fit", str(tmp_path / "points.csv"), *words)
     assert all(part in message for part in parts), message
@@ -423,9 +409,7 @@ def test_results_go_into_pictures_and_csv(capsys: Capture, tmp_path: Path, words
     assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
 
 
-def test_without_matplotlib_a_picture_names_the_extra(
-    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_picture_names_the_extra_it_needs(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("figure", "pyplot"):
         monkeypatch.setitem(sys.modules, f"matplotlib.{name}", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
@@ -472,9 +456,7 @@ BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3"
      (("cylinder", *BALL[1:], "--length", "1cm", "--oscillation", "along"), "cylinder",
       {"length": 0.01, "oscillation": "along"})],
 )  # fmt: skip
-def test_stiffness_from_materials_with_units_and_what_it_prints_goes_into_the_next_command(
-    capsys: Capture, words: Any, geometry: Any, given: Any
-) -> None:
+def test_what_stiffness_prints_goes_into_a_command(capsys: Capture, words: Any, geometry: Any, given: Any) -> None:
     found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
     expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
     assert (found["k"], found["contact"]) == (expected.k, expected.contact)

@@ -131,9 +131,7 @@ def test_octave(repository: Path, live_server: Any, surrogate: Surrogate) -> Non
     assert 0.02 < number(r"steepest near ([\d.]+) m/s", text) < 0.04
 
 
-def test_the_umbridge_server_answers_as_the_library_and_lives_on_after_an_error(
-    bridge: Any, surrogate: Surrogate
-) -> None:
+def test_the_umbridge_server_answers_as_the_library_and_outlives_an_error(bridge: Any, surrogate: Surrogate) -> None:
     model, point = importlib.import_module("umbridge").HTTPModel(bridge, "mu_macro"), list(CASE.values())
     expected = surrogate.evaluate(CASE, gradient=True)
     slopes = [expected.gradient[name] for name in CASE]

@@ -65,9 +65,7 @@ def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any)
          pa.array([""]), pa.array([" "]), pa.array(["NaN"]), pa.array([None], pa.float64()), pa.nulls(1),
          pa.array([None], pa.string()), pa.array([math.nan]), pa.array([math.nan], pa.float32())))],
 )  # fmt: skip
-def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type_of_column(
-    surrogate: Surrogate, cell: Any, k: Any
-) -> None:
+def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type(surrogate: Surrogate, cell: Any, k: Any) -> None:
     found, rejects = answer(batch_of(k=cell), surrogate)
     if k == GAP:
         assert found.column("mu_macro").null_count == 1
@@ -88,9 +86,7 @@ def test_numbers_rigid_contacts_and_gaps_are_read_from_every_type_of_column(
      ("mu0", "0x1", "must be a number without a unit: give a plain number"), ("Fz", "inf", "must be finite and > 0"),
      ("omega", "-1", "must be finite and >= 0")],
 )  # fmt: skip
-def test_a_bad_cell_is_named_with_its_value_and_reason(
-    surrogate: Surrogate, column: Any, cell: Any, reason: Any
-) -> None:
+def test_a_bad_cell_is_named_with_value_and_reason(surrogate: Surrogate, column: Any, cell: Any, reason: Any) -> None:
     name = column.partition(" ")[0]
     batch = batch_of(**{column: [cell]})
     batch = batch.drop_columns(["omega"] if name == "f" else [name] if name != column else [])
@@ -113,9 +109,7 @@ LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
          ("0", None), ("9.99", None), ("10", ("Fz_amplitude", LIFTS)), ("-1", ("Fz_amplitude", LIFTS)),
          ("", ("Fz_amplitude", "is missing")), ("inf", ("Fz_amplitude", LIFTS))))],
 )  # fmt: skip
-def test_ends_of_k_and_amplitudes_of_the_force_are_refused_likewise(
-    surrogate: Surrogate, left_out: Any, columns: Any, refused: Any
-) -> None:
+def test_ends_of_k_and_amplitudes_are_refused(surrogate: Surrogate, left_out: Any, columns: Any, refused: Any) -> None:
     batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(left_out)
     found, rejects = answer(batch, surrogate, direction="normal" if left_out == "y0" else "across")
     assert [(reject["field"], reject["reason"]) for reject in rejects.to_pylist()] == ([refused] if refused else [])
@@ -172,9 +166,7 @@ def test_rigid_can_be_given_for_a_batch_without_k(surrogate: Surrogate) -> None:
     assert found.column("source")[0].as_py() == "rigid"
 
 
-def test_a_column_that_holds_no_numbers_is_refused_by_name_and_one_without_rows_is_answered(
-    surrogate: Surrogate,
-) -> None:
+def test_a_column_without_numbers_is_refused_and_one_without_rows_answered(surrogate: Surrogate) -> None:
     with pytest.raises(FilesError, match="the column v0 holds bool, not numbers"):
         answer(batch_of(v0=[True]), surrogate)
     found, rejects = answer(batch_of().slice(0, 0), surrogate)

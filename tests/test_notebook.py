@@ -18,9 +18,7 @@ CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
 SPEEDS = np.geomspace(1e-3, 1.0, 30)
 
 
-def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_from(
-    repository: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_cell_of_the_notebook_runs_and_finds_the_truth(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("scipy")
     pytest.importorskip("pandas")
     pytest.importorskip("matplotlib")

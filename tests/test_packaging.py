@@ -128,9 +128,7 @@ def test_the_debug_build_alone_has_both_sanitizers(repository: Path, tmp_path: P
         assert (b"libasan" in made, b"libubsan" in made) == (debug, debug)
 
 
-def test_the_development_command_sees_a_change_of_the_c_sources(
-    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_dev_py_sees_a_changed_c_source(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(repository)
     dev = importlib.import_module("dev")
     monkeypatch.setattr(dev, "ROOT", tmp_path)
@@ -175,9 +173,7 @@ def test_the_source_distribution_builds_and_its_tests_collect(repository: Path, 
 # --- the installed package -----------------------------------------------------------------------------
 
 
-def test_an_installed_package_finds_its_own_tables_and_no_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path
-) -> None:
+def test_a_package_finds_its_own_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path) -> None:
     assert bundled.bundled_tables() == sorted(tables_dir.glob("*.nc"))  # a checkout
     package = tmp_path / "mumacro"
     for folder in (package, tmp_path / "tables"):
@@ -200,9 +196,7 @@ PARTS = ("service", "builder", "mumacro")
         *((name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*") for name in PARTS[1:]),
     ],
 )
-def test_what_is_missing_is_said_in_one_line(
-    repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any
-) -> None:
+def test_one_line_says_what_is_missing(repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any) -> None:
     ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
     for name in {"mumacro", module}:
         shutil.copytree(repository / name, tmp_path / name, ignore=ignored)

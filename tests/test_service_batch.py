@@ -152,9 +152,7 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(client: Any, case: Cas
         assert answers[1]["type"].endswith("malformed-body") == (status == 400)
 
 
-def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(
-    client: Any, case: Case, surrogate: Surrogate
-) -> None:
+def test_bad_lines_among_many_plain_ones_are_reported_by_number(client: Any, case: Case, surrogate: Surrogate) -> None:
     lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(3000)]
     expected = surrogate.evaluate({**case, "v0": [line["v0"] for line in lines]}).mu_macro.tolist()
     bad = range(3, 3000, 7)
@@ -185,9 +183,7 @@ def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client: Any, case
     assert good[0]["mu_macro"] == one(client, case)["mu_macro"]
 
 
-def test_arrow_keeps_order_over_record_batches_and_names_its_table(
-    started: Any, case: Case, surrogate: Surrogate
-) -> None:
+def test_arrow_keeps_order_over_batches_and_names_its_table(started: Any, case: Case, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-6, 1e3, 150_000)
     columns = {**{name: np.full(v0.size, value) for name, value in case.items()}, "v0": v0}
     whole = pa.record_batch(columns)

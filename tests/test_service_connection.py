@@ -235,9 +235,7 @@ def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
 
 
 @pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])
-def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(
-    live_server: Any, raw: Any, kind: Any, step: Any
-) -> None:
+def test_a_body_is_read_in_any_pieces_after_100_continue(live_server: Any, raw: Any, kind: Any, step: Any) -> None:
     body = columns(20_000)
     raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
     said = b""

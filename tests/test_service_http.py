@@ -1,6 +1,7 @@
 """Common to all requests: errors, request ids, keys, body limits, headers, files, the interface's description."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -170,14 +171,17 @@ def test_the_described_examples_are_answered(client: Any) -> None:
 
 
 def test_the_page_loads_nothing_from_elsewhere(client: Any) -> None:
-    page = client.get("/docs")
-    assert page.headers["content-type"].startswith("text/html")
-    assert "//" not in page.text
+    for path in ("/", "/docs"):
+        page = client.get(path)
+        assert page.headers["content-type"].startswith("text/html")
+        assert not re.search(r"<script(?![^>]*src=)|<style|style=|\son\w+=|https?:|//", page.text)
     for path, media_type in FILES.items():
         assert path[1:] in page.text or "swagger" not in path
         asset = client.get(path)
-        assert asset.status_code == 200
-        assert asset.headers["content-type"].startswith(media_type)
+        assert (asset.status_code, asset.headers["content-type"].split(";")[0]) == (200, media_type)
+        if "swagger" not in path:  # every part is served; a name of XML is no address
+            assert "://" not in asset.text.replace("http://www.w3.org/2000/svg", "")
+            assert {f"/static/page/{name}" for name in re.findall(r'from "\./([^"]+)"', asset.text)} <= FILES.keys()
     assert {"contact", "direction", "k_range"} <= set(client.get("/static/page/names.json").json()["knows"])
 
 
@@ -200,9 +204,7 @@ def test_a_page_that_the_client_has_is_not_sent_again(client: Any, path: Any) ->
      ("nonsense", 400), ("bytes=", 400), ("bytes=a-b", 400), ("bytes=\xff-", 400)],
 )  # fmt: skip
 @pytest.mark.parametrize("path", ["/v1/table.nc", "/", "/static/page/main.js"])
-def test_a_range_that_the_file_has_not_is_a_problem_document(
-    client: Any, problem: Any, path: Any, given: Any, status: Any
-) -> None:
+def test_a_range_beyond_the_file_is_a_problem(client: Any, problem: Any, path: Any, given: Any, status: Any) -> None:
     response = client.get(path, headers={"Range": given.encode("latin-1")})
     problem(response, status)
     size = client.get(path).headers["content-length"]

@@ -96,9 +96,7 @@ def test_cases_are_counted_by_source_and_regime(fresh: Any, case: Case, surrogat
 
 
 @pytest.mark.slow
-def test_several_workers_serve_behind_a_key_count_together_and_stop(
-    serving: Any, surrogate: Surrogate, case: dict[str, Any]
-) -> None:
+def test_several_workers_behind_a_key_count_together_and_stop(serving: Any, surrogate: Surrogate, case: Case) -> None:
     body, asked, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
     with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
         server.wait_until_ready(2)

@@ -80,9 +80,7 @@ def command(repository: Path, *arguments: Any) -> Any:
     )  # fmt: skip
 
 
-def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure(
-    live_server: Any, repository: Path, surrogate: Surrogate
-) -> None:
+def test_the_health_check_and_a_port_that_is_taken(live_server: Any, repository: Path, surrogate: Surrogate) -> None:
     assert command(repository, "healthcheck", "--port", str(live_server.port)).returncode == 0
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))

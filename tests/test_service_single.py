@@ -55,9 +55,7 @@ def test_the_answer_is_the_surrogates_and_always_json(client: Any, surrogate: Su
 
 @pytest.mark.parametrize("include", ["groups,limits", "limits, groups,groups", "groups&include=limits"])
 @pytest.mark.parametrize("k", ["1e+6", "1000000", "rigid", "Rigid"])
-def test_a_query_may_be_written_in_other_words(
-    client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any
-) -> None:
+def test_a_query_may_have_other_words(client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any) -> None:
     expected = ask(client, {**case, "k": 1e6 if "1" in k else None}, include=["limits", "groups"])
     assert expected["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
     query = "&".join(f"{name}={value}" for name, value in {**case, "k": k, "include": include}.items())

@@ -77,9 +77,7 @@ SPOILT: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("kind", SPOILT)
-def test_an_unusable_table_leaves_the_process_alive_and_not_ready(
-    started: Any, table_copy: Any, case: Case, problem: Any, kind: Any
-) -> None:
+def test_an_unusable_table_is_not_ready(started: Any, table_copy: Any, case: Case, problem: Any, kind: Any) -> None:
     table_copy.write_bytes(SPOILT[kind](table_copy.read_bytes()))
     if kind == "missing":
         table_copy.unlink()
@@ -122,9 +120,7 @@ def test_a_wrong_known_answer_is_not_ready(
         assert "secret" not in detail
 
 
-def test_tables_are_found_by_file_and_by_directory(
-    started: Any, tmp_path: Path, table_copy: Any, surrogate: Surrogate, problem: Any
-) -> None:
+def test_tables_are_found(started: Any, tmp_path: Path, table_copy: Any, surrogate: Surrogate, problem: Any) -> None:
     for name in (".hidden.nc", "notes.txt"):
         (tmp_path / name).write_bytes(b"")
     other = tmp_path / "other"
