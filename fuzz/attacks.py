@@ -81,32 +81,39 @@ def brackets(server: Server, share: float) -> None:
            number=2 * BATCHES)  # fmt: skip
 
 
-ATTACKS: dict[str, Callable[[Server, float], None]] = {
-    "Heads without an end, of 64 KB of the smallest fields": lambda server, share: held(
-        server, share, b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a:b\r\n" * 13_000
-    ),
-    "16 KB of the smallest requests on each connection, whose answers are not read": lambda server, share: held(
-        server, share, b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600
-    ),
-    "More connections without a byte than are allowed": lambda server, share: held(server, 1.5 * share, b""),
-    "Bodies of 64 KB that lack their last byte": lambda server, share: held(
-        server, share, head("/v1/mu-macro", 65_000) + b" " * 64_999
-    ),
-    "A CSV whose first line is as long as a body may be": lambda server, share: posted(
-        server, "text/csv", b"a," * round(BODY * share / 2), number=2 * BATCHES
-    ),
-    "A CSV of blank lines": lambda server, share: posted(
-        server, "text/csv", b"mu0,Fz,k,y0,omega,v0\n" + b"\n" * round((BODY - 100) * share), number=2 * BATCHES
-    ),
+Attack = Callable[[Server, float], None]
+
+
+def holding(text: bytes, factor: float = 1.0) -> Attack:
+    return lambda server, share: held(server, factor * share, text)
+
+
+def table_of(line: bytes) -> Attack:
+    """A CSV of such pieces, as long as a body may be."""
+    text = b"" if line == b"a," else b"mu0,Fz,k,y0,omega,v0\n"
+    return lambda server, share: posted(
+        server, "text/csv", text + line * round((BODY - 100) / len(line) * share), number=2 * BATCHES
+    )
+
+
+ATTACKS: dict[str, Attack] = {
+    "Heads without an end, of 64 KB of the smallest fields":
+        holding(b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a:b\r\n" * 13_000),
+    "16 KB of the smallest requests on each connection, whose answers are not read":
+        holding(b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600),
+    "More connections without a byte than are allowed": holding(b"", 1.5),
+    "Bodies of 64 KB that lack their last byte": holding(head("/v1/mu-macro", 65_000) + b" " * 64_999),
+    "A CSV whose first line is as long as a body may be": table_of(b"a,"),
+    "A CSV of blank lines": table_of(b"\n"),
     "JSON of the smallest values and lists": brackets,
     "As many rows, and as long columns, as are allowed, with everything included": everything,
     "Columns of words and of nulls, which Python reads one by one": strange_words,
     "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
-}
+}  # fmt: skip
 
 
-def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float, float]:
+def tried(attack: Attack, share: float) -> tuple[float, float]:
     """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve afterwards."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
