@@ -7,8 +7,6 @@ half of them around the border of continuous sliding and around the corner; and 
 the border, where rounding decides the side.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
 import ctypes

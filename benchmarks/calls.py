@@ -1,7 +1,5 @@
 """Time of one call, and a point of large arrays; beside scipy's elliptic integral."""
 
-from __future__ import annotations
-
 from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 import timeit

@@ -7,8 +7,6 @@ Values come from tests/data/points.csv and border.csv, computed by another solve
 not from this project's own solver or tables.  docs/accuracy.md describes them.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import sys

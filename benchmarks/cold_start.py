@@ -1,7 +1,5 @@
 """Time and memory to the first answer of a new process; that of the service: benchmarks/service.py."""
 
-from __future__ import annotations
-
 import os
 import statistics
 import subprocess

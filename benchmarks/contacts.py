@@ -4,8 +4,6 @@ python benchmarks/contacts.py            # nanoseconds a point, one thread, log-
 python benchmarks/contacts.py --errors   # the constants of mumacro/contact.py, measured anew
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import timeit

@@ -5,8 +5,6 @@
 Each case computes the naive number too.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import ROOT, main, markdown, progress, quantity, sections  # isort: split
 
 import csv

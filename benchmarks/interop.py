@@ -3,8 +3,6 @@
 PyTorch is measured where it is installed.  Times in brackets are of the release that called Python back.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 import functools

@@ -5,15 +5,11 @@ unknown.  A disturbance of the cycle decays with the slip path, by exp(-2 pi v~)
 the cost grows as v~ falls; for the same reason two cycles agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from scipy.integrate import solve_ivp
-
-__all__ = ["Marched", "march"]
 
 RTOL, ATOL, AGREE = 1e-9, 1e-12, 1e-9
 PERIOD = 2.0 * math.pi

@@ -3,8 +3,6 @@
 Imported before numpy: it sets one thread for every numerical library, and numpy reads that once, when it loads.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform

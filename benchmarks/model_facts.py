@@ -3,8 +3,6 @@
 python benchmarks/model_facts.py [--write]
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
 
 import math

@@ -3,8 +3,6 @@
 Every contender takes v~ and y~ and includes the time of the two logarithms, as the table does.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,8 +17,6 @@ from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make
 
 import builder
 from builder.sweep import Sweep
-
-__all__ = ["SQUARE", "Contender", "cache", "fitted_to_the_border", "grid_axis", "on_grid", "solve_grid"]
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]

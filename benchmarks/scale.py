@@ -6,8 +6,6 @@ Every chunk of cases is generated, evaluated and reduced (mean, extremes, a hist
 stored.  Processor time is the sum over all threads: other work on the machine has little effect on it.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import main, markdown, quantity  # isort: split
 
 from time import process_time

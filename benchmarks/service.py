@@ -6,8 +6,6 @@ Linux, two processors: one for the servers, one for the client.  Servers run at 
 in turn, so that other load slows all of them; figures are medians of the rounds.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
 
 import http.client

@@ -5,8 +5,6 @@
 One thread.  Points are log-uniform over v~, y~ in [1e-3, 1e3].
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import CLOCKS, best_of, main, markdown, progress, quantity  # isort: split
 
 from functools import partial

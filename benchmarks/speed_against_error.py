@@ -6,8 +6,6 @@ Points are log-uniform over v~, y~ in [1e-3, 1e3].  Times are of one thread, bes
 against fresh solves.  A full run draws build/results/speed_against_error.png.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
 import math

@@ -7,8 +7,6 @@ folder, times it and compares its checksum with the committed one; without it th
 from the page, as long as they were measured for the committed table.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity  # isort: split
 
 import json

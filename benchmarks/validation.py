@@ -4,8 +4,6 @@
 states otherwise; exact is the solver, or the 1e-12 table where thousands of points are needed.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import FINEST, ROOT, main, markdown, quantity, sections  # isort: split
 
 import csv

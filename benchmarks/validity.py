@@ -3,8 +3,6 @@
 python benchmarks/validity.py [--write]
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import FINEST, main, markdown, quantity, sections  # isort: split
 
 import math

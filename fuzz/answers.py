@@ -6,8 +6,6 @@ Cases are drawn in three ways: any positive double for each input, by its bits; 
 y~ in the range of the table; and a share of inputs at the ends of the double range.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -87,9 +85,6 @@ def excess(one: Any, other: Any, change: Array) -> tuple[NDArray[np.bool_], Arra
     allowed = np.where(rounded, allowed + 4 * 5e-324, allowed)
     with np.errstate(all="ignore"):
         return change > allowed, np.where(change > 0.0, change / np.where(allowed > 0.0, allowed, 5e-324), 0.0)
-
-
-# --- properties ---------------------------------------------------------------------------------------
 
 
 def finite(table: Surrogate, share: float) -> Count:

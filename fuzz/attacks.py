@@ -6,8 +6,6 @@ Beside each attack another client asks ``/livez``, one new connection after anot
 process, and the longest of these waits.
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import time

@@ -6,8 +6,6 @@ Small disks are mounted as tmpfs and permissions are removed for another user; b
 that cannot be made on this machine is reported as "not tried".
 """
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

@@ -1,7 +1,5 @@
 """Files made to harm the program that opens them: memory, time, stack, other files, numbers of a wrong type."""
 
-from __future__ import annotations
-
 import functools
 import shutil
 import zlib

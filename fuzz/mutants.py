@@ -7,8 +7,6 @@ the tests of every row run without a fault, and must pass.  Exit code 1 if a fau
 exactly once.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

@@ -6,8 +6,6 @@ They go over sockets to a running service.  The seed of a share of the work is i
 reproduced: ``--again NUMBER`` sends one share and prints the failing requests.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import random

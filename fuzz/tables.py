@@ -6,8 +6,6 @@ Files are opened by other processes (``python fuzz/tables.py open``), which may 
 opening the intact table; a process that crashes is a failure.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 import os

@@ -1,7 +1,5 @@
 """A server process on a loopback port, for tests, benchmarks and fuzz."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -34,9 +34,6 @@ def tables(text: str) -> list[list[Row]]:
     return found
 
 
-# --- results ------------------------------------------------------------------------------------------
-
-
 def test_a_result_is_put_between_its_markers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- begin times -->\n\nold\n\n<!-- end times -->\nafter\n", "utf-8")

@@ -170,9 +170,6 @@ def test_the_source_distribution_builds_and_its_tests_collect(repository: Path, 
     assert collected == {f"tests/{path.name}" for path in (repository / "tests").glob("test_*.py")}
 
 
-# --- the installed package -----------------------------------------------------------------------------
-
-
 def test_a_package_finds_its_own_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tables_dir: Path) -> None:
     assert bundled.bundled_tables() == sorted(tables_dir.glob("*.nc"))  # a checkout
     package = tmp_path / "mumacro"

@@ -23,8 +23,6 @@ pytest.importorskip("pyarrow", reason="the extra files is not installed")
 from fuzz import answers, faults, tables
 from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
 
-# --- untrusted tables --------------------------------------------------------------------------------
-
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tables.Outcome]:
@@ -50,9 +48,6 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
     assert {one.what for one in found} <= {tables.REFUSED, tables.SAME}, found
     # the rest is in room that HDF5 leaves empty
     assert sum(one.what == tables.REFUSED for one in found) > 0.6 * len(found)
-
-
-# --- answers ------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module", params=[1e-4, 1e-12])
@@ -128,9 +123,6 @@ def test_numbers_in_text_have_the_bits_of_float_or_are_refused(tmp_path: Path, r
     evaluate_files([source], out, Surrogate.open(1e-4))
     found = [json.loads(line)["mu_macro"] for line in out.read_text("utf-8").splitlines()]
     assert found == [float(text) for text in texts if right]
-
-
-# --- disks, permissions, processes --------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -28,9 +28,6 @@ def answered(client: Any, path: Any, given: Any, **changed: Any) -> Any:
     return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
-# --- solve-for ------------------------------------------------------------------------------------------
-
-
 def test_a_root_gives_its_target_back(client: Any) -> None:
     answer = answered(client, "solve-for", SOLVE)
     assert answer.keys() == {"unknown", "unit", "quantity", "range", "reachable", "results", "table", "api_version"}
@@ -77,9 +74,6 @@ def test_folded_roots_are_all_returned_within_the_range(client: Any) -> None:
     answer = answered(client, "solve-for", request, range=within)
     assert [root["value"] for root in answer["results"][0]["roots"]] == [close(values[0], rel=1e-9)]
     assert answer["range"] == within
-
-
-# --- law ------------------------------------------------------------------------------------------------
 
 
 def test_a_law_is_single_answers_in_a_row(client: Any) -> None:

@@ -50,9 +50,6 @@ def test_the_answer_is_the_surrogates_and_always_json(client: Any, surrogate: Su
     assert client.get(PATH, params=query).json() == plain
 
 
-# --- how it is asked ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("include", ["groups,limits", "limits, groups,groups", "groups&include=limits"])
 @pytest.mark.parametrize("k", ["1e+6", "1000000", "rigid", "Rigid"])
 def test_a_query_may_have_other_words(client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any) -> None:
@@ -100,9 +97,6 @@ def test_without_oscillation_or_stiffness_nothing_sticks(
     assert answer["power"]["saved"] == close((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
     assert answer["stick_fraction"] == answer["stick_fraction_bound"] == 0.0
     assert 0.0 <= answer["power_bound"]["saved"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
-
-
-# --- what include adds; slopes, powers, and groups are those of test_service_contacts.py -----------------
 
 
 @pytest.mark.parametrize("k", [1e6, None])
