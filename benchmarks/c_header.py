@@ -38,7 +38,6 @@ def library(folder: Path, compiler: str, options: str) -> Any:
 
 
 def called(function: Any, v: Array, y: Array, out: Array) -> Callable[[], object]:
-    """A call of the driver's ``function`` over arrays."""
     pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (v, y, out)]
     return lambda: function(pointers[0], pointers[1], v.size, pointers[2])
 

@@ -26,7 +26,6 @@ ARRAYS = {
 
 
 def calls(points: int, quick: bool) -> str:
-    """The two tables."""
     rng = np.random.default_rng(0)
     n = 10_000 if quick else points
     v, y = 10.0 ** rng.uniform(-3.0, 3.0, (2, n))

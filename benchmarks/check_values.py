@@ -50,7 +50,6 @@ def chosen() -> list[dict[str, str]]:
 
 
 def rows() -> Iterator[dict[str, Any]]:
-    """All check values."""
     for point in chosen():
         v, y, mu = (float(point[name]) for name in ("v", "y", "mu_ratio"))
         groups = {"v_tilde": v, "y_tilde": y}
@@ -82,7 +81,6 @@ def closed_forms() -> Iterator[dict[str, Any]]:
 
 
 def text() -> str:
-    """The file."""
     out = io.StringIO()
     writer = csv.DictWriter(out, COLUMNS, restval="", lineterminator="\n")
     writer.writeheader()

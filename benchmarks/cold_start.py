@@ -29,7 +29,6 @@ def measured(arguments: list[str]) -> tuple[float, float, float]:
 
 
 def cold_start(rounds: int, quick: bool) -> str:
-    """A line for every way to start."""
     rows = []
     for name, arguments in list(COMMANDS.items())[: 4 if quick else None]:
         progress(name)

@@ -29,7 +29,6 @@ HALF = 0.5 * math.pi
 
 
 def g(x: float) -> str:
-    """Two significant digits."""
     return quantity(float(x), 2)
 
 

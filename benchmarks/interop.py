@@ -77,7 +77,6 @@ def in_casadi(table: mumacro.Surrogate) -> Way:
 
 
 def interop(quick: bool) -> str:
-    """mu~ in every library."""
     n = 10_000 if quick else 1_000_000
     table = mumacro.open(1e-7, threads=1)
     v, y = 10.0 ** np.random.default_rng(0).uniform(-3.0, 3.0, (2, n))

@@ -60,7 +60,6 @@ def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options
 
 
 def write(script: str, section: str, text: str) -> None:
-    """Store a section's result."""
     RESULTS.mkdir(parents=True, exist_ok=True)
     (RESULTS / f"{'-'.join(dict.fromkeys((script, section)))}.md").write_text(f"{text}\n", "utf-8")
     for path in PAGES:

@@ -69,7 +69,6 @@ def ask(server: Server, request: bytes, number: int, clients: int) -> None:
 
 
 def read(raw: socket.socket) -> None:
-    """Read an answer, which must be 200."""
     answer = http.client.HTTPResponse(raw, method="POST")
     answer.begin()
     text = answer.read()
@@ -78,7 +77,6 @@ def read(raw: socket.socket) -> None:
 
 
 def batch(server: Server, kind: str, body: bytes) -> None:
-    """Send one batch and read the answer."""
     with connect(server) as raw:
         sending = threading.Thread(target=raw.sendall, args=(head(BATCH, len(body), kind) + body,))
         sending.start()
@@ -92,12 +90,10 @@ def service(**settings: Any) -> AbstractContextManager[Server]:
 
 
 def peer(name: str, folder: str) -> AbstractContextManager[Server]:
-    """Another one there."""
     return running([*FIRST, sys.executable, "-m", "benchmarks.service_peers", name], Path(folder) / name)
 
 
 def single() -> str:
-    """The seven forms and FastAPI, beside raw ASGI."""
     found: dict[str, list[tuple[float, float]]] = {}
     with (
         tempfile.TemporaryDirectory() as folder, service() as own, peer("raw", folder) as raw,
@@ -125,7 +121,6 @@ def single() -> str:
 
 
 def body_of(form: str, n: int) -> bytes:
-    """A batch with all digits."""
     random = np.random.default_rng(n)
     table = {
         "mu0": random.uniform(0.1, 0.9, n), "Fz": 10 ** random.uniform(0, 2, n), "k": 10 ** random.uniform(5, 7, n),

@@ -32,7 +32,6 @@ def raw() -> Any:
 
 
 def fastapi() -> Any:
-    """Models in and out, around the same table."""
     from fastapi import FastAPI
 
     from mumacro import Surrogate

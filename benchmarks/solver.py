@@ -57,7 +57,6 @@ def against_marching(n: int, clock: str) -> str:
 
 
 def solver(points: int, rounds: int, quick: bool, clock: str) -> str:
-    """Time by regime, and marching beside it."""
     n = min(points, 500) if quick else points
     regimes, note = by_regime(n, rounds, clock)
     progress("marching")

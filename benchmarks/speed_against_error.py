@@ -47,7 +47,6 @@ class Row:
     solves: int = 0
 
     def cells(self) -> list[str]:
-        """The line as text."""
         numbers = [quantity(x) if x == x else "-" for x in (self.ns, self.max_abs, self.p99_abs, self.max_rel)]
         counts = [f"{n:,}" if n else "-" for n in (self.bytes, self.solves)]
         return [f"**{self.name}**" if self.kind == OURS else self.name, self.size, *numbers, *counts]
@@ -66,7 +65,6 @@ def tables() -> list[Surrogate]:
 
 
 def spread(error: Array, truth: Array) -> tuple[float, float, float]:
-    """Largest and 99 % absolute error and largest relative error."""
     return float(error.max()), float(np.quantile(error, 0.99)), float((error / truth).max())
 
 
@@ -122,7 +120,6 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
 
 
 def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> str:
-    """All methods; and the picture."""
     points = 20_000 if quick else points
     numba.set_num_threads(1)
     rows, note = compare(points, quick, rounds, clock)

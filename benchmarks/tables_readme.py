@@ -53,7 +53,6 @@ def kept(page: str, checksum: str) -> list[str]:
 
 
 def tables(build: bool, workers: int) -> str:
-    """Contents and cost of every committed table."""
     old = PAGES[-1].read_text("utf-8")
     opened = sorted((Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")), key=lambda s: -s.tolerance)
     rows, builds = [], []

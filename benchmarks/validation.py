@@ -28,7 +28,6 @@ AMPLITUDES = np.geomspace(1e-3, 1e6, 18_001)
 
 @cache
 def table() -> Surrogate:
-    """The tightest committed table."""
     return Surrogate.open(FINEST)
 
 

@@ -124,7 +124,6 @@ def tried(attack: Attack, share: float) -> tuple[float, float]:
 
 
 def attacks(share: float) -> str:
-    """All of them."""
     found = {name: tried(attack, share) for name, attack in ATTACKS.items()}
     rows = [(name, f"{memory:.0f}", f"{1e3 * wait:.0f}") for name, (memory, wait) in found.items()]
     return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)

@@ -50,17 +50,14 @@ def run(*words: object, nobody: bool = False, code: int | None = 0, **environmen
 
 
 def build(out: Path) -> list[str]:
-    """The arguments that build a coarse table."""
     return ["-m", "builder", "build", "--tolerance", TOLERANCE, "--out", str(out)]
 
 
 def checksum(path: Path) -> str:
-    """The checksum of the numbers in a table."""
     return Surrogate.open(path).checksum
 
 
 def cases(path: Path, n: int) -> Path:
-    """A CSV file of random cases."""
     rows = 10.0 ** np.random.default_rng(1).uniform([-2, -1, 4, -8, 2, -5], [0, 3, 8, -4, 6, 1], (n, 6))
     np.savetxt(path, rows, "%.17g", ",", header="mu0,Fz,k,y0,omega,v0", comments="")
     return path
@@ -97,7 +94,6 @@ def closed(folder: Path) -> Path:
 
 
 def left(folder: Path) -> list[str]:
-    """The names of all files in a folder, hidden ones too."""
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
@@ -255,7 +251,6 @@ def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
 
 
 def faults() -> str:
-    """Every fault once."""
     rows = [[name, *tried(fault)] for name, fault in FAULTS.items()]
     return markdown(("fault", "result", "what was seen"), rows, 3)
 

@@ -36,8 +36,6 @@ BATCH = "/v1/mu-macro/batch"
 
 
 class Request(NamedTuple):
-    """One request."""
-
     method: str
     path: str
     query: bytes
@@ -79,7 +77,6 @@ def document(chance: random.Random) -> tuple[str, Any]:
 
 
 def arrow(chance: random.Random) -> bytes:
-    """A valid Arrow stream."""
     n = chance.choice([0, 1, 3, 50])
     rng = np.random.default_rng(chance.randrange(1 << 30))
     kinds = [pa.float64()] * 8 + [pa.float32(), pa.int64(), pa.uint8(), pa.float16()]
@@ -277,7 +274,6 @@ def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
 
 
 def wire(request: Request) -> bytes:
-    """The request as bytes."""
     target = quote(request.path, safe="/%.") + ("?" + request.query.decode("latin-1") if request.query else "")
     lines = [f"{request.method} {target} HTTP/1.1".encode("latin-1", "replace")]
     lines += [name + b": " + value for name, value in request.headers]
@@ -301,8 +297,6 @@ def asked(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
 
 
 class Found:
-    """Results of many requests."""
-
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.statuses: Counter[int] = Counter()

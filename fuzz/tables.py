@@ -132,7 +132,6 @@ def damaged(share: float, change: str) -> list[Outcome]:
 
 
 def row(name: str, found: Sequence[Outcome]) -> list[str]:
-    """One row of the table."""
     count = Counter(outcome.what for outcome in found)
     numbers = [len(found), *(count[what] for what in (REFUSED, SAME, TEXTS))]
     numbers.append(sum(count[what] for what in (DIFFERS, ESCAPED, DIED)))

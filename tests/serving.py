@@ -86,16 +86,13 @@ class Server:
         return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks.iterdir()) / 1e9
 
     def errors(self) -> list[str]:
-        """Lines of the service's log about unexpected errors."""
         return [line for line in self.lines if '"logger": "mumacro.error"' in line]
 
     def stop(self, number: int = signal.SIGTERM) -> int:
-        """Send a signal; returns the exit code."""
         self.process.send_signal(number)
         return self.wait()
 
     def wait(self) -> int:
-        """The exit code, after the end."""
         return self.process.wait(timeout=120)
 
     def kill(self) -> None:
@@ -152,7 +149,6 @@ def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
 
 
 def connect(server: Server, receive_buffer: int | None = None) -> socket.socket:
-    """A connection."""
     raw = socket.socket()
     if receive_buffer is not None:
         raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)

@@ -67,7 +67,6 @@ def read(path: Any, sep: str = ",") -> Any:
 
 
 def rejects_of(path: Any) -> Any:
-    """Row, input and reason of each rejected row."""
     rows = read(path.with_name(path.name + ".rejects.csv"))
     return [(int(row["row"]), row["field"], row["reason"]) for row in rows]
 

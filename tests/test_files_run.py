@@ -56,7 +56,6 @@ def cases(tmp_path_factory: pytest.TempPathFactory, small_blocks: Any) -> Any:  
 
 
 def copied(cases: Any, kind: Any, folder: Path) -> Any:
-    """An input of this test's own."""
     return shutil.copy(cases / f"cases.{kind}", folder)
 
 

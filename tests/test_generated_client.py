@@ -67,7 +67,6 @@ def run(folder: Path, *command: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def folder(live_server: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A folder with the generated package and the program that uses it."""
     made = tmp_path_factory.mktemp("client")
     (made / "openapi.json").write_bytes(live_server.ask("GET", "/openapi.json")[2])
     (made / "config.yaml").write_text("content_type_overrides:\n  application/x-netcdf: application/octet-stream\n")

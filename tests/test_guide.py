@@ -37,12 +37,10 @@ sys.exit(0 if result.attempted and not result.failed else 1)
 
 
 def blocks(page: Path, language: str) -> list[str]:
-    """The fenced blocks of a page in one language."""
     return [text for kind, text in BLOCK.findall(page.read_text("utf-8")) if kind == language]
 
 
 def having(language: str) -> list[Path]:
-    """The pages with such a block."""
     return [page for page in PAGES if blocks(page, language)]
 
 

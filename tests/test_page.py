@@ -206,8 +206,6 @@ def test_the_pages_ask_for_the_key_and_use_it(open_page: Any, serving: Any, tabl
 
 
 def ask_for_the_key(page: Any, folder: Path) -> None:
-    """The pages of a service with an API key in force."""
-
     def enter(key: Any) -> None:
         page.type("#key", key, commit=False)
         page.find("#key-form button").click()

@@ -30,7 +30,6 @@ def table(tables_dir: Path) -> Any:
 
 @pytest.fixture(scope="module")
 def folder(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The page's folder."""
     if compiler() is None:
         pytest.skip("neither zig nor clang with lld is installed")
     root = tmp_path_factory.mktemp("alone")
@@ -128,7 +127,6 @@ def test_its_numbers_are_pythons(open_page: Any, host: Any, table: Surrogate) ->
 
 
 def both(open_page: Any, host: Any, client: Any, path: Any, asked: Any) -> Any:
-    """The answers of the page and of the service."""
     page = open_page("", url=host)
     found = page.run(f"return (await import('./static/page/service.js')).post('{path}', {asked});")
     return found, client.post(f"/{path}", json={**asked, "tolerance": 1e-7}).json()

@@ -47,7 +47,6 @@ def raw(live_server: Any) -> Any:
 
 
 def answer(raw: Any) -> Any:
-    """One answer."""
     response = http.client.HTTPResponse(raw, method="POST")
     response.begin()
     return response.status, response.read()

@@ -143,7 +143,6 @@ def unread(repository: Path, surrogate: Surrogate) -> Any:
 
 
 def statuses(port: Any, path: Any, many: Any) -> Any:
-    """Responses to the same request on one connection."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     found = []
     for _ in range(many):

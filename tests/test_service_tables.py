@@ -16,7 +16,6 @@ HEALTH = ("/readyz", "/healthz")
 
 @pytest.fixture
 def table_copy(surrogate: Surrogate, tmp_path: Path) -> Any:
-    """A copy of a table that a test may damage."""
     return Path(shutil.copy(surrogate.path, tmp_path / surrogate.path.name))
 
 
