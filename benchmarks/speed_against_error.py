@@ -9,7 +9,6 @@ against fresh solves.  A full run draws build/results/speed_against_error.png.
 from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
 import math
-import timeit
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -26,8 +25,6 @@ from mumacro import Surrogate, closed_forms
 
 Array = NDArray[np.float64]
 OURS, PEER, EXACT = "ours", "peer", "exact"
-TRIAL = 2000  # points of the trial that determines the points of one round
-BUDGET = 2.0  # seconds allowed for one round of one contender; slower ones are timed on fewer points
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
 HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
 
@@ -82,13 +79,6 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
     return found
 
 
-def affordable(contender: Contender, v: Array, y: Array) -> int:
-    """The number of points for one round, from a short trial; the first call compiles."""
-    contender.evaluate(v[:TRIAL], y[:TRIAL])
-    seconds = min(timeit.repeat(partial(contender.evaluate, v[:TRIAL], y[:TRIAL]), number=1, repeat=3))
-    return int(min(v.size, max(TRIAL, BUDGET * TRIAL / seconds)))
-
-
 def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row], str]:
     """All rows: the tables, the peers, the formula, the solvers; and a sentence about other load."""
     v, y = draw(points, seed=1)
@@ -97,10 +87,7 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
         progress("fresh solves")
         truth = sweep.solve("full", v_true, y_true)["mu_ratio"]
         entries = contenders(sweep, quick)
-    used = {str(i): affordable(c, v, y) for i, (_, c) in enumerate(entries)}
-    work: dict[str, Callable[[], object]] = {
-        str(i): partial(c.evaluate, v[: used[str(i)]], y[: used[str(i)]]) for i, (_, c) in enumerate(entries)
-    }
+    work: dict[str, Callable[[], object]] = {str(i): partial(c.evaluate, v, y) for i, (_, c) in enumerate(entries)}
     logs = np.empty((points, 2))
     work["logs"] = lambda: (np.log(v, out=logs[:, 0]), np.log(y, out=logs[:, 1]))
     direct = np.stack([v, y, y - 1.0], axis=1)[: 500 if quick else 10_000]
@@ -110,7 +97,7 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     rows: list[Row] = []
     for i, (kind, c) in enumerate(entries):
         error = np.abs(c.evaluate(v_true, y_true) - truth)
-        ns = timed.best[str(i)] / used[str(i)] * 1e9
+        ns = timed.best[str(i)] / points * 1e9
         rows.append(Row(kind, c.name, c.size, ns, *spread(error, truth), c.bytes, c.solves))
     ns = timed.best["logs"] / points * 1e9
     rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))

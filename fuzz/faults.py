@@ -127,23 +127,6 @@ def full_disk_in_writing_a_table(folder: Path) -> str:
     return "TableError; no file left"
 
 
-def full_disk_in_eval(folder: Path, n: int = 100_000) -> str:
-    source = cases(folder / "cases.csv", n)
-    for kind in ("csv", "ndjson", "parquet"):
-        run("-m", "mumacro", "eval", source, "-o", folder / f"whole.{kind}")
-        with small_disk(folder, f"{n * 100 >> 10}k") as disk:
-            words = ("-m", "mumacro", "eval", source, "-o", disk / f"out.{kind}")
-            said = run(*words, code=1)
-            assert "No space left on device" in said, said
-            assert not (disk / f"out.{kind}").exists()
-            subprocess.run(["mount", "-o", f"remount,size={n >> 9}m", str(disk)], check=True)
-            run(*words)
-            assert (disk / f"out.{kind}").read_bytes() == (folder / f"whole.{kind}").read_bytes()
-            assert left(disk) == [f"out.{kind}", f"out.{kind}.run.json"]
-        (folder / "disk").rmdir()
-    return "one line; with more space the same command resumes and gives the same bytes; CSV, NDJSON, Parquet"
-
-
 def lost_permission(folder: Path) -> str:
     """Commands whose user must not write into the folder."""
     shut, source = closed(folder), cases(folder / "cases.csv", 100)
@@ -228,7 +211,6 @@ def clock_steps(folder: Path) -> str:
 
 FAULTS: dict[str, Callable[[Path], str]] = {
     "disk full while a build runs": full_disk_in_a_build,
-    "disk full while eval runs": full_disk_in_eval,
     "no home, and an unwritable one": no_home,
     "SIGKILL of builds": killed_builds,
     "disk full while a table is written": full_disk_in_writing_a_table,
@@ -236,7 +218,7 @@ FAULTS: dict[str, Callable[[Path], str]] = {
     "two builds to one output": two_builds_to_one_output,
     "a clock that steps": clock_steps,
 }
-QUICK = [*FAULTS][4:]
+QUICK = [*FAULTS][3:]
 
 
 def tried(fault: Callable[[Path], str]) -> tuple[str, str]:

@@ -116,15 +116,6 @@ def test_a_line_is_answered_like_a_batch_or_a_case(client: Any, case: Case) -> N
     assert third == one(client, case)
 
 
-def test_lines_keep_their_order_however_they_arrive(client: Any, case: Case) -> None:
-    text = as_ndjson([{**case, "v0": [0.001 * i, 0.002 * i]} for i in range(1, 200)]).replace("\n", "\r\n").encode()
-    whole = posted(client, "ndjson", text)
-    assert whole.text.count("\n") == 199
-    for size in (1, 7, 1000, 100_000):
-        pieces = (text[start : start + size] for start in range(0, len(text), size))
-        assert posted(client, "ndjson", pieces).content == whole.content
-
-
 def test_options_of_a_stream_come_with_its_query_or_its_lines(client: Any, case: Case, problem: Any) -> None:
     body = as_ndjson([case, {**case, "include": ["limits"]}])
     plain, extended = read("ndjson", posted(client, "ndjson", body))
