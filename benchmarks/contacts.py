@@ -35,8 +35,6 @@ def costs() -> None:
             print(f"{tolerance:g} {name:10} {1e9 * each:7.0f} ns, {each / spring:6.1f} springs")
 
 
-# --- the errors of the rules --------------------------------------------------------------------------------
-
 RULES, MANY, HUGE = 5, 160, 1e6  # pieces; nodes of what counts as exact; a constant beside which rounding is nothing
 CLOSE, ABOVE = 2, 3  # CLOSE has no relative error; ABOVE has constants of oscillation along, too
 ALONG_SLOPE = 6  # the place of the slopes of oscillation along

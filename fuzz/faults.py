@@ -30,9 +30,6 @@ TOLERANCE = "1e-2"
 AS_NOBODY = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")  # a user that owns nothing
 
 
-# --- what the trials share ----------------------------------------------------------------------------
-
-
 class NotTriedError(Exception):
     """A trial cannot be made here; the message says why."""
 
@@ -97,9 +94,6 @@ def left(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-# --- full disks and lost permissions ------------------------------------------------------------------
-
-
 def full_disk_in_a_build(folder: Path) -> str:
     with small_disk(folder, "96k") as disk:
         said = run(*build(disk / "rough.nc"), code=1)
@@ -142,9 +136,6 @@ def lost_permission(folder: Path) -> str:
         assert "Permission denied" in found, found
         assert left(shut) == []
     return "one line; no file left"
-
-
-# --- two at work, no home, clock ----------------------------------------------------------------------
 
 
 def two_builds_to_one_output(folder: Path) -> str:

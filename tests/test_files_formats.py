@@ -42,7 +42,7 @@ def write(given: Any, path: Any) -> Any:
     if path.suffix == ".parquet":
         pq.write_table(given, path, row_group_size=100)
         return path
-    rows = [{**row, "k": "rigid" if row["k"] == math.inf else row["k"]} for row in given.to_pylist()]
+    rows = [{name: "rigid" if x == math.inf else x for name, x in row.items()} for row in given.to_pylist()]
     text = io.StringIO()
     if ".csv" in path.name:
         writer = csv.DictWriter(text, given.schema.names)
@@ -354,12 +354,7 @@ def test_files_know_contact_and_ends_of_k(tmp_path: Path, capsys: Capture, start
     kind, more = ANSWERED[name]
     rng = np.random.default_rng(3)
     given = {field: value * rng.uniform(0.9, 1.1, 40) for field, value in {**ALIKE, **more, "omega": 1.3e5}.items()}
-    source, out, rows = tmp_path / f"cases.{start}", tmp_path / f"out.{end}", pa.table(given).to_pylist()
-    if start == "parquet":
-        pq.write_table(pa.table(given), source)
-    else:
-        lines = [",".join(given), *(",".join(map(repr, row.values())) for row in rows)]
-        source.write_text("\n".join(lines if start == "csv" else map(json.dumps, rows)))
+    source, out = write(pa.table(given), tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"
     options = [f"--{key}={value}" for key, value in kind.items()]
     ran(capsys, 0, source, "-o", out, *options, "--include", "gradient")
     found = read(out)

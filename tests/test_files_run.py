@@ -1,6 +1,5 @@
 """``mumacro eval`` killed, stopped, cut, changed: the same command goes on with the same bytes, or says why not."""
 
-import json
 import os
 import shutil
 import signal
@@ -10,10 +9,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tests.cases import Capture, opened
+from tests.test_files_formats import cases as random_cases
+from tests.test_files_formats import write
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
@@ -21,7 +21,7 @@ import pyarrow.parquet as pq  # noqa: E402
 from mumacro.__main__ import main  # noqa: E402
 from mumacro.files import FilesError, evaluate_files, reading, run  # noqa: E402
 
-NAMES, TABLE = ("mu0", "Fz", "k", "y0", "omega", "v0"), opened(1e-12)
+TABLE = opened(1e-12)
 KINDS = ("csv", "csv.gz", "ndjson", "parquet")
 
 
@@ -33,25 +33,18 @@ def small_blocks() -> Any:
 
 
 def table_of(n: int) -> Any:
-    rng = np.random.default_rng(1)
-    low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
-    values = 10.0 ** rng.uniform(low, high, (n, 6))
-    values[::999, 0] *= -1.0  # rejected
-    return pa.table(dict(zip(NAMES, values.T, strict=True)))
+    given = random_cases(n)
+    mu0 = given["mu0"].to_numpy().copy()
+    mu0[::999] *= -1.0  # rejected
+    return given.set_column(0, "mu0", pa.array(mu0))
 
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory, small_blocks: Any) -> Any:  # noqa: ARG001
     """3,000 cases in every format, and the output of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("cases")
-    pq.write_table(table_of(3000), folder / "cases.parquet", row_group_size=1000)
-    rows = table_of(3000).to_pylist()
-    (folder / "cases.ndjson").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    lines = [",".join(NAMES), *(",".join(map(repr, row.values())) for row in rows), ""]
-    (folder / "cases.csv").write_text("\n".join(lines))
-    subprocess.run(["gzip", "-kn", folder / "cases.csv"], check=True)
     for kind in KINDS:
-        evaluate_files([folder / f"cases.{kind}"], folder / f"whole.{kind}", TABLE)
+        evaluate_files([write(table_of(3000), folder / f"cases.{kind}")], folder / f"whole.{kind}", TABLE)
     return folder
 
 
@@ -190,9 +183,6 @@ def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path: Path, repository: Pa
         assert subprocess.run([*command, str(path)], cwd=repository, capture_output=True, check=False).returncode == 3
     assert out.read_bytes() == (tmp_path / f"whole.{kind}").read_bytes()
     assert not list(tmp_path.glob("*.parts"))
-
-
-# --- inputs that change, outputs that are inputs -----------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", KINDS)

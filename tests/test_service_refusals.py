@@ -251,8 +251,6 @@ def test_columns_that_do_not_fit_are_refused(client: Any, problem: Any, form: An
     assert any(words in f"{fault['field']}: {fault['reason']}" for fault in document["errors"]), document
 
 
-# --- bodies as a whole ----------------------------------------------------------------------------------
-
 CASES = "must be an object of columns or a list of rows"
 
 

@@ -21,15 +21,11 @@ def table_copy(surrogate: Surrogate, tmp_path: Path) -> Any:
 
 def test_the_table_describes_itself(client: Any, surrogate: Surrogate) -> None:
     answer = client.get("/v1/table").json()
-    label = {"id": surrogate.id, "tolerance": surrogate.tolerance}
-    expected = {
-        **label, "table": label, "checksum": surrogate.checksum, "file": surrogate.path.name, "api_version": "1",
-        "size_bytes": surrogate.path.stat().st_size, "max_abs_error": surrogate.max_abs_error,
-        "max_rel_error": surrogate.max_rel_error,
-    }  # fmt: skip
+    label = {name: getattr(surrogate, name) for name in ("id", "tolerance")}
+    expected = {name: getattr(surrogate, name) for name in ("checksum", "max_abs_error", "max_rel_error")}
+    expected |= {**label, "table": label, "file": surrogate.path.name, "size_bytes": surrogate.path.stat().st_size}
     assert {name: answer[name] for name in expected} == expected
-    assert answer["attributes"]
-    assert answer["blocks"]
+    assert all(answer[name] for name in ("attributes", "blocks"))
     assert label in answer["loaded"]
 
 
