@@ -75,10 +75,10 @@ def c_header(quick: bool) -> str:
                 called(made.ratio_array, hard_v, hard_y, found)()
                 ulps = np.where(found == expected, 0.0, np.abs(found - expected) / np.spacing(np.abs(expected)))
                 apart[row] = (f"{np.mean(ulps > 0.0):.1e}", f"{np.mean(ulps > 4.0):.1e}", f"{ulps[away].max():.0f}")
-        timed = best_of(rounds, work, "processor")
-    rows = [[name, quantity(1e9 * timed.best[name] / n), *apart.get(name, "---")] for name in work]
+        best = best_of(rounds, work)
+    rows = [[name, quantity(1e9 * best[name] / n), *apart.get(name, "---")] for name in work]
     header = ("evaluator", "ns/point", "other bits", "beyond 4 ulp", "largest off the border")
-    return f"{markdown(header, rows)}\n\n{timed.note()}"
+    return markdown(header, rows)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def calls(points: int, quick: bool) -> str:
         ("one call", SCALARS, 2000, 1e6, "us"), (f"{n:,} points, one thread", ARRAYS, 1, 1e9 / n, "ns a point"),
     ):  # fmt: skip
         work = {name: partial(timeit.timeit, text, globals=names, number=number) for name, text in statements.items()}
-        best = best_of(2 if quick else 15, work, "processor").best
+        best = best_of(2 if quick else 15, work)
         tables.append(markdown([kind, f"[{unit}]"], [[name, quantity(t / number * scale)] for name, t in best.items()]))
     return "\n\n".join([f"Table 1e-10, kernel of the level {mumacro.library.kernels[-1].level}.", *tables])
 

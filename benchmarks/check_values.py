@@ -28,7 +28,6 @@ STICK = 1e-11  # absolute: next to the border the end of slip is a grazing root
 
 
 def read(name: str) -> list[dict[str, str]]:
-    """The rows of a file of reference values."""
     with (DATA / name).open(newline="", encoding="utf-8") as stream:
         return list(csv.DictReader(stream))
 
@@ -40,7 +39,6 @@ def row(quantity: str, where: str, value: float, tolerance: float, **inputs: Any
 
 
 def chosen() -> list[dict[str, str]]:
-    """Some points of every class, evenly spread over the file."""
     points = read("points.csv")
     found = []
     for kind in dict.fromkeys(point["case"] for point in points):

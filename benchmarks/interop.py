@@ -35,7 +35,6 @@ Way = tuple[Callable[..., Any], Callable[..., Any], Callable[[float], Any]]
 
 
 def loop(step: Callable[[Any], Any], start: Any) -> Any:
-    """A body that takes 1,000 small steps."""
     for _ in range(STEPS):
         start = 0.9 * start + 0.1 * step(start)
     return start
@@ -51,7 +50,6 @@ def in_jax(table: mumacro.Surrogate) -> Way:
 
 
 def in_torch(table: mumacro.Surrogate) -> Way:
-    """The operator, without derivatives."""
     import torch
 
     from mumacro.torch import Friction
@@ -94,7 +92,7 @@ def interop(quick: bool) -> str:
             given = [0.1] if points is None else [made(x[:points] if points else float(x[0])) for x in (v, y)]
             once = functools.partial(steps if points is None else call, *given)
             work[name] = functools.partial(timeit.timeit, once, number=number)
-        for name, seconds in best_of(15, work, "processor").best.items():
+        for name, seconds in best_of(15, work).items():
             before = BEFORE.get((name, i))
             rows[name].append(quantity(seconds / number * unit) + (f" ({before})" if before else ""))
     head = ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"]

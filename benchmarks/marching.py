@@ -54,9 +54,8 @@ def march(v: float, y: float, max_step: float = math.inf) -> Marched:
         tau, total = 0.0, 0.0
         while tau < PERIOD:
             law, event, start = (stick, full, [*state, total]) if sticking else (slip, speed, [*state, total])
-            run = solve_ivp(
-                law, (tau, PERIOD), start, method="DOP853", rtol=RTOL, atol=ATOL, events=event, max_step=max_step
-            )
+            options: Any = {"rtol": RTOL, "atol": ATOL, "max_step": max_step}
+            run = solve_ivp(law, (tau, PERIOD), start, method="DOP853", events=event, **options)
             tau, total = float(run.t[-1]), float(run.y[-1, -1])
             if sticking:
                 state = (float(run.y[0, -1]), float(run.y[1, -1]))

@@ -15,7 +15,6 @@ from tests.serving import serving
 
 
 def main() -> None:
-    """Take the screenshot, of the whole page."""
     with serving() as server, tempfile.TemporaryDirectory() as profile:
         browser = driven.start(Path(profile))
         try:

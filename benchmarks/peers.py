@@ -45,7 +45,6 @@ def cache() -> Path:
 
 
 def grid_axis(n: int) -> Array:
-    """``n`` log-spaced values across :data:`SQUARE`."""
     return np.geomspace(*SQUARE, n)
 
 

@@ -32,7 +32,6 @@ def points(block_info: Any = None) -> Any:
 
 
 def over(shares: Any, low: float, high: float) -> Any:
-    """Numbers log-uniform from ``low`` to ``high`` for uniform ``shares``."""
     return np.exp(np.log(low) + np.log(high / low) * shares)
 
 

@@ -35,13 +35,11 @@ KINDS = {name: TYPES[form] for name, form in (
 
 
 def post(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
-    """A request."""
     body = json.dumps(case).encode()
     return head(path, len(body)) + body
 
 
 def get(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
-    """The same as a query."""
     query = "&".join(f"{name}={value}" for name, value in case.items())
     return f"GET {path}?{query} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
 
@@ -167,7 +165,6 @@ def longest(server: Server, kind: str, body: bytes, number: int) -> float:
 
 
 def start() -> str:
-    """Time to the first ready answer, and memory."""
     times, idle = [], 0.0
     for _ in range(3):
         with serving(FINEST, ready=False, before=FIRST) as own:

@@ -12,7 +12,6 @@ from mumacro.inputs import FIELDS
 
 
 def raw() -> Any:
-    """The floor."""
     import orjson
 
     async def app(scope: Any, receive: Any, send: Any) -> None:

@@ -50,13 +50,11 @@ class Row:
 
 
 def draw(n: int, seed: int) -> Array:
-    """``n`` points v~, y~, log-uniform over the square."""
     low, high = np.log(peers.SQUARE)
     return np.exp(np.random.default_rng(seed).uniform(low, high, (2, n)))
 
 
 def tables() -> list[Surrogate]:
-    """The committed tables, coarse to fine."""
     opened = [Surrogate.open(path, threads=1) for path in (ROOT / "tables").glob("*.nc")]
     return sorted(opened, key=lambda s: -s.tolerance)
 
@@ -66,7 +64,6 @@ def spread(error: Array, truth: Array) -> tuple[float, float, float]:
 
 
 def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
-    """All methods timed on the large set of points, the tables first."""
     found = []
     for s in tables():
         solves = int(s.table.attributes["n_solves"])
@@ -79,8 +76,8 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
     return found
 
 
-def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row], str]:
-    """All rows: the tables, the peers, the formula, the solvers; and a sentence about other load."""
+def compare(points: int, quick: bool, rounds: int) -> list[Row]:
+    """All rows: the tables, the peers, the formula, the solvers."""
     v, y = draw(points, seed=1)
     v_true, y_true = draw(2_000 if quick else 100_000, seed=2)
     with Sweep(1, checkpoint=peers.cache()) as sweep:
@@ -93,30 +90,28 @@ def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row
     direct = np.stack([v, y, y - 1.0], axis=1)[: 500 if quick else 10_000]
     work["direct"] = lambda: solve_chunk("full", direct)
     progress(f"{rounds} rounds of {len(work)} contenders")
-    timed = best_of(rounds, work, clock)
+    best = best_of(rounds, work)
     rows: list[Row] = []
     for i, (kind, c) in enumerate(entries):
         error = np.abs(c.evaluate(v_true, y_true) - truth)
-        ns = timed.best[str(i)] / points * 1e9
+        ns = best[str(i)] / points * 1e9
         rows.append(Row(kind, c.name, c.size, ns, *spread(error, truth), c.bytes, c.solves))
-    ns = timed.best["logs"] / points * 1e9
+    ns = best["logs"] / points * 1e9
     rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))
-    ns = timed.best["direct"] / len(direct) * 1e9
+    ns = best["direct"] / len(direct) * 1e9
     rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns))
-    return rows, timed.note()
+    return rows
 
 
-def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> str:
+def speed_against_error(points: int, rounds: int, quick: bool) -> str:
     points = 20_000 if quick else points
     numba.set_num_threads(1)
-    rows, note = compare(points, quick, rounds, clock)
+    rows = compare(points, quick, rounds)
     if not quick:
         plot(rows, RESULTS / "speed_against_error.png")
-    text = f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread; best of {rounds} rounds."
-    return (
-        f"{text} {note} Errors of mu~ are against fresh solves. Bytes are those of the data in memory.\n\n"
-        + markdown(HEADER, [row.cells() for row in rows], 2)
-    )
+    text = f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread, best of {rounds} rounds, "
+    text += "processor time. Errors of mu~ are against fresh solves. Bytes are those of the data in memory."
+    return f"{text}\n\n{markdown(HEADER, [row.cells() for row in rows], 2)}"
 
 
 def plot(rows: list[Row], path: Path) -> None:
@@ -145,4 +140,4 @@ def plot(rows: list[Row], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(__doc__, {"speed_against_error": speed_against_error}, points=1_000_000, rounds=5, quick=False, clock="wall")
+    main(__doc__, {"speed_against_error": speed_against_error}, points=1_000_000, rounds=5, quick=False)

@@ -28,7 +28,6 @@ BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "c
 
 
 def command(tolerance: float, out: str, workers: int | None = None) -> list[str]:
-    """Arguments of the interpreter that build a table."""
     words = ["-m", "builder", "build", "--tolerance", f"{tolerance:.0e}".replace("e-0", "e-"), "--out", out]
     return words + ([] if workers is None else ["--workers", str(workers)])
 

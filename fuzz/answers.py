@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.measuring import main, markdown, quantity
+from benchmarks.measuring import main, markdown, quantity, sections
 from builder.limits import V_RANGE, Y_RANGE
 from builder.sweep import Sweep
 from mumacro import Surrogate
@@ -198,7 +198,6 @@ PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
 
 
 def promises(share: float) -> str:
-    """Every property, for the coarsest and the finest table."""
     rows = []
     for tolerance in (1e-4, 1e-12):
         for name, check in PROMISES.items():
@@ -208,7 +207,5 @@ def promises(share: float) -> str:
     return markdown(("property", "table", "tried", "broken", "largest change or error, bound = 1"), rows)
 
 
-SECTIONS = {"promises": promises}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0)
+    main(__doc__, sections(promises), share=1.0)

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
-from benchmarks.measuring import main, markdown
+from benchmarks.measuring import main, markdown, sections
 from tests.serving import CASE, Server, asking, connect, head, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
@@ -129,7 +129,5 @@ def attacks(share: float) -> str:
     return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
 
 
-SECTIONS = {"attacks": attacks}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0)
+    main(__doc__, sections(attacks), share=1.0)

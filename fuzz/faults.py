@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measuring import ROOT, main, markdown
+from benchmarks.measuring import ROOT, main, markdown, sections
 from mumacro import Surrogate, TableError
 from mumacro.table import read_table, write_table
 from mumacro.writing import alone_in
@@ -146,11 +146,7 @@ def two_builds_to_one_output(folder: Path) -> str:
     return "the second is refused with one line"
 
 
-ASK = ("-m", "mumacro", "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01", "--json", "--table", "1e-4")
-
-
 def killed_builds(folder: Path, kills: int = 20) -> str:
-    """At random moments, each followed by the same command."""
     out, chance, resumed, done = folder / "rough.nc", random.Random(7), 0, 0  # noqa: S311
     begun = time.perf_counter()
     run(*build(folder / "whole.nc"))
@@ -167,19 +163,6 @@ def killed_builds(folder: Path, kills: int = 20) -> str:
     assert checksum(out) == checksum(folder / "whole.nc")
     assert left(folder) == ["rough.nc", "whole.nc"], left(folder)
     return f"{kills} kills, {resumed} starts from finished parts, {done} after an end: the same data, no file left"
-
-
-def no_home(folder: Path) -> str:
-    if os.getuid() != 0:
-        raise NotTriedError("only root may run a trial as a user without a home")
-    (folder / "tmp").mkdir(mode=0o777)
-    (folder / "tmp").chmod(0o777)
-    closed(folder)
-    for home in ("", "/nonexistent"):
-        said = run(*ASK, nobody=True, HOME=home, XDG_CACHE_HOME="", TMPDIR=str(folder / "tmp"))
-        assert said == run(*ASK)
-    assert left(folder / "tmp") == []
-    return "the same answer; no file in a folder of temporary files"
 
 
 def clock_steps(folder: Path) -> str:
@@ -202,14 +185,13 @@ def clock_steps(folder: Path) -> str:
 
 FAULTS: dict[str, Callable[[Path], str]] = {
     "disk full while a build runs": full_disk_in_a_build,
-    "no home, and an unwritable one": no_home,
     "SIGKILL of builds": killed_builds,
     "disk full while a table is written": full_disk_in_writing_a_table,
     "no permission to write": lost_permission,
     "two builds to one output": two_builds_to_one_output,
     "a clock that steps": clock_steps,
 }
-QUICK = [*FAULTS][3:]
+QUICK = [*FAULTS][2:]
 
 
 def tried(fault: Callable[[Path], str]) -> tuple[str, str]:
@@ -228,7 +210,5 @@ def faults() -> str:
     return markdown(("fault", "result", "what was seen"), rows, 3)
 
 
-SECTIONS = {"faults": faults}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS)
+    main(__doc__, sections(faults))

@@ -23,7 +23,7 @@ import numpy as np
 import orjson
 import pyarrow as pa
 
-from benchmarks.measuring import ROOT, main, markdown, progress
+from benchmarks.measuring import ROOT, main, markdown, progress, sections
 from tests.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
@@ -41,9 +41,6 @@ class Request(NamedTuple):
     query: bytes
     headers: list[tuple[bytes, bytes]]
     body: bytes
-
-
-# --- valid requests -----------------------------------------------------------------------------------
 
 
 def case(chance: random.Random) -> dict[str, float]:
@@ -88,8 +85,6 @@ def arrow(chance: random.Random) -> bytes:
             writer.write_table(table)
     return bytes(sink.getvalue().to_pybytes())
 
-
-# --- what is changed ----------------------------------------------------------------------------------
 
 #: texts that replace a value
 NUMBERS = (
@@ -262,15 +257,11 @@ KINDS: dict[str, tuple[int, Callable[[random.Random], Request]]] = {
 
 
 def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
-    """Requests of one share of the work."""
     chance = random.Random(seed)  # noqa: S311
     names, weights = list(KINDS), [weight for weight, _ in KINDS.values()]
     for _ in range(count):
         name = chance.choices(names, weights)[0]
         yield name, KINDS[name][1](chance)
-
-
-# --- sending ------------------------------------------------------------------------------------------
 
 
 def wire(request: Request) -> bytes:
@@ -348,7 +339,5 @@ def strange_requests(share: float, again: int = 0) -> str:
     return f"{markdown(('what is changed', 'requests'), rows)}\n\n{text}"
 
 
-SECTIONS = {"strange_requests": strange_requests}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0, again=0)
+    main(__doc__, sections(strange_requests), share=1.0, again=0)

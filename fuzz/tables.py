@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.measuring import ROOT, main, markdown
+from benchmarks.measuring import ROOT, main, markdown, sections
 from fuzz.hostile_tables import HOSTILE, SMALLEST
 from mumacro import Surrogate, TableError
 from mumacro.table import parse_table
@@ -140,7 +140,6 @@ def row(name: str, found: Sequence[Outcome]) -> list[str]:
 
 
 def damaged_tables(share: float) -> str:
-    """Truncations and flipped bytes."""
     rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
     left_out = "" if share == 1.0 else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
     return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time."
@@ -167,10 +166,8 @@ def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
     return markdown(("content of the file", "result", "reason", "seconds", "memory so far [MB]"), rows, 3)
 
 
-SECTIONS = {"damaged_tables": damaged_tables, "hostile_tables": hostile_tables}
-
 if __name__ == "__main__":
     if sys.argv[1:2] == ["open"]:
         open_all(sys.argv[2:])
     else:
-        main(__doc__, SECTIONS, share=1.0)
+        main(__doc__, sections(damaged_tables, hostile_tables), share=1.0)

@@ -94,8 +94,6 @@ class Opened:
 
 
 class Page:
-    """The page as a user sees it."""
-
     def __init__(self, browser: Any, url: Any) -> None:
         self.browser, self.url = browser, url
 
@@ -142,7 +140,6 @@ class Page:
         return float(self.text(selector))
 
     def shown(self) -> Any:
-        """Names and values beside the result."""
         return dict(zip(self.texts("dt"), self.texts("dd"), strict=True))
 
     def value(self, selector: str) -> Any:

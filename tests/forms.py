@@ -63,7 +63,6 @@ def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Ro
 
 
 def read(form: str, response: Any) -> list[Row]:
-    """The cases of an answer."""
     if form == "arrow":
         return list(pa.ipc.open_stream(response.content).read_all().to_pylist())
     return rows_of(form, response.text)

@@ -60,14 +60,8 @@ def test_solve_answers_at_the_ends_of_its_range(run_builder: Run) -> None:
         assert answer["status"] == 0
         assert 0.0 < answer["mu_ratio"] <= 1.0
         assert 0.0 <= answer["error_estimate"] < 2e-15
-
-
-def test_solve_far_below_the_border_leaves_out_what_it_did_not_compute(run_builder: Run) -> None:
-    done = run_builder("solve", "--v", "1e-9", "--y", "0.5")
-    assert done.returncode == 0, done.stderr
-    answer = json.loads(done.stdout)
-    assert answer["regime"] == "stick_slip"
-    assert answer["min_slip_speed"] is None
+    answer = json.loads(run_builder("solve", "--v", "1e-9", "--y", "0.5").stdout)
+    assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)  # far below the border: not computed
     assert answer["stick_fraction"] > 0.99
 
 

@@ -25,11 +25,6 @@ CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 VALUES: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
 
 
-@pytest.fixture(scope="module")
-def tightest() -> Any:
-    return Surrogate.open()
-
-
 def said(capsys: Capture, code: Any, *words: Any) -> Any:
     """The output of ``mumacro WORDS``; from stderr, one line, if it fails."""
     assert main(words) == code
@@ -42,33 +37,33 @@ def said(capsys: Capture, code: Any, *words: Any) -> Any:
     return found.out
 
 
-def test_one_case_is_answered_with_units_regime_bound_and_source(capsys: Capture, tightest: Surrogate) -> None:
+def test_one_case_is_answered_with_units_regime_bound_and_source(capsys: Capture, surrogate: Surrogate) -> None:
     text = said(capsys, 0, CASE, "--digits", "15")
-    expected = tightest.evaluate(**VALUES)
+    expected = surrogate.evaluate(**VALUES)
     row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
     assert float(row.split()[1]) == close(expected.mu_macro, rel=1e-14)
     assert "[-]" in row
     assert f"+- {expected.error_bound:.2g}" in row
-    for part in (expected.regime, expected.source, tightest.id):
+    for part in (expected.regime, expected.source, surrogate.id):
         assert part in text
     shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
-    told = [f"model  {row['row']}: {row['text']}" for row in model_rows(tightest, VALUES)]
+    told = [f"model  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
     assert rows[-len(told) :] == told
-    assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(tightest, VALUES)
+    assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(surrogate, VALUES)
     assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
 
 
-def test_json_has_every_bit_but_no_infinity_and_inputs_may_be_apart(capsys: Capture, tightest: Surrogate) -> None:
-    expected = tightest.evaluate(**VALUES, gradient=True)
+def test_json_has_every_bit_but_no_infinity_and_inputs_may_be_apart(capsys: Capture, surrogate: Surrogate) -> None:
+    expected = surrogate.evaluate(**VALUES, gradient=True)
     for words in ((CASE, "--json", "--gradient"), (*CASE.split()[:3], "--json", *CASE.split()[3:], "--gradient")):
         answer = json.loads(said(capsys, 0, *words))
         assert answer["mu_macro"] == expected.mu_macro
         assert answer["error_bound"] == expected.error_bound
         assert answer["gradient"] == expected.gradient
-        assert answer["table"] == {"id": tightest.id, "tolerance": tightest.tolerance}
+        assert answer["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
     rigid = json.loads(said(capsys, 0, CASE.replace("1e6", "rigid"), "--json"), parse_constant=pytest.fail)
-    assert rigid["mu_macro"] == tightest.evaluate(**{**VALUES, "k": None}).mu_macro
+    assert rigid["mu_macro"] == surrogate.evaluate(**{**VALUES, "k": None}).mu_macro
     assert rigid["v_tilde"] is None  # JSON has no infinity
 
 
@@ -107,8 +102,8 @@ def test_everything_that_is_wrong_with_a_case_is_told_at_once(capsys: Capture) -
     assert message.endswith("missing: y0 [m]")
 
 
-def test_a_unit_may_be_given_beside_the_number_or_apart(capsys: Capture, tightest: Surrogate) -> None:
-    expected = tightest.evaluate(**VALUES).mu_macro
+def test_a_unit_may_be_given_beside_the_number_or_apart(capsys: Capture, surrogate: Surrogate) -> None:
+    expected = surrogate.evaluate(**VALUES).mu_macro
     for case in (
         "mu0=30% Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s",
         "mu0=30 % Fz = 0.01 kN k=1 N/um y0=2 um f=20690Hz, v0=10mm/s",
@@ -166,18 +161,18 @@ def test_wrong_options_are_reported_in_one_line(capsys: Capture, words: Any) -> 
     assert len(ended(capsys, 2, *words).splitlines()) == 1
 
 
-def test_a_law_runs_along_any_input_and_marks_the_border(capsys: Capture, tightest: Surrogate) -> None:
+def test_a_law_runs_along_any_input_and_marks_the_border(capsys: Capture, surrogate: Surrogate) -> None:
     known = CASE.replace("v0=0.01", "")
     words = ("law", known, "--along", "v0", "1e-4", "1", "--points", "9")
     found = json.loads(said(capsys, 0, *words, "--json"))
     assert found["v0"][0] == 1e-4
     assert found["v0"][-1] == 1.0
     for v0, mu, regime in zip(found["v0"], found["mu_macro"], found["regime"], strict=True):
-        answer = tightest.evaluate(**{**VALUES, "v0": v0})
+        answer = surrogate.evaluate(**{**VALUES, "v0": v0})
         assert (mu, regime) == (answer.mu_macro, answer.regime)
     (border,) = found["border"]
-    assert tightest.evaluate(**{**VALUES, "v0": border["v0"]}).regime == "continuous"
-    assert tightest.evaluate(**{**VALUES, "v0": math.nextafter(border["v0"], 0.0)}).regime == "stick_slip"
+    assert surrogate.evaluate(**{**VALUES, "v0": border["v0"]}).regime == "continuous"
+    assert surrogate.evaluate(**{**VALUES, "v0": math.nextafter(border["v0"], 0.0)}).regime == "stick_slip"
     text = said(capsys, 0, *words)
     assert "v0 [m/s]" in text
     assert "border of continuous sliding at v0" in text
@@ -195,7 +190,7 @@ def test_a_law_along_the_frequency_is_one_along_omega(capsys: Capture) -> None:
     assert "small_amplitude" in said(capsys, 0, *words, "--approximations")
 
 
-def test_a_range_of_k_gives_that_of_mu_macro_also_where_not_monotone(capsys: Capture, tightest: Surrogate) -> None:
+def test_a_range_of_k_gives_that_of_mu_macro_also_where_not_monotone(capsys: Capture, surrogate: Surrogate) -> None:
     case: Case = {
         "mu0": 0.3,
         "Fz": 10.0,
@@ -205,7 +200,7 @@ def test_a_range_of_k_gives_that_of_mu_macro_also_where_not_monotone(capsys: Cap
     }  # r = 100: mu_macro rises and falls along k
     words = "mu0=0.3 Fz=10N k=0.1..100 N/um y0=20um omega=1e5 v0=2cm/s"
     found = json.loads(said(capsys, 0, words, "--json"))
-    mu = tightest.evaluate(**case, k=np.geomspace(1e5, 1e8, 20_001)).mu_macro
+    mu = surrogate.evaluate(**case, k=np.geomspace(1e5, 1e8, 20_001)).mu_macro
     low, high = (found["k_range"][f"mu_macro_{end}"] for end in ("low", "high"))
     assert (low, high) == (close(mu.min(), rel=1e-6), close(mu.max(), rel=1e-6))
     assert low <= mu.min() <= mu.max() <= high
@@ -236,9 +231,9 @@ def asked(name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_contact_direction_and_range_are_the_librarys(capsys: Capture, tightest: Surrogate, name: str) -> None:
+def test_contact_direction_and_range_are_the_librarys(capsys: Capture, surrogate: Surrogate, name: str) -> None:
     words, options, inputs = asked(name)
-    expected = tightest.evaluate(**inputs, gradient=True)
+    expected = surrogate.evaluate(**inputs, gradient=True)
     found = json.loads(said(capsys, 0, words, *options, "--json", "--gradient"))
     for key in ("mu_macro", "regime", "source", "error_bound", "gradient"):
         assert found[key] == getattr(expected, key)
@@ -252,14 +247,14 @@ def test_contact_direction_and_range_are_the_librarys(capsys: Capture, tightest:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_law_and_solve_for_know_them_too(capsys: Capture, tmp_path: Path, tightest: Surrogate, name: str) -> None:
+def test_law_and_solve_for_know_them_too(capsys: Capture, tmp_path: Path, surrogate: Surrogate, name: str) -> None:
     words, options, inputs = asked(name)
     words = words.replace("v0=0.01", "")
     out = tmp_path / "law.csv"
     said(capsys, 0, "law", words, "--along", "v0", "1mm/s", "1m/s", "--points", "5", *options, "-o", str(out))
     with out.open() as stream:
         rows = list(csv.DictReader(stream))
-    expected = tightest.evaluate(**{**inputs, "v0": np.array([float(row["v0 [m/s]"]) for row in rows])})
+    expected = surrogate.evaluate(**{**inputs, "v0": np.array([float(row["v0 [m/s]"]) for row in rows])})
     columns = ["mu_macro"] + ["mu_macro_low", "mu_macro_high"] * ("k_range" in inputs)
     assert list(rows[0]) == ["v0 [m/s]", *columns, "regime", "error_bound", "source", "mu_static"]
     for column in columns:
@@ -270,7 +265,7 @@ def test_law_and_solve_for_know_them_too(capsys: Capture, tmp_path: Path, tighte
         return
     found = json.loads(said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json"))
     for root in found["roots"]:
-        assert tightest.evaluate(**{**inputs, "v0": root["v0"]}).mu_macro == close(0.29, abs=1e-10)
+        assert surrogate.evaluate(**{**inputs, "v0": root["v0"]}).mu_macro == close(0.29, abs=1e-10)
     assert found["roots"]
 
 
@@ -296,10 +291,10 @@ def test_what_does_not_belong_to_a_contact_or_direction_is_named(capsys: Capture
 
 
 @pytest.fixture
-def measured(tmp_path: Path, tightest: Surrogate) -> Any:
+def measured(tmp_path: Path, surrogate: Surrogate) -> Any:
     """Thirty points of a ball, with scatter, in a file; and the same in SI."""
     v0 = np.geomspace(1e-3, 1.0, 30)
-    exact = tightest.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=v0, contact="ball").mu_macro
+    exact = surrogate.evaluate(mu0=0.3, Fz=10, k=1e6, y0=2e-6, f=20e3, v0=v0, contact="ball").mu_macro
     mu = exact + 1e-3 * np.cos(17.0 * np.arange(30))
     rows = [f"{1e3 * v!r},a note,{100.0 * m!r}" for v, m in zip(v0.tolist(), mu.tolist(), strict=True)]
     path = tmp_path / "measured.csv"
@@ -418,26 +413,26 @@ def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path)
         assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)
 
 
-def test_objects_plot_themselves(tightest: Surrogate) -> None:
+def test_objects_plot_themselves(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
     from mumacro.law import friction_law
     from mumacro.plotting import plot_answer, plot_map
 
     known = {name: value for name, value in VALUES.items() if name != "v0"}
-    law = friction_law(tightest, "v0", np.geomspace(1e-3, 1.0, 20), known)
+    law = friction_law(surrogate, "v0", np.geomspace(1e-3, 1.0, 20), known)
     axes = law.plot(figure.add_subplot())
     np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack((law.values, law.answer.mu_macro)))
     assert [line.get_xdata()[0] for line in axes.lines[2:]] == [crossing.value for crossing in law.border]
-    axes = plot_map(tightest, figure.add_subplot(), point=(0.1, 0.5))
+    axes = plot_map(surrogate, figure.add_subplot(), point=(0.1, 0.5))
     v, y = axes.lines[0].get_data()
-    np.testing.assert_array_equal(v, tightest.v_tilde_crit(y))
+    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y))
     assert axes.lines[1].get_xydata().tolist() == [[0.1, 0.5]]
-    many = tightest.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
+    many = surrogate.evaluate(**{**VALUES, "v0": np.array([0.0, 1e-3, 1.0, 3.0])}, groups=True)
     axes = plot_answer(many, figure.add_subplot())
     shown = {line.get_label(): len(line.get_xdata()) for line in axes.lines[:-1]}
     assert shown == {"continuous": 2, "stick_slip": 1}  # v~ = 0 has no place on a logarithmic axis
     with pytest.raises(AttributeError, match="groups=True"):
-        plot_answer(tightest.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}), figure.add_subplot())
+        plot_answer(surrogate.evaluate(**{**VALUES, "v0": np.array([1.0, 2.0])}), figure.add_subplot())
 
 
 BALL = ("ball", "--radius", "5mm", "--Fz", "10N", "--E", "210GPa", "--nu", "0.3")
@@ -495,12 +490,12 @@ def test_solve_for_reports_the_reachable_range(capsys: Capture) -> None:
     assert "v0 from 0.0001 to 0.001 m/s" in said(capsys, 1, *words, "0.24", "--between", "1e-4", "1e-3")
 
 
-def test_the_table_in_use_is_described(capsys: Capture, tightest: Surrogate) -> None:
+def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) -> None:
     found = json.loads(said(capsys, 0, "table", "--json"))
-    expected = (str(tightest.path), tightest.checksum, tightest.max_abs_error)
+    expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
     assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
     text = said(capsys, 0, "table")
-    assert tightest.checksum in text
+    assert surrogate.checksum in text
     assert text.count(".nc") > len(found["bundled"])
 
 

@@ -118,7 +118,6 @@ def test_the_folds_along_k_are_those_on_the_page(surrogate: Surrogate) -> None:
     y = np.geomspace(2.0, 20.0, 4001)
 
     def minimum(r: float) -> float:
-        """y~ of the minimum along k, at y~/v~ = r; NaN where there is none."""
         rises = np.flatnonzero(np.diff(surrogate.mu_ratio(y / r, y)) > 0.0)
         return float(y[rises[0]]) if rises.size else math.nan
 
@@ -161,11 +160,8 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
     wanted = {"power.saved", "results[].roots[].settling.periods", "border[].value", "errors[].reason"}
     assert wanted <= {field for field, _ in rows}
     # an object is followed by its fields, unless the description does not fix them
-    bare = {
-        one
-        for (one, kind), (other, _) in pairwise(rows)
-        if re.search(r"\bobject\b(?! of)", kind) and not other.startswith(one)
-    }
+    objects = ((one, other) for (one, kind), (other, _) in pairwise(rows) if re.search(r"\bobject\b(?! of)", kind))
+    bare = {one for one, other in objects if not other.startswith(one)}
     assert bare == {"attributes", "blocks"}
 
 
@@ -180,10 +176,8 @@ def test_metadata_agrees_with_the_package() -> None:
     assert meta["runtimePlatform"] == f"Python {project['requires-python']}"
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     (article,) = meta["referencePublication"]
-    names = (
-        f"family-names: {author['familyName']}\n        given-names: {author['givenName']}\n"
-        for author in article["author"]
-    )
+    author = "family-names: {familyName}\n        given-names: {givenName}\n"
+    names = (author.format(**one) for one in article["author"])
     said = (f"version: {__version__}\n", f"license: {project['license']}\n", article["name"], *names)
     assert [text for text in said if text not in citation] == []
 

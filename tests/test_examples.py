@@ -39,7 +39,6 @@ def run(repository: Path, *command: Any) -> Any:
 
 
 def need(name: str | None, *modules: Any) -> None:
-    """Skip unless a program, or Python packages, are installed."""
     if name is not None and shutil.which(name) is None:
         pytest.skip(f"{name} is not installed")
     for module in modules:

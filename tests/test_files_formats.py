@@ -144,8 +144,6 @@ def test_text_comes_out_as_it_came_in(tmp_path: Path) -> None:
     assert (tmp_path / "o.csv").read_bytes().startswith(text.replace("\r", "").encode()[: len(HEADER) + 5])
 
 
-# --- other separators and decimal signs, standard input and output ---------------------------------------
-
 GERMAN = 'name;mu0;Fz;k [N/mm];y0 [µm];f [kHz];v0\n"a;b";0,3;10;1,5e3;0,2;20;0,005\nc;0.3;10;rigid;0,2;20;0,005\n'
 
 
@@ -168,9 +166,7 @@ def test_a_german_file_is_recognised_and_read_with_its_options(tmp_path: Path, c
 
 
 @pytest.mark.parametrize("kind", ["csv", "ndjson", "csv.gz", "parquet"])
-def test_standard_input_and_output(
-    tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
-) -> None:
+def test_standard_input_output(tmp_path: Path, capfdbinary: Any, monkeypatch: pytest.MonkeyPatch, kind: Any) -> None:
     bad = cases(50).set_column(0, "mu0", pa.array([-1.0] + [0.3] * 49))
     source, wanted = write(bad, tmp_path / f"cases.{kind}"), tmp_path / ("o.ndjson" if kind == "ndjson" else "o.csv")
     rejects = evaluate_files([source], wanted, TABLE).rejects
@@ -181,9 +177,6 @@ def test_standard_input_and_output(
         assert main(["eval", "-", "-o", "-"]) == 3
         assert written.getvalue() == wanted.read_bytes()
     assert capfdbinary.readouterr().err.startswith(rejects.read_bytes() + b"49 of 50 rows")
-
-
-# --- rejects ------------------------------------------------------------------------------------------
 
 
 def with_k(cell: Any) -> Any:
@@ -247,9 +240,6 @@ def test_cells_with_line_ends_do_not_shift_the_numbers_of_rows(tmp_path: Path, m
     evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
     assert [row["name"] for row in read(tmp_path / "out.csv")] == ["a\nb", "c", "f\r\ng"] * 3
     assert [row for row, *_ in rejects_of(tmp_path / "out.csv")] == [3, 4, 8, 9, 13, 14]
-
-
-# --- files that are refused -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("end", ["csv", "parquet"])
@@ -335,8 +325,6 @@ def test_folders_patterns_and_hive_names(tmp_path: Path) -> None:
     (reject,) = read(summary.rejects)
     assert (reject["file"], reject["row"]) == (str(texts[1]), "6")
 
-
-# --- contact, direction, an uncertain k -----------------------------------------------------------------
 
 ALIKE = {name: value for name, value in CASE.items() if name not in ("k", "y0", "omega")}
 ANSWERED: dict[str, tuple[Case, Case]] = {

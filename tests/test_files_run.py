@@ -92,9 +92,7 @@ def test_a_stopped_run_goes_on_with_the_same_bytes(tmp_path: Path, cases: Any, k
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed", "gone", "longer"])
-def test_finished_pieces_that_are_cut_or_changed_are_done_again(
-    tmp_path: Path, cases: Any, kind: Any, harm: Any
-) -> None:
+def test_finished_pieces_cut_or_changed_are_done_again(tmp_path: Path, cases: Any, kind: Any, harm: Any) -> None:
     source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
     stopped(source, out)
     part = tmp_path / f"out.{kind}.parts" / "log"

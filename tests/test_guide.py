@@ -51,7 +51,6 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The programs of an environment with the wheel and what it requires."""
     return Installed(tmp_path_factory.mktemp("bare"), wheel).bin
 
 
@@ -87,7 +86,6 @@ def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
 
 
 def run(programs: Path, folder: Path, *words: str | Path) -> str:
-    """The output of a command with these programs, which must succeed."""
     env = environment(programs)
     done = subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -102,7 +100,6 @@ def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequ
 
 
 def parts(text: str) -> tuple[list[str], list[float]]:
-    """Words and numbers of a command's output."""
     return NUMBER.sub("#", text).split(), [float(found) for found in NUMBER.findall(text)]
 
 

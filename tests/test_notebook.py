@@ -47,9 +47,8 @@ def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate: Surrogate) 
     one = surrogate.evaluate(**CASE, v0=0.01)._repr_html_()
     assert one.count("<tr>") == 2
     assert "more" not in one
-    found = fit(
-        {"v0": SPEEDS, "mu_macro": answer.mu_macro + 1e-3 * np.cos(17.0 * np.arange(30))}, Fz=10, y0=2e-6, f=2e4
-    )
+    mu = answer.mu_macro + 1e-3 * np.cos(17.0 * np.arange(30))
+    found = fit({"v0": SPEEDS, "mu_macro": mu}, Fz=10, y0=2e-6, f=2e4)
     assert f"<td>k</td><td>{found.values['k']:.6g}</td>" in found._repr_html_()
 
 

@@ -19,7 +19,6 @@ POINTS = np.array([[0.1, 0.5], [2.0, 1.0], [1e-3, 0.7], [0.3, 30.0]])
 
 @pytest.fixture
 def component(repository: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A function that makes a problem of one component with four cases."""
     monkeypatch.syspath_prepend(str(repository / "examples"))
     table = Surrogate.open(1e-10, threads=1)
     friction = importlib.import_module("openmdao_component").Friction

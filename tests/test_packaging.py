@@ -61,7 +61,6 @@ REQUIREMENTS = "import hatchling.build as b; print(*b.get_requires_for_build_whe
 
 
 def python(folder: Path, program: Any, *arguments: Any, **variables: Any) -> Any:
-    """A program in a folder, without the caller's choice of a compiler."""
     env = {name: value for name, value in os.environ.items() if name != "CC"} | variables
     command = [sys.executable, "-c", program, *map(str, arguments)]
     return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=300)

@@ -16,6 +16,7 @@ from builder.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files
+from tests import cases as ordinary
 from tests.cases import Case
 
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
@@ -50,9 +51,7 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
     assert sum(one.what == tables.REFUSED for one in found) > 0.6 * len(found)
 
 
-@pytest.fixture(scope="module", params=[1e-4, 1e-12])
-def table(request: pytest.FixtureRequest) -> Surrogate:
-    return Surrogate.open(request.param)
+table = ordinary.tables(1e-4, 1e-12)
 
 
 @pytest.mark.parametrize(

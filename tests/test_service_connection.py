@@ -56,9 +56,6 @@ def posted(path: Any, body: Any) -> Any:
     return head(path, len(body)) + body
 
 
-# --- framing --------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("size", [1, 7, 64, 1000])
 def test_the_answers_do_not_depend_on_how_the_bytes_come(raw: Any, size: Any) -> None:
     body = LINE.strip()
@@ -115,8 +112,6 @@ def test_a_head_without_an_end_is_cut_at_its_limit(raw: Any) -> None:
         raw.sendall(GET[:-2] + b"A: " + b"b" * 10_000_000)
     assert not to_end(raw).startswith(b"HTTP/1.1 200")
 
-
-# --- clients that stop, drip, do not read, or leave -----------------------------------------------------
 
 #: what a client sends, what it sends again and again, and what is in the answer before the connection ends
 SLOW = {
@@ -186,9 +181,6 @@ def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(s
     assert json.loads(content)["max_bytes"] == 65536
 
 
-# --- many clients ---------------------------------------------------------------------------------------
-
-
 def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(strict: Any) -> None:
     large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
     compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
@@ -228,9 +220,6 @@ def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
         assert [strict.ask("GET", path)[0] for path in ("/livez", "/readyz", "/v1/table")] == [200, 200, 503]
     time.sleep(2 * WAIT_S)
     assert strict.ask("GET", "/v1/table")[0] == 200
-
-
-# --- bodies and streams ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])

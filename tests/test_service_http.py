@@ -70,7 +70,6 @@ def test_an_unexpected_error_is_logged_and_not_shown(
 
 @pytest.fixture(scope="module")
 def closed(started: Any) -> Any:
-    """A client of an application with an API key."""
     with started(api_key=KEY["X-API-Key"]) as client:
         yield client
 

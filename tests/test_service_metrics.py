@@ -23,7 +23,6 @@ def samples(text: str) -> Any:
 
 @pytest.fixture
 def fresh(started: Any) -> Any:
-    """A client of an application with all counters at zero."""
     with started() as client:
         yield client
 

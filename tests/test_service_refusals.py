@@ -309,7 +309,6 @@ def test_json_is_read_whatever_the_case_of_its_type_and_without_one(client: Any,
 
 @pytest.fixture(scope="module")
 def few(started: Any) -> Any:
-    """A client of an application for batches of three cases."""
     with started(max_batch=3) as client:
         yield client
 

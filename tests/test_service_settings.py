@@ -61,9 +61,7 @@ def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp
         load_settings()
 
 
-def test_a_misspelt_variable_is_noticed(
-    started: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_misspelt_variable_is_noticed(started: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any) -> None:
     monkeypatch.setenv("MUMACRO_TABLE", "x")
     monkeypatch.setenv("MUMACRO_PORT", "81")
     with started():

@@ -87,9 +87,7 @@ def test_one_value_is_returned_as_text_and_answers_may_be_cached(client: Any, ca
     [*(({name: 0, **rest}, (0.3, 0.0, 0.3), 0.0) for name in ("y0", "omega") for rest in ({}, {"k": None})),
      ({"k": None}, (0.0, 0.0, 0.0), None)],
 )  # fmt: skip
-def test_without_oscillation_or_stiffness_nothing_sticks(
-    client: Any, case: Case, change: Any, limits: Any, power: Any
-) -> None:
+def test_nothing_sticks_without_oscillation_or_k(client: Any, case: Case, change: Any, limits: Any, power: Any) -> None:
     answer = ask(client, {**case, **change}, include=["limits", "power", "stick_fraction"])
     assert tuple(answer["limits"].values()) == limits
     assert (answer["mu_macro"] == 0.3) == (limits[0] == 0.3)

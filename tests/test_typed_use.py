@@ -16,9 +16,8 @@ LEFT_OUT = {"mumacro.__main__", "mumacro._kernel"}  # the second is no module of
 for package in ("jax", "torch"):  # hundreds of megabytes, needed only by their own tests
     if importlib.util.find_spec(package) is None:
         LEFT_OUT.add(f"mumacro.{package}")
-MODULES = sorted(
-    {"mumacro", *(module.name for module in pkgutil.walk_packages(mumacro.__path__, "mumacro."))} - LEFT_OUT
-)
+WALKED = (module.name for module in pkgutil.walk_packages(mumacro.__path__, "mumacro."))
+MODULES = sorted({"mumacro", *WALKED} - LEFT_OUT)
 
 
 @pytest.mark.parametrize("name", MODULES)
