@@ -247,13 +247,9 @@ def head_request(chance: random.Random) -> Request:
 
 
 KINDS: dict[str, tuple[int, Callable[[random.Random], Request]]] = {
-    "JSON": (35, json_request),
-    "lines": (15, lines_request),
-    "CSV": (10, csv_request),
-    "Arrow": (15, arrow_request),
-    "queries": (15, query_request),
-    "methods, paths and headers": (10, head_request),
-}
+    "JSON": (35, json_request), "lines": (15, lines_request), "CSV": (10, csv_request), "Arrow": (15, arrow_request),
+    "queries": (15, query_request), "methods, paths and headers": (10, head_request),
+}  # fmt: skip
 
 
 def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:

@@ -201,36 +201,33 @@ def test_the_description_is_accessible_and_leads_back(open_page: Any, repository
 
 
 def test_the_pages_ask_for_the_key_and_use_it(open_page: Any, serving: Any, tables_dir: Path, tmp_path: Path) -> None:
-    with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
-        ask_for_the_key(open_page(url=server.url, path="docs"), tmp_path)
-
-
-def ask_for_the_key(page: Any, folder: Path) -> None:
     def enter(key: Any) -> None:
         page.type("#key", key, commit=False)
         page.find("#key-form button").click()
 
-    page.wait_until_shown("#key-form")
-    enter("open-sesame")
-    page.wait_for("#swagger-ui", "mu_macro over a range of one input")
-    assert not page.find("#key-form").is_displayed()
-    page.find("#back").click()  # the tab keeps the key until it is deleted
-    page.wait_for("#mu", r"^0\.\d+$")
-    page.find("#forget").click()
-    page.wait_for("#mu", "^…$")
-    page.wait_until_shown("#key-form")
-    assert page.run("return sessionStorage.length;") == 0
-    for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
-        enter(wrong)
-        page.wait_for("#key-status", said)
-        assert page.text("#mu") == "…"
-    enter("open-sesame")
-    page.wait_for("#mu", r"^0\.\d+$")
-    page.settle()
-    assert not page.find("#key-form").is_displayed()
-    assert "k=1N/um" in page.address()
-    assert "sesame" not in page.browser.current_url
-    assert len(page.download("#csv", folder, "friction-law-v0.csv")) > 10_000
-    page.run("sessionStorage.clear();")
-    # a browser logs every response with 401; nothing else may be logged
-    assert [entry for entry in page.complaints() if "401" not in entry] == []
+    with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
+        page = open_page(url=server.url, path="docs")
+        page.wait_until_shown("#key-form")
+        enter("open-sesame")
+        page.wait_for("#swagger-ui", "mu_macro over a range of one input")
+        assert not page.find("#key-form").is_displayed()
+        page.find("#back").click()  # the tab keeps the key until it is deleted
+        page.wait_for("#mu", r"^0\.\d+$")
+        page.find("#forget").click()
+        page.wait_for("#mu", "^…$")
+        page.wait_until_shown("#key-form")
+        assert page.run("return sessionStorage.length;") == 0
+        for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
+            enter(wrong)
+            page.wait_for("#key-status", said)
+            assert page.text("#mu") == "…"
+        enter("open-sesame")
+        page.wait_for("#mu", r"^0\.\d+$")
+        page.settle()
+        assert not page.find("#key-form").is_displayed()
+        assert "k=1N/um" in page.address()
+        assert "sesame" not in page.browser.current_url
+        assert len(page.download("#csv", tmp_path, "friction-law-v0.csv")) > 10_000
+        page.run("sessionStorage.clear();")
+        # a browser logs every response with 401; nothing else may be logged
+        assert [entry for entry in page.complaints() if "401" not in entry] == []

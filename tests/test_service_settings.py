@@ -14,24 +14,16 @@ from service.__main__ import main
 from service.settings import Settings, SettingsError, load_settings
 
 BAD = {
-    "MUMACRO_TABLES": ("", os.pathsep),
-    "MUMACRO_HOST": ("",),
-    "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"),
-    "MUMACRO_WORKERS": ("0", "257", "two"),
-    "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)),
-    "MUMACRO_MAX_BATCH": ("0", "10000001"),
-    "MUMACRO_MAX_BATCHES": ("0", "1025"),
-    "MUMACRO_MAX_CONNECTIONS": ("0", "many", "1000001"),
-    "MUMACRO_KEEP_ALIVE_S": ("0", "3601"),
+    "MUMACRO_TABLES": ("", os.pathsep), "MUMACRO_HOST": ("",), "MUMACRO_WORKERS": ("0", "257", "two"),
+    "MUMACRO_PORT": ("", "http", "-1", "65536", "80.5", "tcp://10.0.0.1:80"), "MUMACRO_LOG_LEVEL": ("", "loud"),
+    "MUMACRO_MAX_BODY_BYTES": ("1023", "1e6", str(2**31 + 1)), "MUMACRO_MAX_BATCH": ("0", "10000001"),
+    "MUMACRO_MAX_BATCHES": ("0", "1025"), "MUMACRO_MAX_CONNECTIONS": ("0", "many", "1000001"),
+    "MUMACRO_KEEP_ALIVE_S": ("0", "3601"), "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
     "MUMACRO_API_KEYS": ("alice", "alice=", "two words=x", "a=same,b=same"),
-    "MUMACRO_ROOT_PATH": ("friction", "/a/", "/a b"),
-    "MUMACRO_GUIDE": ("no/such/directory", __file__),
-    "MUMACRO_CLIENT_TIMEOUT_S": ("0", "3601"),
-    "MUMACRO_TIME_LIMIT_S": ("0", "86401"),
     "MUMACRO_API_KEY": ("", "two words", "schlüssel", "x" * 513, "line\nbreak"),
-    "MUMACRO_LOG_LEVEL": ("", "loud"),
-    "MUMACRO_SHUTDOWN_GRACE_S": ("-1", "3601", "soon"),
-}
+    "MUMACRO_ROOT_PATH": ("friction", "/a/", "/a b"), "MUMACRO_GUIDE": ("no/such/directory", __file__),
+    "MUMACRO_TIME_LIMIT_S": ("0", "86401"), "MUMACRO_SHUTDOWN_GRACE_S": ("-1", "3601", "soon"),
+}  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
