@@ -85,8 +85,6 @@ def compare(points: int, quick: bool, rounds: int) -> list[Row]:
         truth = sweep.solve("full", v_true, y_true)["mu_ratio"]
         entries = contenders(sweep, quick)
     work: dict[str, Callable[[], object]] = {str(i): partial(c.evaluate, v, y) for i, (_, c) in enumerate(entries)}
-    logs = np.empty((points, 2))
-    work["logs"] = lambda: (np.log(v, out=logs[:, 0]), np.log(y, out=logs[:, 1]))
     direct = np.stack([v, y, y - 1.0], axis=1)[: 500 if quick else 10_000]
     work["direct"] = lambda: solve_chunk("full", direct)
     progress(f"{rounds} rounds of {len(work)} contenders")
@@ -96,8 +94,6 @@ def compare(points: int, quick: bool, rounds: int) -> list[Row]:
         error = np.abs(c.evaluate(v_true, y_true) - truth)
         ns = best[str(i)] / points * 1e9
         rows.append(Row(kind, c.name, c.size, ns, *spread(error, truth), c.bytes, c.solves))
-    ns = best["logs"] / points * 1e9
-    rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))
     ns = best["direct"] / len(direct) * 1e9
     rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns))
     return rows

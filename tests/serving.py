@@ -145,9 +145,6 @@ def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
         asked.result()
 
 
-# --- HTTP as bytes --------------------------------------------------------------------------------------
-
-
 def connect(server: Server, receive_buffer: int | None = None) -> socket.socket:
     raw = socket.socket()
     if receive_buffer is not None:

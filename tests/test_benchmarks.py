@@ -60,8 +60,6 @@ def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
     assert tables_readme.tables(build=False, workers=2).strip() in section
 
 
-# --- what the scripts print -----------------------------------------------------------------------------
-
 SLOW = {"model", "angles", "stiffness", "layer", "cusp", "creep"}
 SECTIONS = [
     pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])

@@ -34,8 +34,7 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)  # JSON only: the progress bar goes to stderr
     opened = Surrogate.open(out)
-    assert report["table"] == str(out)
-    assert report["content_sha256"] == opened.checksum
+    assert (report["table"], report["content_sha256"]) == (str(out), opened.checksum)
     assert report["tolerance"] == opened.tolerance == 1e-3
     assert report["verified_max_abs_error"] == opened.max_abs_error <= 1e-3
     assert report["verified_max_rel_error"] == opened.max_rel_error <= ABS_TO_REL * 1e-3
@@ -46,8 +45,7 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
 
     verified = run_builder("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
-    assert json.loads(verified.stdout)["holds"] is True
-    assert json.loads(verified.stdout)["not_covered"] == 0
+    assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
 
 
 def test_solve_answers_at_the_ends_of_its_range(run_builder: Run) -> None:

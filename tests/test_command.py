@@ -509,7 +509,7 @@ def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_d
 @pytest.mark.slow
 def test_a_closed_output_pipe_is_no_error(repository: Path) -> None:
     command = [sys.executable, "-m", "mumacro", "law", CASE.replace("v0=0.01", ""), "--along", "v0", "1e-4", "1"]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen([*command, "--points", "20000"], cwd=repository, **pipes) as process:
         assert process.stdout
         assert process.stdout.readline().startswith(b"v0 [m/s]")

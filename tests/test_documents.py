@@ -168,17 +168,14 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
 def test_metadata_agrees_with_the_package() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     meta = json.loads((ROOT / "codemeta.json").read_text("utf-8"))
-    assert meta["version"] == __version__
-    assert meta["description"] == project["description"]
     assert meta["license"].endswith(project["license"])
-    assert meta["keywords"] == project["keywords"]
-    assert meta["softwareRequirements"] == project["dependencies"]
-    assert meta["runtimePlatform"] == f"Python {project['requires-python']}"
+    same = {"description": project["description"], "keywords": project["keywords"], "version": __version__,
+            "softwareRequirements": project["dependencies"],
+            "runtimePlatform": f"Python {project['requires-python']}"}  # fmt: skip
+    assert {name: meta[name] for name in same} == same
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     (article,) = meta["referencePublication"]
-    author = "family-names: {familyName}\n        given-names: {givenName}\n"
-    names = (author.format(**one) for one in article["author"])
-    said = (f"version: {__version__}\n", f"license: {project['license']}\n", article["name"], *names)
+    said = (f"version: {__version__}\n", f"license: {project['license']}\n", article["name"])
     assert [text for text in said if text not in citation] == []
 
 

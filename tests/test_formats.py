@@ -104,8 +104,6 @@ def test_the_service_answers_in_every_format_what_the_library_does(client: Any, 
     assert {tuple(row) for row in found} == {(*COLUMNS, "error")}
 
 
-# --- what include adds ----------------------------------------------------------------------------------
-
 INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
 
 

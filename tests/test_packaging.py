@@ -54,8 +54,6 @@ def test_the_manifest_gives_a_pod_nothing_that_it_does_not_need(repository: Path
     assert pod["terminationGracePeriodSeconds"] > load_settings().shutdown_grace_s + 3.0  # preStop
 
 
-# --- the build ---------------------------------------------------------------------------------------
-
 BUILD = "import runpy; runpy.run_path('hatch_build.py', run_name='__main__')"
 REQUIREMENTS = "import hatchling.build as b; print(*b.get_requires_for_build_wheel())"
 
@@ -185,13 +183,11 @@ def test_a_package_finds_its_own_tables(tmp_path: Path, monkeypatch: pytest.Monk
 PARTS = ("service", "builder", "mumacro")
 
 
-@pytest.mark.parametrize(
-    ("module", "lacks", "said"),
-    [
-        *((name, "packages", r".*(\w+) is not installed: pip install 'mumacro.*") for name in PARTS),
-        *((name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*") for name in PARTS[1:]),
-    ],
-)
+LACKS = [(name, "packages", r".*(\w+) is not installed: pip install 'mumacro.*") for name in PARTS]
+LACKS += [(name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*") for name in PARTS[1:]]
+
+
+@pytest.mark.parametrize(("module", "lacks", "said"), LACKS)
 def test_one_line_says_what_is_missing(repository: Path, tmp_path: Path, module: Any, lacks: Any, said: Any) -> None:
     ignored = shutil.ignore_patterns("__pycache__", *(["_kernel.*"] if lacks == "kernel" else []))
     for name in {"mumacro", module}:

@@ -133,8 +133,6 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
     assert (head.status_code, head.content) == (200, b"")
 
 
-# --- stiffness and fit ----------------------------------------------------------------------------------
-
 STEEL = {"E": 210e9, "nu": 0.3, "Fz": 10.0}
 BODIES = [
     ("ball", {"radius": 5e-3}), ("flat", {"radius": 1e-3}), ("ball", {"radius": 5e-3, "E2": "rigid"}),
