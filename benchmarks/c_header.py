@@ -68,8 +68,7 @@ def c_header(quick: bool) -> str:
         write_c(surrogate.table, folder)
         for compiler in filter(shutil.which, ("gcc", "clang")):
             for options in OPTIONS:
-                row = f"`{compiler} {options}`"
-                progress(row)
+                progress(row := f"`{compiler} {options}`")
                 made = library(folder, compiler, options)
                 work[row] = called(made.ratio_array, v, y, out)
                 work[f"{row}, call by call"] = called(made.ratios, v, y, out)

@@ -78,11 +78,6 @@ def batch(server: Server, kind: str, body: bytes) -> None:
         sending.join()
 
 
-def service(**settings: Any) -> AbstractContextManager[Server]:
-    """This service with its defaults, on the first processor: checked, logged, counted."""
-    return serving(FINEST, before=FIRST, **settings)
-
-
 def peer(name: str, folder: str) -> AbstractContextManager[Server]:
     return running([*FIRST, sys.executable, "-m", "benchmarks.service_peers", name], Path(folder) / name)
 
@@ -90,7 +85,7 @@ def peer(name: str, folder: str) -> AbstractContextManager[Server]:
 def single() -> str:
     found: dict[str, list[tuple[float, float]]] = {}
     with (
-        tempfile.TemporaryDirectory() as folder, service() as own, peer("raw", folder) as raw,
+        tempfile.TemporaryDirectory() as folder, serving(FINEST, before=FIRST) as own, peer("raw", folder) as raw,
         peer("fastapi", folder) as fast,
     ):  # fmt: skip
         asked = [(f"this service, {name}", own, text) for name, text in FORMS.items()]
@@ -136,7 +131,8 @@ def body_of(form: str, n: int) -> bytes:
 def batches() -> str:
     """Speed of 100,000 cases, and the waits of short requests beside them and beside a million."""
     rows = []
-    with service(MUMACRO_MAX_BODY_BYTES="1000000000", MUMACRO_MAX_BATCH="1000000") as own:
+    settings = {"MUMACRO_MAX_BODY_BYTES": "1000000000", "MUMACRO_MAX_BATCH": "1000000"}
+    with serving(FINEST, before=FIRST, ready=True, **settings) as own:
         for form, kind in KINDS.items():
             body = body_of(form, 100_000)
             batch(own, kind, body)

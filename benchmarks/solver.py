@@ -5,7 +5,7 @@
 One thread.  Points are log-uniform over v~, y~ in [1e-3, 1e3].
 """
 
-from benchmarks.measuring import best_of, main, markdown, progress, quantity  # isort: split
+from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 from functools import partial
 from time import process_time
@@ -60,7 +60,6 @@ def against_marching(n: int) -> str:
 def solver(points: int, rounds: int, quick: bool) -> str:
     n = min(points, 500) if quick else points
     regimes = by_regime(n, rounds)
-    progress("marching")
     return (
         f"{n:,} points, one thread, best of {rounds} rounds, processor time.\n\n{regimes}\n\n"
         "Beside scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and of slip), at points "

@@ -10,9 +10,9 @@ from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progres
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -26,27 +26,23 @@ from mumacro import Surrogate, closed_forms
 Array = NDArray[np.float64]
 OURS, PEER, EXACT = "ours", "peer", "exact"
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
-HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
+HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "bytes", "solves")
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One line of the table; times in ns a point, errors of mu~ [-], NaN if not applicable."""
 
     kind: str
-    name: str
-    size: str
+    method: Contender
     ns: float
     max_abs: float = math.nan
     p99_abs: float = math.nan
-    max_rel: float = math.nan
-    bytes: int = 0
-    solves: int = 0
 
     def cells(self) -> list[str]:
-        numbers = [quantity(x) if x == x else "-" for x in (self.ns, self.max_abs, self.p99_abs, self.max_rel)]
-        counts = [f"{n:,}" if n else "-" for n in (self.bytes, self.solves)]
-        return [f"**{self.name}**" if self.kind == OURS else self.name, self.size, *numbers, *counts]
+        name = self.method.name
+        numbers = [quantity(x) if x == x else "-" for x in (self.ns, self.max_abs, self.p99_abs)]
+        counts = [f"{n:,}" if n else "-" for n in (self.method.bytes, self.method.solves)]
+        return [f"**{name}**" if self.kind == OURS else name, self.method.size, *numbers, *counts]
 
 
 def draw(n: int, seed: int) -> Array:
@@ -57,10 +53,6 @@ def draw(n: int, seed: int) -> Array:
 def tables() -> list[Surrogate]:
     opened = [Surrogate.open(path, threads=1) for path in (ROOT / "tables").glob("*.nc")]
     return sorted(opened, key=lambda s: -s.tolerance)
-
-
-def spread(error: Array, truth: Array) -> tuple[float, float, float]:
-    return float(error.max()), float(np.quantile(error, 0.99)), float((error / truth).max())
 
 
 def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
@@ -93,9 +85,9 @@ def compare(points: int, quick: bool, rounds: int) -> list[Row]:
     for i, (kind, c) in enumerate(entries):
         error = np.abs(c.evaluate(v_true, y_true) - truth)
         ns = best[str(i)] / points * 1e9
-        rows.append(Row(kind, c.name, c.size, ns, *spread(error, truth), c.bytes, c.solves))
-    ns = best["direct"] / len(direct) * 1e9
-    rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns))
+        rows.append(Row(kind, c, ns, float(error.max()), float(np.quantile(error, 0.99))))
+    solver = Contender("direct solve of the full model", "compiled", lambda v, _: v, 0, 0)
+    rows.append(Row(EXACT, solver, best["direct"] / len(direct) * 1e9))
     return rows
 
 
@@ -121,8 +113,8 @@ def plot(rows: list[Row], path: Path) -> None:
     axes.set_xlabel(r"largest error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000")
     colors = iter(("#c1272d", "#1f5fa8", "#2a8c8c", "#8a8a8a", "#b07aa1", "#e08214", "#222222"))
     shown = [row for row in rows if row.max_abs == row.max_abs]
-    for name in dict.fromkeys("our tables" if row.kind == OURS else row.name for row in shown):
-        line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.name)]
+    for name in dict.fromkeys("our tables" if row.kind == OURS else row.method.name for row in shown):
+        line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.method.name)]
         width = 2.2 if line[0].kind == OURS else 1.0
         x, y = [row.max_abs for row in line], [row.ns for row in line]
         axes.plot(x, y, "o-", label=name, color=next(colors), lw=width)

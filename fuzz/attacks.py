@@ -86,12 +86,12 @@ def holding(text: bytes, factor: float = 1.0) -> Attack:
     return lambda server, share: held(server, factor * share, text)
 
 
-def table_of(line: bytes) -> Attack:
-    """A CSV of such pieces, as long as a body may be."""
-    text = b"" if line == b"a," else b"mu0,Fz,k,y0,omega,v0\n"
-    return lambda server, share: posted(
-        server, "text/csv", text + line * round((BODY - 100) / len(line) * share), number=2 * BATCHES
-    )
+def csv_of(start: bytes, line: bytes) -> Attack:
+    def attack(server: Server, share: float) -> None:
+        text = start + line * round((BODY - 100) / len(line) * share)  # as long as a body may be
+        posted(server, "text/csv", text, number=2 * BATCHES)
+
+    return attack
 
 
 ATTACKS: dict[str, Attack] = {
@@ -101,8 +101,8 @@ ATTACKS: dict[str, Attack] = {
         holding(b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600),
     "More connections without a byte than are allowed": holding(b"", 1.5),
     "Bodies of 64 KB that lack their last byte": holding(head("/v1/mu-macro", 65_000) + b" " * 64_999),
-    "A CSV whose first line is as long as a body may be": table_of(b"a,"),
-    "A CSV of blank lines": table_of(b"\n"),
+    "A CSV whose first line is as long as a body may be": csv_of(b"", b"a,"),
+    "A CSV of blank lines": csv_of(b"mu0,Fz,k,y0,omega,v0\n", b"\n"),
     "JSON of the smallest values and lists": brackets,
     "As many rows, and as long columns, as are allowed, with everything included": everything,
     "Columns of words and of nulls, which Python reads one by one": strange_words,

@@ -173,9 +173,7 @@ def test_a_law_runs_along_any_input_and_marks_the_border(capsys: Capture, surrog
     (border,) = found["border"]
     assert surrogate.evaluate(**{**VALUES, "v0": border["v0"]}).regime == "continuous"
     assert surrogate.evaluate(**{**VALUES, "v0": math.nextafter(border["v0"], 0.0)}).regime == "stick_slip"
-    text = said(capsys, 0, *words)
-    assert "v0 [m/s]" in text
-    assert "border of continuous sliding at v0" in text
+    assert "border of continuous sliding at v0" in said(capsys, 0, *words)
 
 
 def test_a_law_along_the_frequency_is_one_along_omega(capsys: Capture) -> None:
@@ -494,9 +492,7 @@ def test_the_table_in_use_is_described(capsys: Capture, surrogate: Surrogate) ->
     found = json.loads(said(capsys, 0, "table", "--json"))
     expected = (str(surrogate.path), surrogate.checksum, surrogate.max_abs_error)
     assert (found["path"], found["checksum"], found["verified_max_abs_error"]) == expected
-    text = said(capsys, 0, "table")
-    assert surrogate.checksum in text
-    assert text.count(".nc") > len(found["bundled"])
+    assert said(capsys, 0, "table").count(".nc") > len(found["bundled"])
 
 
 def test_export_is_that_of_the_builder(capsys: Capture, tmp_path: Path, tables_dir: Path) -> None:

@@ -75,18 +75,14 @@ def service(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[st
         yield server.url
 
 
-def environment(programs: Path) -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
-    return {**kept, "PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
-
-
 def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
     found: Path = request.getfixturevalue("bare" if page.stem in BARE else "full")
     return found
 
 
 def run(programs: Path, folder: Path, *words: str | Path) -> str:
-    env = environment(programs)
+    env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
+    env |= {"PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
     done = subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

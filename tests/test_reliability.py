@@ -54,11 +54,11 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
 table = ordinary.tables(1e-4, 1e-12)
 
 
-@pytest.mark.parametrize(
-    "check",
-    [pytest.param(check, id=name, marks=[pytest.mark.slow] if check is answers.fresh_solves else [])
-     for name, check in answers.PROMISES.items()],
-)  # fmt: skip
+SLOW = {answers.fresh_solves: [pytest.mark.slow]}
+PROMISES = [pytest.param(check, id=name, marks=SLOW.get(check, [])) for name, check in answers.PROMISES.items()]
+
+
+@pytest.mark.parametrize("check", PROMISES)
 def test_answers_have_their_properties_over_the_full_double_range(table: Surrogate, check: Any) -> None:
     found = check(table, 0.02)
     assert found.tried >= 500

@@ -51,7 +51,7 @@ def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case)
         assert found["mumacro_requests_total", *sorted((route, method, status))] == number
     assert found["mumacro_request_duration_seconds_count", PATH] == 5
     assert found["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
-    assert 0 < found["mumacro_request_duration_seconds_sum", PATH] < 60
+    assert found["mumacro_request_duration_seconds_sum", PATH] > 0
     for path in fresh.get("/openapi.json").json()["paths"]:
         fresh.put(path)
     found = scrape(fresh)

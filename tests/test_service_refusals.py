@@ -137,11 +137,8 @@ def test_a_bad_field_is_refused_by_its_place(
     method, _, path = request_line.partition(" ")
     path, _, query = path.partition("?")
     given = {name: value for name, value in {**ASKED[path], **changed}.items() if value is not ...}
-    if method == "GET":
-        response = client.get(f"/v1/{path}?{urlencode(given)}&{query}")
-    else:
-        response = client.post(f"/v1/{path}?{query}", content=json.dumps(given))
-    document = problem(response, 422)
+    body, query = ("", f"{urlencode(given)}&{query}") if method == "GET" else (json.dumps(given), query)
+    document = problem(client.request(method, f"/v1/{path}?{query}", content=body), 422)
     faults = {fault.get("pointer", f"?{fault.get('parameter')}"): fault for fault in document["errors"]}
     assert place in faults, document
     assert words in f"{faults[place]['reason']}; {faults[place].get('bound')}"

@@ -110,12 +110,10 @@ def test_the_standard_deviation_is_the_root_of_squares(client: Any, case: Case, 
     assert ask(client, case, include=["std"], std={})["std"] == 0.0
 
 
-@pytest.mark.parametrize(
-    "change", [{}, {"v0": 1e-4, "y0": 1e-7}, {"v0": 5.0, "y0": 1e-4}, {"omega": 0}, {"k": None}, {"v0": 0}]
-)
-def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate, change: Any) -> None:
-    at = {**case, **change}
-    answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
-    for name, value in {**answer["settling"], "error_bound": answer["settling_bound"]["periods"]}.items():
-        assert value == (getattr(expected, name) if math.isfinite(getattr(expected, name)) else None), name
-    assert (answer["settling"]["time"] is None) == ("v0" in change and change["v0"] == 0)  # it never slips
+def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate) -> None:
+    for change in ({}, {"v0": 1e-4, "y0": 1e-7}, {"v0": 5.0, "y0": 1e-4}, {"omega": 0}, {"k": None}, {"v0": 0}):
+        at: Case = {**case, **change}
+        answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
+        for name, value in {**answer["settling"], "error_bound": answer["settling_bound"]["periods"]}.items():
+            assert value == (getattr(expected, name) if math.isfinite(getattr(expected, name)) else None), name
+        assert (answer["settling"]["time"] is None) == (at["v0"] == 0)  # it never slips
