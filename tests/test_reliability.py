@@ -54,7 +54,7 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
 table = ordinary.tables(1e-4, 1e-12)
 
 
-SLOW = {answers.fresh_solves: [pytest.mark.slow]}
+SLOW: dict[object, list[Any]] = {answers.fresh_solves: [pytest.mark.slow]}
 PROMISES = [pytest.param(check, id=name, marks=SLOW.get(check, [])) for name, check in answers.PROMISES.items()]
 
 
