@@ -5,8 +5,6 @@
 ``python benchmarks/validation.py`` has the errors of all formulas.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import FINEST, main  # isort: split
 
 import numpy as np

@@ -7,8 +7,6 @@ Values come from tests/data/points.csv and border.csv, computed by another solve
 not from this project's own solver or tables.  docs/accuracy.md describes them.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import sys
@@ -30,7 +28,6 @@ STICK = 1e-11  # absolute: next to the border the end of slip is a grazing root
 
 
 def read(name: str) -> list[dict[str, str]]:
-    """The rows of a file of reference values."""
     with (DATA / name).open(newline="", encoding="utf-8") as stream:
         return list(csv.DictReader(stream))
 
@@ -42,7 +39,6 @@ def row(quantity: str, where: str, value: float, tolerance: float, **inputs: Any
 
 
 def chosen() -> list[dict[str, str]]:
-    """Some points of every class, evenly spread over the file."""
     points = read("points.csv")
     found = []
     for kind in dict.fromkeys(point["case"] for point in points):
@@ -52,7 +48,6 @@ def chosen() -> list[dict[str, str]]:
 
 
 def rows() -> Iterator[dict[str, Any]]:
-    """All check values."""
     for point in chosen():
         v, y, mu = (float(point[name]) for name in ("v", "y", "mu_ratio"))
         groups = {"v_tilde": v, "y_tilde": y}
@@ -84,7 +79,6 @@ def closed_forms() -> Iterator[dict[str, Any]]:
 
 
 def text() -> str:
-    """The file."""
     out = io.StringIO()
     writer = csv.DictWriter(out, COLUMNS, restval="", lineterminator="\n")
     writer.writeheader()

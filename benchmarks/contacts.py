@@ -4,72 +4,36 @@ python benchmarks/contacts.py            # nanoseconds a point, one thread, log-
 python benchmarks/contacts.py --errors   # the constants of mumacro/contact.py, measured anew
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
-import time
-from collections.abc import Callable, Iterator
+import timeit
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from scipy.integrate import quad
 
 from mumacro import Surrogate, batch, contact
 from mumacro.contact import put_rules, rules
-from tests.cases import Array, opened
-from tests.naive import march_ball
+from tests.cases import TOLERANCES, Array, opened
 
 KINDS = {"spring": None, "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
 
 
-def points(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Log-uniform in v~ from 1e-6 to 1e4 and y~ from 1e-4 to 1e4."""
-    rng = np.random.default_rng(seed)
-    return 10.0 ** rng.uniform(-6, 4, count), 10.0 ** rng.uniform(-4, 4, count)
-
-
-def best(call: Callable[[], object], times: int = 7) -> float:
-    """Seconds of the fastest of several calls."""
-    found = []
-    for _ in range(times):
-        start = time.perf_counter()
-        call()
-        found.append(time.perf_counter() - start)
-    return min(found)
-
-
 def costs() -> None:
-    """Mean, and median and worst of groups of 32 equal points, per kind and table."""
-    v, y = points(400)
-    for tolerance in (1e-4, 1e-7, 1e-10, 1e-12):
+    """Beside one spring, per kind and table: v~ from 1e-6 to 1e4, y~ from 1e-4 to 1e4."""
+    rng = np.random.default_rng(1)
+    v, y = 10.0 ** rng.uniform(-6, 4, 400), 10.0 ** rng.uniform(-4, 4, 400)
+    for tolerance in TOLERANCES:
         s = Surrogate.open(tolerance, threads=1)
         put_rules(s._data, tolerance)
         spring = 0.0
         for name, kind in KINDS.items():
             amplitude = np.minimum(y, 0.99) if name == "normal" else y
-            args = [(np.full(32, a), np.full(32, b)) for a, b in zip(v, amplitude, strict=True)]
-            ask = functools.partial(batch.values, 0, s._data, threads=1, kind=kind)
-            each = [best(functools.partial(ask, *pair), 9) / 32 for pair in args]
-            mixed = best(functools.partial(ask, v, amplitude)) / v.size
-            spring = spring or mixed
-            told = f"mixed {1e9 * mixed:7.0f} ns, {mixed / spring:6.1f} springs; median {np.median(each) / spring:6.1f}"
-            print(f"{tolerance:g} {name:10} {told}, worst {max(each) / spring:6.1f}")
-    s = Surrogate.open(1e-10, threads=1)
-    march: Any = march_ball
-    march(1.0, 1.0, 1, 10)
-    marched = best(lambda: march(0.05, 0.4, 300, 1000), 1)
+            ask = functools.partial(batch.values, 0, s._data, v, amplitude, threads=1, kind=kind)
+            each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
+            spring = spring or each
+            print(f"{tolerance:g} {name:10} {1e9 * each:7.0f} ns, {each / spring:6.1f} springs")
 
-    def share(xi: float) -> float:
-        load = 1.0 - xi * xi
-        return 1.5 * load * float(s.mu_ratio(0.05 / (1.5 * load), 0.4 / (1.5 * load)))
-
-    adaptive = best(lambda: quad(share, 0.0, 1.0 - 1e-12, epsabs=1e-10, epsrel=1e-10, limit=200), 3)
-    ball = best(lambda: s.ratio_with_bound(0.05, 0.4, contact="ball"))
-    print(f"(0.05, 0.4): ball, one call {1e6 * ball:.1f} us; quad {1e3 * adaptive:.2f} ms; 300 springs {marched:.2f} s")
-
-
-# --- the errors of the rules --------------------------------------------------------------------------------
 
 RULES, MANY, HUGE = 5, 160, 1e6  # pieces; nodes of what counts as exact; a constant beside which rounding is nothing
 CLOSE, ABOVE = 2, 3  # CLOSE has no relative error; ABOVE has constants of oscillation along, too
@@ -100,10 +64,8 @@ def hard_points(count: int, along: bool, seed: int = 3) -> tuple[Array, Array]:
         small, wide, high = decades(-6, 0.5), decades(-6, 6), decades(-1, 6)
         pairs += [(decades(-25, 6), decades(-12, 6)), (decades(-300, 279), decades(-300, 279))]
         pairs += [(small * small * decades(-5, 2), small), (decades(-25, 0.3), 1.5 * beside(-15, 0))]
-        pairs += [
-            (0.33516779066085 * wide * beside(-12, -0.5), wide),
-            (1.5 * border(high / 1.5) * beside(-12, -0.5), high),
-        ]
+        pairs += [(0.33516779066085 * wide * beside(-12, -0.5), wide)]
+        pairs += [(1.5 * border(high / 1.5) * beside(-12, -0.5), high)]
     return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))  # type: ignore[return-value]
 
 
@@ -114,9 +76,8 @@ def asked(s: Surrogate, v: Array, y: Array, direction: str, put: list[tuple[Arra
     found = [np.array(s.quantity(name, v, y, **kind)[:2]) for name in NAMES[:3]]
     answer = s.evaluate(mu0=1.0, Fz=1.0, k=1.0, omega=1.0, v0=v, y0=y, gradient=True, **kind)
     with np.errstate(all="ignore"):
-        return found + [
-            np.array([answer.gradient[n] * x, answer.gradient_bound[n] * x]) for n, x in (("v0", v), ("y0", y))
-        ]
+        slopes = ((answer.gradient[name] * x, answer.gradient_bound[name] * x) for name, x in (("v0", v), ("y0", y)))
+        return found + list(map(np.array, slopes))
 
 
 def largest(error: Array, scale: Array) -> float:

@@ -5,9 +5,7 @@
 Each case computes the naive number too.
 """
 
-from __future__ import annotations
-
-from benchmarks.measuring import ROOT, main, markdown, progress, quantity  # isort: split
+from benchmarks.measuring import ROOT, main, markdown, progress, quantity, sections  # isort: split
 
 import csv
 import math
@@ -31,16 +29,14 @@ HALF = 0.5 * math.pi
 
 
 def g(x: float) -> str:
-    """Two significant digits."""
     return quantity(float(x), 2)
 
 
 def reference(case: str) -> list[tuple[float, float, float]]:
     """v~, y~, mu~ of the quadruple-precision points of one kind."""
-    with open(ROOT / "tests" / "data" / "points.csv", newline="") as stream:
-        return [
-            (float(r["v"]), float(r["y"]), float(r["mu_ratio"])) for r in csv.DictReader(stream) if r["case"] == case
-        ]
+    with (ROOT / "tests" / "data" / "points.csv").open(newline="") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["case"] == case]
+    return [(float(row["v"]), float(row["y"]), float(row["mu_ratio"])) for row in rows]
 
 
 def worst(case: str) -> str:
@@ -48,9 +44,6 @@ def worst(case: str) -> str:
     points = reference(case)
     error = max(abs(solve(v, y).mu_ratio - mu) / mu for v, y, mu in points)
     return f"{g(error)} on {len(points)} points"
-
-
-# --- the border ---------------------------------------------------------------------------------------
 
 
 def _lam_samples(v: float, y: float, n: int) -> tuple[Array, float]:
@@ -84,32 +77,26 @@ def grazing() -> str:
     return f"y~ = 1, lam along the orbit that slides all the time:\n\n{markdown(header, rows)}"
 
 
+def hinted(v: float, y: float, w: Array, out: Array, orbit: Array) -> None:
+    """The cycle with stick, from the orbit that slides all the time where there is one."""
+    hint = out[FALL] if continuous(v, y, w, out) == OK else math.nan
+    stick_slip(v, y, y - 1.0, hint, w, out, orbit)
+
+
 def surplus() -> str:
     """The error from the poorly known end of slip if the surplus is not removed."""
     w, out, orbit, _ = workspace()
-    lost = kept = spread = 0.0
-    count = 0
+    found = []
     for v, y, mu in reference("border"):
         full = solve(v, y)
-        if full.regime != "stick_slip":
-            continue
-        count += 1
-        hint = math.nan
-        if continuous(v, y, w, out) == OK:
-            hint = out[FALL]
-        stick_slip(v, y, y - 1.0, hint, w, out, orbit)
-        naive = (orbit[DURATION] * (orbit[COS_0] + 0.5 * v * orbit[DURATION]) + out[SUM_UX]) / math.pi
-        spread = max(spread, abs(out[SIGMA] - orbit[SIGMA_0]))
-        lost = max(lost, abs(naive - mu) / mu)
-        kept = max(kept, abs(full.mu_ratio - mu) / mu)
+        if full.regime == "stick_slip":
+            hinted(v, y, w, out, orbit)
+            naive = (orbit[DURATION] * (orbit[COS_0] + 0.5 * v * orbit[DURATION]) + out[SUM_UX]) / math.pi
+            found.append((abs(out[SIGMA] - orbit[SIGMA_0]), abs(naive - mu) / mu, abs(full.mu_ratio - mu) / mu))
+    spread, lost, kept = map(max, zip(*found, strict=True))
     rows = [["as it comes", g(lost)], ["surplus taken out", g(kept)]]
-    return (
-        f"{count} reference points below the border; slip and stick fail to add up to half a period by as much as "
-        f"{g(spread)}:\n\n" + markdown(("mu~", "max rel error"), rows)
-    )
-
-
-# --- stick onset --------------------------------------------------------------------------------------
+    text = f"{len(found)} reference points below the border; slip and stick fail to add up to half a period by as much"
+    return f"{text} as {g(spread)}:\n\n{markdown(('mu~', 'max rel error'), rows)}"
 
 
 def double_root() -> str:
@@ -137,25 +124,17 @@ def double_root() -> str:
     return f"v~ = {v}, y~ = {y}:\n\n{markdown(header, rows)}"
 
 
-# --- creep --------------------------------------------------------------------------------------------
-
-
 def creep() -> str:
     """Cycles that marching needs as v~ falls, and the remaining error when two cycles agree."""
     rows = []
     for v, y in ((1.0, 0.1), (0.1, 0.1), (0.01, 0.1), (0.01, 0.5), (0.001, 0.5)):
         progress(f"marching at v~ = {v:g}, y~ = {y:g}")
-        marched = march(v, y)
-        full = solve(v, y)
-        rows.append(
-            [f"{v:g}", f"{y:g}", full.regime.replace("_", "-"), f"{marched.cycles}" + ("" if marched.agreed else " *"),
-             g(abs(marched.mu_ratio - full.mu_ratio))]
-        )  # fmt: skip
+        marched, full = march(v, y), solve(v, y)
+        cycles = f"{marched.cycles}" + ("" if marched.agreed else " *")
+        off = g(abs(marched.mu_ratio - full.mu_ratio))
+        rows.append([f"{v:g}", f"{y:g}", full.regime.replace("_", "-"), cycles, off])
     text = markdown(("v~", "y~", "regime", "cycles", "error when it stops"), rows, 3)
     return text + f"\n\nThe solver here, at the reference points of creep: max rel error {worst('creep')}."
-
-
-# --- corner -------------------------------------------------------------------------------------------
 
 
 def _corner(radius: Array, psi: Array) -> tuple[Array, Array, Array]:
@@ -175,8 +154,7 @@ def exact_eta() -> str:
     rows = []
     for radius in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5):
         v, eta, phi = (float(x) for x in _corner(np.array(radius), np.array(0.25 * math.pi)))
-        exact = solve(v, 1.0 + eta, eta).mu_ratio
-        rounded = solve(v, 1.0 + eta).mu_ratio
+        exact, rounded = solve(v, 1.0 + eta, eta).mu_ratio, solve(v, 1.0 + eta).mu_ratio
         rows.append([f"{radius:.0e}", f"{v:.1e}", f"{eta:.1e}", g(abs(rounded / exact - 1)), g(abs(exact / phi - 1))])
     header = ("R", "v~", "y~ - 1", "rel change of mu~ by rounding y~", "abs(mu~/phi - 1)")
     return f"psi = pi/4; phi is the root of the normal form:\n\n{markdown(header, rows, 0)}"
@@ -207,35 +185,24 @@ def cusp() -> str:
     outside = _solved(np.exp(log_v), np.exp(log_y) - 1.0)
 
     def ratio(p: Array, s: Array) -> Array:
-        eta_ = 0.25 * s * s - 0.5 * p * p
-        p, s, eta_ = np.broadcast_arrays(p, s, eta_)
-        out: Array = _solved(p * s * s / (2.0 * math.pi), eta_) / p
-        return out
+        return np.asarray(_solved(p * s * s / (2.0 * math.pi), 0.25 * s * s - 0.5 * p * p) / p)
 
     def polar(r: Array, t: Array) -> Array:
-        out: Array = ratio(r * np.sin(t) / math.sqrt(2.0), math.sqrt(2.0) * r * np.cos(t))
-        return out
+        return ratio(r * np.sin(t) / math.sqrt(2.0), math.sqrt(2.0) * r * np.cos(t))
 
     def plain(a: Array, b: Array) -> Array:
-        a, b = np.broadcast_arrays(a, b)
         return _solved(np.exp(a), np.exp(b) - 1.0)
 
+    spans, s0 = ((0.0, 0.8 / math.sqrt(2.0)), (0.0, 0.8 * math.sqrt(2.0))), math.sqrt(2.0) * radius * np.cos(psi)
     rows = []
     for n in (8, 16, 32, 64):
         progress(f"corner {n} x {n}")
-        rows.append(
-            [
-                f"{n} x {n}",
-                g(_fit_error(n, (low, high), plain, log_v, log_y, outside)),
-                g(
-                    _fit_error(
-                        n, ((0.0, 0.8 / math.sqrt(2.0)), (0.0, 0.8 * math.sqrt(2.0))), ratio,
-                        phi, math.sqrt(2.0) * radius * np.cos(psi), inside / phi,
-                    )
-                ),
-                g(_fit_error(n, ((0.0, 0.8), (0.0, HALF)), polar, radius, psi, inside / phi)),
-            ]
-        )  # fmt: skip
+        errors = (
+            _fit_error(n, (low, high), plain, log_v, log_y, outside),
+            _fit_error(n, spans, ratio, phi, s0, inside / phi),
+            _fit_error(n, ((0.0, 0.8), (0.0, HALF)), polar, radius, psi, inside / phi),
+        )
+        rows.append([f"{n} x {n}", *map(g, errors)])
     header = ("Chebyshev nodes", "mu~ on (ln v~, ln y~)", "mu~/phi on (phi, s0)", "mu~/phi on (R, psi)")
     return (
         "Largest absolute error at 2,000 random points; the two right columns over R <= 0.8, the left one over v~ in "
@@ -244,20 +211,14 @@ def cusp() -> str:
     )
 
 
-# --- small and large amplitude ------------------------------------------------------------------------
-
-
 def small_amplitude() -> str:
     """1 - mu~ where mu~ is almost 1."""
     v = 2.0
     rows = []
     for y in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
-        full = solve(v, y)
-        limit = y * y / (4.0 * (1.0 + v * v))
-        rows.append(
-            [f"{y:.0e}", f"{full.deficit:.6e}", g(abs((1.0 - full.mu_ratio) / full.deficit - 1)),
-             g(abs(full.deficit / limit - 1))]
-        )  # fmt: skip
+        full, limit = solve(v, y), y * y / (4.0 * (1.0 + v * v))
+        off = g(abs((1.0 - full.mu_ratio) / full.deficit - 1)), g(abs(full.deficit / limit - 1))
+        rows.append([f"{y:.0e}", f"{full.deficit:.6e}", *off])
     header = ("y~", "1 - mu~, solved", "rel error of 1 - fl(mu~)", "rel distance to eq. (31)")
     return f"v~ = {v:g}; eq. (31) itself is off by O(y~^2):\n\n{markdown(header, rows, 0)}"
 
@@ -269,10 +230,7 @@ def short_stick() -> str:
     for y in (1e4, 1e6, 1e8, 1e10, 1e12):
         v = 0.9 * closed_forms.border_large_amplitude(y)
         full = solve(v, y)
-        hint = math.nan
-        if continuous(v, y, w, out) == OK:
-            hint = out[FALL]
-        stick_slip(v, y, y - 1.0, hint, w, out, orbit)
+        hinted(v, y, w, out, orbit)
         d, cth, sth, s0, s1 = (orbit[i] for i in (DURATION, COS_0, SIN_0, SIGMA_0, SIGMA_1))
         ux, uy = cth + v * d, 2.0 * y * math.sin(s0 + 0.5 * d) * math.sin(0.5 * d) - sth
         x, chart = (-math.asin(min(ux, 1.0)), 1) if uy > 0.0 else (math.atan2(uy, ux), 0)
@@ -311,17 +269,7 @@ def stiffness() -> str:
     return f"{markdown(header, rows, 0)}\n\nAt the reference points of large speed: max rel error {worst('tail_vinf')}."
 
 
-SECTIONS: dict[str, Callable[[], str]] = {
-    "grazing": grazing,
-    "surplus": surplus,
-    "double_root": double_root,
-    "creep": creep,
-    "exact_eta": exact_eta,
-    "cusp": cusp,
-    "small_amplitude": small_amplitude,
-    "short_stick": short_stick,
-    "stiffness": stiffness,
-}
+SECTIONS = sections(grazing, surplus, double_root, creep, exact_eta, cusp, small_amplitude, short_stick, stiffness)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

@@ -3,8 +3,6 @@
 PyTorch is measured where it is installed.  Times in brackets are of the release that called Python back.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 import functools
@@ -12,6 +10,7 @@ import importlib.util
 import subprocess
 import sys
 import tempfile
+import timeit
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,18 +34,7 @@ long long ratio_n_in(void) { return 2; }
 Way = tuple[Callable[..., Any], Callable[..., Any], Callable[[float], Any]]
 
 
-def repeated(number: int, call: Callable[..., Any], *arguments: Any) -> Callable[[], None]:
-    """The call that many times."""
-
-    def run() -> None:
-        for _ in range(number):
-            call(*arguments)
-
-    return run
-
-
 def loop(step: Callable[[Any], Any], start: Any) -> Any:
-    """A body that takes 1,000 small steps."""
     for _ in range(STEPS):
         start = 0.9 * start + 0.1 * step(start)
     return start
@@ -62,7 +50,6 @@ def in_jax(table: mumacro.Surrogate) -> Way:
 
 
 def in_torch(table: mumacro.Surrogate) -> Way:
-    """The operator, without derivatives."""
     import torch
 
     from mumacro.torch import Friction
@@ -88,7 +75,6 @@ def in_casadi(table: mumacro.Surrogate) -> Way:
 
 
 def interop(quick: bool) -> str:
-    """mu~ in every library."""
     n = 10_000 if quick else 1_000_000
     table = mumacro.open(1e-7, threads=1)
     v, y = 10.0 ** np.random.default_rng(0).uniform(-3.0, 3.0, (2, n))
@@ -103,16 +89,14 @@ def interop(quick: bool) -> str:
     for i, (points, number, unit) in enumerate([(0, 2000, 1e6), (1000, 200, 1e6), (n, 1, 1e9 / n), (None, 1, 1e3)]):
         work = {}
         for name, (call, made, steps) in ways.items():
-            if points is None:
-                work[name] = repeated(number, steps, 0.1)
-            else:
-                work[name] = repeated(number, call, *(made(x[:points] if points else float(x[0])) for x in (v, y)))
-        for name, seconds in best_of(15, work, "processor").best.items():
+            given = [0.1] if points is None else [made(x[:points] if points else float(x[0])) for x in (v, y)]
+            once = functools.partial(steps if points is None else call, *given)
+            work[name] = functools.partial(timeit.timeit, once, number=number)
+        for name, seconds in best_of(15, work).items():
             before = BEFORE.get((name, i))
             rows[name].append(quantity(seconds / number * unit) + (f" ({before})" if before else ""))
-    return markdown(
-        ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"], list(rows.values())
-    )
+    head = ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"]
+    return markdown(head, list(rows.values()))
 
 
 if __name__ == "__main__":

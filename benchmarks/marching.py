@@ -5,15 +5,11 @@ unknown.  A disturbance of the cycle decays with the slip path, by exp(-2 pi v~)
 the cost grows as v~ falls; for the same reason two cycles agree to 1e-9 while both are 1e-9 / (2 pi v~) off.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from scipy.integrate import solve_ivp
-
-__all__ = ["Marched", "march"]
 
 RTOL, ATOL, AGREE = 1e-9, 1e-12, 1e-9
 PERIOD = 2.0 * math.pi
@@ -58,9 +54,8 @@ def march(v: float, y: float, max_step: float = math.inf) -> Marched:
         tau, total = 0.0, 0.0
         while tau < PERIOD:
             law, event, start = (stick, full, [*state, total]) if sticking else (slip, speed, [*state, total])
-            run = solve_ivp(
-                law, (tau, PERIOD), start, method="DOP853", rtol=RTOL, atol=ATOL, events=event, max_step=max_step
-            )
+            options: Any = {"rtol": RTOL, "atol": ATOL, "max_step": max_step}
+            run = solve_ivp(law, (tau, PERIOD), start, method="DOP853", events=event, **options)
             tau, total = float(run.t[-1]), float(run.y[-1, -1])
             if sticking:
                 state = (float(run.y[0, -1]), float(run.y[1, -1]))

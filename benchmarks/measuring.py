@@ -3,14 +3,11 @@
 Imported before numpy: it sets one thread for every numerical library, and numpy reads that once, when it loads.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter, process_time
@@ -25,6 +22,11 @@ PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvi
 FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
 #: the documents that hold results, each between a begin and an end marker with the name of its section
 PAGES = tuple(ROOT / path for path in ("docs/accuracy.md", "docs/python.md", "docs/service.md", "tables/README.md"))
+
+
+def sections(*each: Callable[..., str]) -> dict[str, Callable[..., str]]:
+    """Sections for :func:`main` by the names of their functions."""
+    return {section.__name__: section for section in each}
 
 
 def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options: float | str) -> None:
@@ -57,7 +59,6 @@ def main(text: str | None, sections: Mapping[str, Callable[..., str]], **options
 
 
 def write(script: str, section: str, text: str) -> None:
-    """Store a section's result."""
     RESULTS.mkdir(parents=True, exist_ok=True)
     (RESULTS / f"{'-'.join(dict.fromkeys((script, section)))}.md").write_text(f"{text}\n", "utf-8")
     for path in PAGES:
@@ -80,11 +81,11 @@ def processor() -> str:
     return name
 
 
-def machine(*packages: str) -> str:
-    """One line: processor, cores, system, Python, packages in use (more may be named), and the load."""
+def machine() -> str:
+    """One line: processor, cores, system, Python, packages in use, and the load."""
     parts = [processor(), f"{os.cpu_count()} cores", f"{platform.system()} {platform.machine()}"]
     parts.append(f"Python {platform.python_version()}")
-    parts += [f"{name} {version(name)}" for name in (*PACKAGES, *packages) if name in sys.modules]
+    parts += [f"{name} {version(name)}" for name in PACKAGES if name in sys.modules]
     if hasattr(os, "getloadavg"):
         parts.append(f"load average {os.getloadavg()[0]:.1f}")
     return "Machine: " + ", ".join(parts) + "."
@@ -95,41 +96,20 @@ def progress(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-@dataclass(frozen=True)
-class Timed:
-    """Seconds of the best round of each function, the clock, and the share of wall-clock time on a processor."""
-
-    best: dict[str, float]
-    share: float
-    clock: str
-
-    def note(self) -> str:
-        """One sentence about the clock and other load."""
-        what = "wall clock" if self.clock == "wall" else "processor time"
-        return f"Times are {what}; the process had a processor for {100.0 * self.share:.0f} % of the time it was timed."
-
-
-#: processor time is for busy machines; it sums over threads, so use it for single-threaded code
-CLOCKS: dict[str, Callable[[], float]] = {"wall": perf_counter, "processor": process_time}
-
-
-def best_of(rounds: int, work: Mapping[str, Callable[[], object]], clock: str = "wall") -> Timed:
-    """Time the best of ``rounds`` calls of each function, after one untimed call.
+def best_of(rounds: int, work: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """Processor seconds of the best of ``rounds`` calls of each function, after one untimed call; for one thread.
 
     The rounds are interleaved, so that other load slows all functions equally.
     """
     for call in work.values():
         call()
     best = dict.fromkeys(work, float("inf"))
-    wall = own = 0.0
     for _ in range(rounds):
         for name, call in work.items():
-            start, before = perf_counter(), process_time()
+            start = process_time()
             call()
-            seconds, busy = perf_counter() - start, process_time() - before
-            wall, own = wall + seconds, own + min(seconds, busy)
-            best[name] = min(best[name], seconds if clock == "wall" else busy)
-    return Timed(best, own / wall, clock)
+            best[name] = min(best[name], process_time() - start)
+    return best
 
 
 def quantity(value: float, digits: int = 2) -> str:
@@ -148,10 +128,8 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns:
     widths = [max(len(header[i]), 3, *(len(row[i]) for row in rows)) for i in range(len(header))]
 
     def line(cells: Sequence[str]) -> str:
-        padded = (
-            c.ljust(w) if i < text_columns else c.rjust(w) for i, (c, w) in enumerate(zip(cells, widths, strict=True))
-        )
-        return "| " + " | ".join(padded) + " |"
+        sized = enumerate(zip(cells, widths, strict=True))
+        return "| " + " | ".join(c.ljust(w) if i < text_columns else c.rjust(w) for i, (c, w) in sized) + " |"
 
     rule = ["-" * w if i < text_columns else "-" * (w - 1) + ":" for i, w in enumerate(widths)]
     return "\n".join([line(header), line(rule), *map(line, rows)])

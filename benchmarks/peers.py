@@ -3,8 +3,6 @@
 Every contender takes v~ and y~ and includes the time of the two logarithms, as the table does.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,8 +17,6 @@ from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make
 
 import builder
 from builder.sweep import Sweep
-
-__all__ = ["SQUARE", "Contender", "cache", "fitted_to_the_border", "grid_axis", "on_grid", "solve_grid"]
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
@@ -41,20 +37,14 @@ class Contender:
 
 def cache() -> Path:
     """Cache folder outside the source tree for solved grids; its name depends on the solver's source."""
-    folder = Path(builder.__file__).parent
-    digest = sha256(
-        b"".join(
-            (folder / f"{name}.py").read_bytes()
-            for name in ("model", "radau", "sections", "series", "steady", "stick", "sweep")
-        )
-    )
+    names = ("model", "radau", "sections", "series", "steady", "stick", "sweep")
+    digest = sha256(b"".join(Path(builder.__file__).with_name(f"{name}.py").read_bytes() for name in names))
     path = Path(tempfile.gettempdir()) / f"mumacro-benchmarks-{digest.hexdigest()[:16]}"
     path.mkdir(exist_ok=True)
     return path
 
 
 def grid_axis(n: int) -> Array:
-    """``n`` log-spaced values across :data:`SQUARE`."""
     return np.geomspace(*SQUARE, n)
 
 
@@ -62,13 +52,6 @@ def solve_grid(sweep: Sweep, n: int) -> Array:
     """mu~ on the plain grid of ``n`` x ``n`` nodes, axis 0 along v~."""
     axis = grid_axis(n)
     return sweep.solve("full", axis[:, None], axis[None, :])["mu_ratio"]
-
-
-def _pairs(v: Array, y: Array) -> Array:
-    out = np.empty((v.size, 2))
-    np.log(v, out=out[:, 0])
-    np.log(y, out=out[:, 1])
-    return out
 
 
 def _map_coordinates(x: Array, values: Array, order: Literal[1, 3]) -> Evaluate:

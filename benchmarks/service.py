@@ -6,9 +6,7 @@ Linux, two processors: one for the servers, one for the client.  Servers run at 
 in turn, so that other load slows all of them; figures are medians of the rounds.
 """
 
-from __future__ import annotations
-
-from benchmarks.measuring import FINEST, main, markdown  # isort: split
+from benchmarks.measuring import FINEST, main, markdown, sections  # isort: split
 
 import http.client
 import json
@@ -26,47 +24,38 @@ from typing import Any
 
 import numpy as np
 import orjson
+import pyarrow as pa
 
-from tests.serving import CASE, Server, running, serving
+from tests.forms import BATCH, TYPES, as_csv, stream_of
+from tests.serving import CASE, Server, asking, connect, head, running, serving
 
-BATCH = "/v1/mu-macro/batch"
 FIRST, CLIENT = ("taskset", "-c", "0"), {1}  # the processors of the servers and of the client
 ROUNDS, REQUESTS, CLIENTS = 5, 800, 16
-KINDS = {
-    "columns": "application/json", "rows": "application/json", "lines": "application/x-ndjson", "csv": "text/csv",
-    "arrow": "application/vnd.apache.arrow.stream",
-}  # fmt: skip
+KINDS = {name: TYPES[form] for name, form in (
+    ("columns", "json"), ("rows", "json"), ("lines", "ndjson"), ("csv", "csv"), ("arrow", "arrow"))}  # fmt: skip
 
 
 def post(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
-    """A request."""
     body = json.dumps(case).encode()
-    head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
-    return head.encode() + body
+    return head(path, len(body)) + body
 
 
 def get(case: dict[str, Any], path: str = "/v1/mu-macro") -> bytes:
-    """The same as a query."""
     query = "&".join(f"{name}={value}" for name, value in case.items())
     return f"GET {path}?{query} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
 
 
 FORMS = {
-    "POST": post(CASE),
-    "GET": get(CASE),
-    "POST, rigid": post({**CASE, "k": "rigid"}),
-    "GET, rigid": get({**CASE, "k": "rigid"}),
-    "POST, power": post({**CASE, "include": ["power"]}),
-    "GET, power": get({**CASE, "include": "power"}),
-    ".txt": get(CASE, "/v1/mu-macro.txt"),
-}
+    "POST": post(CASE), "GET": get(CASE), "POST, rigid": post({**CASE, "k": "rigid"}),
+    "GET, rigid": get({**CASE, "k": "rigid"}), "POST, power": post({**CASE, "include": ["power"]}),
+    "GET, power": get({**CASE, "include": "power"}), ".txt": get(CASE, "/v1/mu-macro.txt"),
+}  # fmt: skip
 
 
 def ask(server: Server, request: bytes, number: int, clients: int) -> None:
     """Send a request so many times on so many connections; every answer must be 200."""
     with ExitStack() as stack:
-        address = ("127.0.0.1", server.port)
-        made = [stack.enter_context(socket.create_connection(address, timeout=60)) for _ in range(clients)]
+        made = [stack.enter_context(connect(server)) for _ in range(clients)]
         for _ in range(number // clients):
             for raw in made:
                 raw.sendall(request)
@@ -75,7 +64,6 @@ def ask(server: Server, request: bytes, number: int, clients: int) -> None:
 
 
 def read(raw: socket.socket) -> None:
-    """Read an answer, which must be 200."""
     answer = http.client.HTTPResponse(raw, method="POST")
     answer.begin()
     text = answer.read()
@@ -84,31 +72,22 @@ def read(raw: socket.socket) -> None:
 
 
 def batch(server: Server, kind: str, body: bytes) -> None:
-    """Send one batch and read the answer."""
-    with socket.create_connection(("127.0.0.1", server.port), timeout=120) as raw:
-        head = f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
-        sending = threading.Thread(target=raw.sendall, args=(head.encode() + body,))
+    with connect(server) as raw:
+        sending = threading.Thread(target=raw.sendall, args=(head(BATCH, len(body), kind) + body,))
         sending.start()
         read(raw)
         sending.join()
 
 
-def service(**settings: Any) -> AbstractContextManager[Server]:
-    """This service with its defaults, on the first processor: checked, logged, counted."""
-    return serving(FINEST, before=FIRST, **settings)
-
-
 def peer(name: str, folder: str) -> AbstractContextManager[Server]:
-    """Another one there."""
     return running([*FIRST, sys.executable, "-m", "benchmarks.service_peers", name], Path(folder) / name)
 
 
 def single() -> str:
-    """The seven forms and FastAPI, beside raw ASGI."""
     os.sched_setaffinity(0, CLIENT)  # else it interrupts the servers whenever they answer
     found: dict[str, list[tuple[float, float]]] = {}
     with (
-        tempfile.TemporaryDirectory() as folder, service() as own, peer("raw", folder) as raw,
+        tempfile.TemporaryDirectory() as folder, serving(FINEST, before=FIRST) as own, peer("raw", folder) as raw,
         peer("fastapi", folder) as fast,
     ):  # fmt: skip
         asked = [(f"this service, {name}", own, text) for name, text in FORMS.items()]
@@ -133,9 +112,6 @@ def single() -> str:
 
 
 def body_of(form: str, n: int) -> bytes:
-    """A batch with all digits."""
-    import pyarrow as pa
-
     random = np.random.default_rng(n)
     table = {
         "mu0": random.uniform(0.1, 0.9, n), "Fz": 10 ** random.uniform(0, 2, n), "k": 10 ** random.uniform(5, 7, n),
@@ -148,20 +124,17 @@ def body_of(form: str, n: int) -> bytes:
         parts = ({name: column[i : i + 1000] for name, column in table.items()} for i in range(0, n, 1000))
         return b"".join(orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for part in parts)
     if form == "arrow":
-        sink, batch = pa.BufferOutputStream(), pa.record_batch(table)
-        with pa.ipc.new_stream(sink, batch.schema) as writer:
-            writer.write_batch(batch)
-        return bytes(sink.getvalue())
-    rows = zip(*(column.tolist() for column in table.values()), strict=True)
-    if form == "csv":
-        return "\r\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)]).encode()
-    return orjson.dumps([dict(zip(table, row, strict=True)) for row in rows])
+        return stream_of(pa.record_batch(table))
+    columns = (column.tolist() for column in table.values())
+    rows = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
+    return as_csv(rows).encode() if form == "csv" else orjson.dumps(rows)
 
 
 def batches() -> str:
     """Speed of 100,000 cases, and the waits of short requests beside them and beside a million."""
     rows = []
-    with service(MUMACRO_MAX_BODY_BYTES="1000000000", MUMACRO_MAX_BATCH="1000000") as own:
+    settings = {"MUMACRO_MAX_BODY_BYTES": "1000000000", "MUMACRO_MAX_BATCH": "1000000"}
+    with serving(FINEST, before=FIRST, ready=True, **settings) as own:
         for form, kind in KINDS.items():
             body = body_of(form, 100_000)
             batch(own, kind, body)
@@ -179,26 +152,13 @@ def batches() -> str:
 
 def longest(server: Server, kind: str, body: bytes, number: int) -> float:
     """The longest of the waits for ``/livez`` on new connections while batches are answered [s]."""
-    waits: list[float] = []
-    stop = threading.Event()
-
-    def asking() -> None:
-        while not stop.wait(0.002):
-            started = time.perf_counter()
-            ask(server, b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n", 1, 1)
-            waits.append(time.perf_counter() - started)
-
-    thread = threading.Thread(target=asking)
-    thread.start()
-    for _ in range(number):
-        batch(server, kind, body)
-    stop.set()
-    thread.join()
+    with asking(server, 0.002) as waits:
+        for _ in range(number):
+            batch(server, kind, body)
     return max(waits)
 
 
 def start() -> str:
-    """Time to the first ready answer, and memory."""
     times, idle = [], 0.0
     for _ in range(3):
         with serving(FINEST, ready=False, before=FIRST) as own:
@@ -209,8 +169,5 @@ def start() -> str:
     return markdown(("one worker, one table", ""), rows)
 
 
-SECTIONS = {"single": single, "batches": batches, "start": start}
-
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS)
+    main(__doc__, sections(single, batches, start))

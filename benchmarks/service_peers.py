@@ -12,7 +12,6 @@ from mumacro.inputs import FIELDS
 
 
 def raw() -> Any:
-    """The floor."""
     import orjson
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
@@ -32,7 +31,6 @@ def raw() -> Any:
 
 
 def fastapi() -> Any:
-    """Models in and out, around the same table."""
     from fastapi import FastAPI
 
     from mumacro import Surrogate

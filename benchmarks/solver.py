@@ -5,11 +5,10 @@
 One thread.  Points are log-uniform over v~, y~ in [1e-3, 1e3].
 """
 
-from __future__ import annotations
-
-from benchmarks.measuring import CLOCKS, best_of, main, markdown, progress, quantity  # isort: split
+from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
 
 from functools import partial
+from time import process_time
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,57 +22,50 @@ PEER_LOW = 0.01  # smallest v~ of the marched points, so that marching ends
 
 def points(n: int, seed: int, low: float = 1e-3) -> NDArray[np.float64]:
     """Rows of v~, y~, y~ - 1, log-uniform over v~ in [low, 1e3], y~ in [1e-3, 1e3]."""
-    rng = np.random.default_rng(seed)
-    v = np.exp(rng.uniform(np.log(low), np.log(1e3), n))
-    y = np.exp(rng.uniform(np.log(1e-3), np.log(1e3), n))
+    v, y = np.exp(np.random.default_rng(seed).uniform(np.log([[low], [1e-3]]), np.log(1e3), (2, n)))
     return np.stack([v, y, y - 1.0], axis=1)
 
 
-def by_regime(n: int, rounds: int, clock: str) -> tuple[str, str]:
-    """Mean time a solve, all together and split by regime; and a sentence about other load."""
+def by_regime(n: int, rounds: int) -> str:
+    """Mean time a solve, all together and split by regime."""
     drawn = points(n, seed=1)
     slides = drawn[:, 0] >= solve_chunk("border", drawn)[:, 1]
     parts = {"all": drawn, REGIMES[0]: drawn[slides], REGIMES[1]: drawn[~slides]}
-    timed = best_of(rounds, {name: partial(solve_chunk, "full", part) for name, part in parts.items()}, clock)
-    rows = [
-        [name.replace("_", "-"), f"{len(part):,}", quantity(timed.best[name] / len(part) * 1e6)]
-        for name, part in parts.items()
-    ]
-    return markdown(("regime", "points", "mean, microseconds"), rows), timed.note()
+    best = best_of(rounds, {name: partial(solve_chunk, "full", part) for name, part in parts.items()})
+    mean = {name: quantity(best[name] / len(part) * 1e6) for name, part in parts.items()}
+    rows = [[name.replace("_", "-"), f"{len(part):,}", mean[name]] for name, part in parts.items()]
+    return markdown(("regime", "points", "mean, microseconds"), rows)
 
 
-def against_marching(n: int, clock: str) -> str:
+def against_marching(n: int) -> str:
     """The same points by both: time and error, split by whether two marched cycles agreed."""
-    now, drawn = CLOCKS[clock], points(n, seed=2, low=PEER_LOW)
+    drawn = points(n, seed=2, low=PEER_LOW)
     mu = solve_chunk("full", drawn)[:, 0]
-    direct = best_of(3, {"": partial(solve_chunk, "full", drawn)}, clock).best[""] / n
+    direct = best_of(3, {"": partial(solve_chunk, "full", drawn)})[""] / n
     found = []
     for (v, y, _), exact in zip(drawn, mu, strict=True):
-        start = now()
+        start = process_time()
         marched = march(v, y)
-        found.append((marched.agreed, now() - start, abs(marched.mu_ratio - exact)))
+        found.append((marched.agreed, process_time() - start, abs(marched.mu_ratio - exact)))
     rows = [["compiled solver", str(n), quantity(1e6 * direct), "reference"]]
     for agreed, name in ((True, "two cycles agree to 1e-9"), (False, "given up, beside the border")):
         chosen = [(seconds, error) for ended, seconds, error in found if ended == agreed]
         if chosen:
             seconds, error = np.array(chosen).T
-            rows.append(
-                [f"marched, {name}", str(len(chosen)), quantity(1e6 * seconds.mean()), quantity(float(error.max()))]
-            )
+            told = quantity(1e6 * seconds.mean()), quantity(float(error.max()))
+            rows.append([f"marched, {name}", str(len(chosen)), *told])
     return markdown(("method", "points", "mean, microseconds", "max abs error"), rows)
 
 
-def solver(points: int, rounds: int, quick: bool, clock: str) -> str:
-    """Time by regime, and marching beside it."""
+def solver(points: int, rounds: int, quick: bool) -> str:
     n = min(points, 500) if quick else points
-    regimes, note = by_regime(n, rounds, clock)
-    progress("marching")
+    regimes = by_regime(n, rounds)
     return (
-        f"{n:,} points, one thread, best of {rounds} rounds. {note}\n\n{regimes}\n\n"
+        f"{n:,} points, one thread, best of {rounds} rounds, processor time.\n\n{regimes}\n\n"
         "Beside scipy's `solve_ivp` (DOP853, rtol 1e-9, atol 1e-12, events at the end of stick and of slip), at points "
-        f"with v~ >= {PEER_LOW:g}:\n\n{against_marching(3 if quick else 40, clock)}"
+        f"with v~ >= {PEER_LOW:g}:\n\n{against_marching(3 if quick else 40)}"
     )
 
 
 if __name__ == "__main__":
-    main(__doc__, {"solver": solver}, points=20_000, rounds=5, quick=False, clock="wall")
+    main(__doc__, {"solver": solver}, points=20_000, rounds=5, quick=False)

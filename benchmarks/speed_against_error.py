@@ -6,16 +6,13 @@ Points are log-uniform over v~, y~ in [1e-3, 1e3].  Times are of one thread, bes
 against fresh solves.  A full run draws build/results/speed_against_error.png.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import RESULTS, ROOT, best_of, main, markdown, progress, quantity  # isort: split
 
 import math
-import timeit
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -23,60 +20,42 @@ from numpy.typing import NDArray
 
 from benchmarks import peers
 from benchmarks.peers import Contender
-from builder.differences import differences
 from builder.sweep import Sweep, solve_chunk
 from mumacro import Surrogate, closed_forms
 
 Array = NDArray[np.float64]
 OURS, PEER, EXACT = "ours", "peer", "exact"
-TRIAL = 2000  # points of the trial that determines the points of one round
-BUDGET = 2.0  # seconds allowed for one round of one contender; slower ones are timed on fewer points
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
-HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "max rel error", "bytes", "solves")
+HEADER = ("method", "data", "ns/point", "max abs error", "99 % abs error", "bytes", "solves")
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One line of the table; times in ns a point, errors of mu~ [-], NaN if not applicable."""
 
     kind: str
-    name: str
-    size: str
+    method: Contender
     ns: float
     max_abs: float = math.nan
     p99_abs: float = math.nan
-    max_rel: float = math.nan
-    bytes: int = 0
-    solves: int = 0
 
     def cells(self) -> list[str]:
-        """The line as text."""
-        numbers = [quantity(x) if x == x else "-" for x in (self.ns, self.max_abs, self.p99_abs, self.max_rel)]
-        counts = [f"{n:,}" if n else "-" for n in (self.bytes, self.solves)]
-        return [f"**{self.name}**" if self.kind == OURS else self.name, self.size, *numbers, *counts]
+        name = self.method.name
+        numbers = [quantity(x) if x == x else "-" for x in (self.ns, self.max_abs, self.p99_abs)]
+        counts = [f"{n:,}" if n else "-" for n in (self.method.bytes, self.method.solves)]
+        return [f"**{name}**" if self.kind == OURS else name, self.method.size, *numbers, *counts]
 
 
-def draw(n: int, seed: int, low: float = peers.SQUARE[0]) -> tuple[Array, Array]:
-    """``n`` points (v~ >= ``low``, y~), log-uniform over the square."""
-    rng = np.random.default_rng(seed)
-    high = peers.SQUARE[1]
-    v = np.exp(rng.uniform(np.log(low), np.log(high), n))
-    return v, np.exp(rng.uniform(np.log(peers.SQUARE[0]), np.log(high), n))
+def draw(n: int, seed: int) -> Array:
+    low, high = np.log(peers.SQUARE)
+    return np.exp(np.random.default_rng(seed).uniform(low, high, (2, n)))
 
 
 def tables() -> list[Surrogate]:
-    """The committed tables, coarse to fine."""
     opened = [Surrogate.open(path, threads=1) for path in (ROOT / "tables").glob("*.nc")]
     return sorted(opened, key=lambda s: -s.tolerance)
 
 
-def spread(error: Array, truth: Array) -> tuple[float, float, float]:
-    """Largest and 99 % absolute error and largest relative error."""
-    return float(error.max()), float(np.quantile(error, 0.99)), float((error / truth).max())
-
-
 def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
-    """All methods timed on the large set of points, the tables first."""
     found = []
     for s in tables():
         solves = int(s.table.attributes["n_solves"])
@@ -89,92 +68,38 @@ def contenders(sweep: Sweep, quick: bool) -> list[tuple[str, Contender]]:
     return found
 
 
-def affordable(contender: Contender, v: Array, y: Array) -> int:
-    """The number of points for one round, from a short trial; the first call compiles."""
-    contender.evaluate(v[:TRIAL], y[:TRIAL])
-    seconds = min(timeit.repeat(partial(contender.evaluate, v[:TRIAL], y[:TRIAL]), number=1, repeat=3))
-    return int(min(v.size, max(TRIAL, BUDGET * TRIAL / seconds)))
-
-
-def compare(points: int, quick: bool, rounds: int, clock: str) -> tuple[list[Row], str]:
-    """All rows: the tables, the peers, the formula, the solvers; and a sentence about other load."""
+def compare(points: int, quick: bool, rounds: int) -> list[Row]:
+    """All rows: the tables, the peers, the formula, the solvers."""
     v, y = draw(points, seed=1)
     v_true, y_true = draw(2_000 if quick else 100_000, seed=2)
     with Sweep(1, checkpoint=peers.cache()) as sweep:
         progress("fresh solves")
         truth = sweep.solve("full", v_true, y_true)["mu_ratio"]
         entries = contenders(sweep, quick)
-    used = {str(i): affordable(c, v, y) for i, (_, c) in enumerate(entries)}
-    work: dict[str, Callable[[], object]] = {
-        str(i): partial(c.evaluate, v[: used[str(i)]], y[: used[str(i)]]) for i, (_, c) in enumerate(entries)
-    }
-    logs = np.empty((points, 2))
-    work["logs"] = lambda: (np.log(v, out=logs[:, 0]), np.log(y, out=logs[:, 1]))
+    work: dict[str, Callable[[], object]] = {str(i): partial(c.evaluate, v, y) for i, (_, c) in enumerate(entries)}
     direct = np.stack([v, y, y - 1.0], axis=1)[: 500 if quick else 10_000]
     work["direct"] = lambda: solve_chunk("full", direct)
     progress(f"{rounds} rounds of {len(work)} contenders")
-    timed = best_of(rounds, work, clock)
+    best = best_of(rounds, work)
     rows: list[Row] = []
     for i, (kind, c) in enumerate(entries):
         error = np.abs(c.evaluate(v_true, y_true) - truth)
-        ns = timed.best[str(i)] / used[str(i)] * 1e9
-        rows.append(Row(kind, c.name, c.size, ns, *spread(error, truth), c.bytes, c.solves))
-    ns = timed.best["logs"] / points * 1e9
-    rows.append(Row(EXACT, "the two logarithms alone, part of every grid's time", "numpy", ns))
-    ns = timed.best["direct"] / len(direct) * 1e9
-    rows.append(Row(EXACT, "direct solve of the full model", "compiled", ns))
-    return rows, timed.note()
+        ns = best[str(i)] / points * 1e9
+        rows.append(Row(kind, c, ns, float(error.max()), float(np.quantile(error, 0.99))))
+    solver = Contender("direct solve of the full model", "compiled", lambda v, _: v, 0, 0)
+    rows.append(Row(EXACT, solver, best["direct"] / len(direct) * 1e9))
+    return rows
 
 
-def other_quantities(points: int, rounds: int, clock: str, quick: bool) -> str:
-    """Gradient, power and stick fraction: time, largest error, largest bound of every table."""
-    v, y = draw(points, seed=4)
-    few = 200 if quick else 5_000
-    v_few, y_few = draw(few, seed=5)
-    case = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0}
-    rows = []
-    with Sweep(1, checkpoint=peers.cache()) as sweep:
-        truth = sweep.solve("full", v_few, y_few)
-        for s in tables():
-            progress(f"other quantities of {s.id}")
-            slopes, noise = differences(s, sweep, "mu_ratio", v_few, y_few)
-            calls: dict[str, Callable[[], object]] = {
-                "gradient": partial(s.evaluate, y0=y, v0=v, **case, gradient=True),
-                "power": partial(s.power_with_bound, v, y),
-                "stick fraction": partial(s.stick_fraction_with_bound, v, y),
-            }
-            timed = best_of(rounds, calls, clock).best
-            _, along_v, along_y, *bounds = s.slopes(v_few, y_few, bounds=True)
-            off = np.maximum(np.abs(np.stack((along_v, along_y)) - slopes) - noise, 0.0)
-            power, of_power = s.power_with_bound(v_few, y_few)
-            stick, of_stick = s.stick_fraction_with_bound(v_few, y_few)
-            found = {
-                "gradient": ("slopes along ln v~, ln y~, absolute", off, np.stack(bounds)),
-                "power": ("relative", np.abs(power / truth["power"] - 1.0), of_power / truth["power"]),
-                "stick fraction": ("absolute", np.abs(stick - truth["stick_fraction"]), of_stick),
-            }
-            for name, (kind, error, bound) in found.items():
-                ns = quantity(timed[name] / points * 1e9)
-                rows.append([f"**{s.id}** {name}", kind, ns, quantity(error.max()), quantity(float(bound.max()))])
-    return markdown(("quantity", "error", "ns/point", "max error", "max bound"), rows, 2)
-
-
-def speed_against_error(points: int, rounds: int, quick: bool, clock: str) -> str:
-    """All methods, the other quantities; and the picture."""
+def speed_against_error(points: int, rounds: int, quick: bool) -> str:
     points = 20_000 if quick else points
     numba.set_num_threads(1)
-    rows, note = compare(points, quick, rounds, clock)
+    rows = compare(points, quick, rounds)
     if not quick:
         plot(rows, RESULTS / "speed_against_error.png")
-    return "\n\n".join(
-        [
-            f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread; "
-            f"best of {rounds} interleaved rounds. {note} Errors of mu~ are against fresh solves. Bytes are "
-            "those of the data in memory.",
-            markdown(HEADER, [r.cells() for r in rows], 2),
-            other_quantities(points, rounds, clock, quick),
-        ]
-    )
+    text = f"{points:,} log-uniform random points over v~, y~ in [1e-3, 1e3]; one thread, best of {rounds} rounds, "
+    text += "processor time. Errors of mu~ are against fresh solves. Bytes are those of the data in memory."
+    return f"{text}\n\n{markdown(HEADER, [row.cells() for row in rows], 2)}"
 
 
 def plot(rows: list[Row], path: Path) -> None:
@@ -188,12 +113,11 @@ def plot(rows: list[Row], path: Path) -> None:
     axes.set_xlabel(r"largest error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000")
     colors = iter(("#c1272d", "#1f5fa8", "#2a8c8c", "#8a8a8a", "#b07aa1", "#e08214", "#222222"))
     shown = [row for row in rows if row.max_abs == row.max_abs]
-    for name in dict.fromkeys("our tables" if row.kind == OURS else row.name for row in shown):
-        line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.name)]
+    for name in dict.fromkeys("our tables" if row.kind == OURS else row.method.name for row in shown):
+        line = [row for row in shown if name == ("our tables" if row.kind == OURS else row.method.name)]
         width = 2.2 if line[0].kind == OURS else 1.0
-        axes.plot(
-            [row.max_abs for row in line], [row.ns for row in line], "o-", label=name, color=next(colors), lw=width
-        )
+        x, y = [row.max_abs for row in line], [row.ns for row in line]
+        axes.plot(x, y, "o-", label=name, color=next(colors), lw=width)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], minor=False)
     axes.minorticks_off()
@@ -204,4 +128,4 @@ def plot(rows: list[Row], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(__doc__, {"speed_against_error": speed_against_error}, points=1_000_000, rounds=5, quick=False, clock="wall")
+    main(__doc__, {"speed_against_error": speed_against_error}, points=1_000_000, rounds=5, quick=False)

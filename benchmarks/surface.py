@@ -3,8 +3,6 @@
 python benchmarks/surface.py [OUT]      (default: docs/img/surface.png)
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

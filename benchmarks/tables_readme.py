@@ -7,8 +7,6 @@ folder, times it and compares its checksum with the committed one; without it th
 from the page, as long as they were measured for the committed table.
 """
 
-from __future__ import annotations
-
 from benchmarks.measuring import PAGES, ROOT, machine, main, markdown, progress, quantity  # isort: split
 
 import json
@@ -23,23 +21,13 @@ from time import perf_counter
 
 from mumacro import Surrogate
 
-HEADER = (
-    "table",
-    "tolerance",
-    "solves",
-    "bytes",
-    "memory of the cells, bytes",
-    "max abs error",
-    "max rel error",
-    "max abs error of the stick fraction",
-    "max rel error of the power",
-)
+HEADER = ("table", "tolerance", "solves", "bytes", "memory of the cells, bytes", "max abs error", "max rel error",
+          "max abs error of the stick fraction", "max rel error of the power")  # fmt: skip
 COMPANIONS = ("verified_max_stick_error", "verified_max_rel_power_error")
 BUILD_HEADER = ("table", "seconds", "processor seconds", "the same checksum", "content_sha256")
 
 
 def command(tolerance: float, out: str, workers: int | None = None) -> list[str]:
-    """Arguments of the interpreter that build a table."""
     words = ["-m", "builder", "build", "--tolerance", f"{tolerance:.0e}".replace("e-0", "e-"), "--out", out]
     return words + ([] if workers is None else ["--workers", str(workers)])
 
@@ -49,10 +37,8 @@ def rebuilt(table: Surrogate, workers: int) -> list[str]:
     progress(f"building {table.id}")
     with tempfile.TemporaryDirectory() as folder:
         before, start = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
-        done = subprocess.run(
-            [sys.executable, *command(table.tolerance, str(Path(folder) / "table.nc"), workers)],
-            cwd=ROOT, stdout=subprocess.PIPE, check=True,
-        )  # fmt: skip
+        words = [sys.executable, *command(table.tolerance, str(Path(folder) / "table.nc"), workers)]
+        done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, check=True)
         seconds, after = perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     own = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     same = json.loads(done.stdout)["content_sha256"] == table.checksum
@@ -66,18 +52,14 @@ def kept(page: str, checksum: str) -> list[str]:
 
 
 def tables(build: bool, workers: int) -> str:
-    """Contents and cost of every committed table."""
     old = PAGES[-1].read_text("utf-8")
     opened = sorted((Surrogate.open(path) for path in (ROOT / "tables").glob("*.nc")), key=lambda s: -s.tolerance)
     rows, builds = [], []
     for s in opened:
-        rows.append(
-            [
-                f"`{s.path.name}`", f"{s.tolerance:.0e}", f"{int(str(s.attributes['n_solves'])):,}",
-                f"{s.path.stat().st_size:,}", f"{s.memory:,}", f"{s.max_abs_error:.2e}", f"{s.max_rel_error:.2e}",
-                *(f"{float(str(s.attributes[name])):.2e}" for name in COMPANIONS),
-            ]
-        )  # fmt: skip
+        counts = (int(str(s.attributes["n_solves"])), s.path.stat().st_size, s.memory)
+        errors = (s.max_abs_error, s.max_rel_error, *(float(str(s.attributes[name])) for name in COMPANIONS))
+        numbers = (*(f"{count:,}" for count in counts), *(f"{error:.2e}" for error in errors))
+        rows.append([f"`{s.path.name}`", f"{s.tolerance:.0e}", *numbers])
         cost = rebuilt(s, workers) if build else kept(old, s.checksum)
         builds.append([f"`{s.path.name}`", *cost, f"`{s.checksum}`"])
     commands = "\n".join(f"    python {' '.join(command(s.tolerance, f'tables/{s.path.name}'))}" for s in opened)

@@ -6,8 +6,6 @@ Cases are drawn in three ways: any positive double for each input, by its bits; 
 y~ in the range of the table; and a share of inputs at the ends of the double range.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -16,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.measuring import main, markdown, quantity
+from benchmarks.measuring import main, markdown, quantity, sections
 from builder.limits import V_RANGE, Y_RANGE
 from builder.sweep import Sweep
 from mumacro import Surrogate
@@ -87,9 +85,6 @@ def excess(one: Any, other: Any, change: Array) -> tuple[NDArray[np.bool_], Arra
     allowed = np.where(rounded, allowed + 4 * 5e-324, allowed)
     with np.errstate(all="ignore"):
         return change > allowed, np.where(change > 0.0, change / np.where(allowed > 0.0, allowed, 5e-324), 0.0)
-
-
-# --- properties ---------------------------------------------------------------------------------------
 
 
 def finite(table: Surrogate, share: float) -> Count:
@@ -203,7 +198,6 @@ PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
 
 
 def promises(share: float) -> str:
-    """Every property, for the coarsest and the finest table."""
     rows = []
     for tolerance in (1e-4, 1e-12):
         for name, check in PROMISES.items():
@@ -213,7 +207,5 @@ def promises(share: float) -> str:
     return markdown(("property", "table", "tried", "broken", "largest change or error, bound = 1"), rows)
 
 
-SECTIONS = {"promises": promises}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0)
+    main(__doc__, sections(promises), share=1.0)

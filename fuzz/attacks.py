@@ -6,19 +6,16 @@ Beside each attack another client asks ``/livez``, one new connection after anot
 process, and the longest of these waits.
 """
 
-from __future__ import annotations
-
 import json
 import resource
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from http.client import HTTPException
 
-from benchmarks.measuring import main, markdown
-from tests.serving import CASE, Server, connect, head, serving
+from benchmarks.measuring import main, markdown, sections
+from tests.serving import CASE, Server, asking, connect, head, serving
 
 CONNECTIONS, BATCHES, CASES, BODY = 990, 4, 100_000, 16 * 2**20  # the defaults; a few connections are left
 EVERYTHING = ["groups", "limits", "gradient", "stick_fraction", "power", "settling"]
@@ -82,60 +79,44 @@ def brackets(server: Server, share: float) -> None:
            number=2 * BATCHES)  # fmt: skip
 
 
-ATTACKS: dict[str, Callable[[Server, float], None]] = {
-    "Heads without an end, of 64 KB of the smallest fields": lambda server, share: held(
-        server, share, b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a:b\r\n" * 13_000
-    ),
-    "16 KB of the smallest requests on each connection, whose answers are not read": lambda server, share: held(
-        server, share, b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600
-    ),
-    "More connections without a byte than are allowed": lambda server, share: held(server, 1.5 * share, b""),
-    "Bodies of 64 KB that lack their last byte": lambda server, share: held(
-        server, share, head("/v1/mu-macro", 65_000) + b" " * 64_999
-    ),
-    "A CSV whose first line is as long as a body may be": lambda server, share: posted(
-        server, "text/csv", b"a," * round(BODY * share / 2), number=2 * BATCHES
-    ),
-    "A CSV of blank lines": lambda server, share: posted(
-        server, "text/csv", b"mu0,Fz,k,y0,omega,v0\n" + b"\n" * round((BODY - 100) * share), number=2 * BATCHES
-    ),
+Attack = Callable[[Server, float], None]
+
+
+def holding(text: bytes, factor: float = 1.0) -> Attack:
+    return lambda server, share: held(server, factor * share, text)
+
+
+def csv_of(start: bytes, line: bytes) -> Attack:
+    def attack(server: Server, share: float) -> None:
+        text = start + line * round((BODY - 100) / len(line) * share)  # as long as a body may be
+        posted(server, "text/csv", text, number=2 * BATCHES)
+
+    return attack
+
+
+ATTACKS: dict[str, Attack] = {
+    "Heads without an end, of 64 KB of the smallest fields":
+        holding(b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"a:b\r\n" * 13_000),
+    "16 KB of the smallest requests on each connection, whose answers are not read":
+        holding(b"GET /x HTTP/1.1\r\nHost:x\r\n\r\n" * 600),
+    "More connections without a byte than are allowed": holding(b"", 1.5),
+    "Bodies of 64 KB that lack their last byte": holding(head("/v1/mu-macro", 65_000) + b" " * 64_999),
+    "A CSV whose first line is as long as a body may be": csv_of(b"", b"a,"),
+    "A CSV of blank lines": csv_of(b"mu0,Fz,k,y0,omega,v0\n", b"\n"),
     "JSON of the smallest values and lists": brackets,
     "As many rows, and as long columns, as are allowed, with everything included": everything,
     "Columns of words and of nulls, which Python reads one by one": strange_words,
     "Streams without a line; the question of a person is answered beside them": idle_streams,
     "Many at once ask for /openapi.json for the first time": descriptions,
-}
+}  # fmt: skip
 
 
-@contextmanager
-def asking(server: Server, waits: list[float]) -> Iterator[None]:
-    """Ask ``/livez`` again and again until the context ends; it must always answer 200."""
-    stop = threading.Event()
-
-    def ask() -> None:
-        while True:
-            started = time.perf_counter()
-            assert server.ask("GET", "/livez")[0] == 200
-            waits.append(time.perf_counter() - started)
-            if stop.wait(0.02):
-                return
-
-    with ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(ask)
-        try:
-            yield
-        finally:
-            stop.set()
-        asked.result()
-
-
-def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float, float]:
+def tried(attack: Attack, share: float) -> tuple[float, float]:
     """The most memory [MB] and the longest wait [s] of one attack on a new service; it must serve afterwards."""
-    waits: list[float] = []
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(8192, most), most))
     with serving() as server:
-        with asking(server, waits):
+        with asking(server) as waits:
             attack(server, share)
         assert server.ask("POST", "/v1/mu-macro", json.dumps(CASE))[0] == 200
         assert not server.errors(), server.errors()[:1]
@@ -143,13 +124,10 @@ def tried(attack: Callable[[Server, float], None], share: float) -> tuple[float,
 
 
 def attacks(share: float) -> str:
-    """All of them."""
     found = {name: tried(attack, share) for name, attack in ATTACKS.items()}
     rows = [(name, f"{memory:.0f}", f"{1e3 * wait:.0f}") for name, (memory, wait) in found.items()]
     return markdown(("attack", "most memory [MB]", "longest wait of /livez [ms]"), rows)
 
 
-SECTIONS = {"attacks": attacks}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0)
+    main(__doc__, sections(attacks), share=1.0)

@@ -1,7 +1,6 @@
 """Files made to harm the program that opens them: memory, time, stack, other files, numbers of a wrong type."""
 
-from __future__ import annotations
-
+import functools
 import shutil
 import zlib
 from collections.abc import Callable
@@ -49,11 +48,11 @@ def zeros(n: int) -> bytes:
     return b"\x78\xda" + block * (n >> 20) + packer.flush() + ((n % 65521 << 16) + 1).to_bytes(4, "big")
 
 
-def replaced(file: h5py.File, name: str, packed: bytes | None = None, **options: Any) -> None:
-    """Replace the variable of this name; its only chunk is written as the given bytes."""
+def replaced(file: h5py.File, name: str, packed: bytes, **options: Any) -> None:
+    """Replace the variable of this name; its only chunk is written as the given bytes, if there are any."""
     del file[name]
     made = file.create_dataset(name, dtype="f8", **options)
-    if packed is not None:
+    if packed:
         made.id.write_direct_chunk((0,) * made.ndim, packed)
 
 
@@ -94,41 +93,32 @@ def attribute(name: str, value: Any, group: str = "/") -> Make:
     return edited(lambda file: file[group].attrs.__setitem__(name, value))
 
 
+def variable(name: str, packed: Callable[[], bytes] = bytes, **options: Any) -> Make:
+    return edited(lambda file: replaced(file, name, packed(), **options))
+
+
+ZEROS, TEN = functools.partial(zeros, 2**31), {"shape": (10,), "chunks": (10,), "compression": "gzip"}
 HOSTILE: dict[str, Make] = {
     "a group that contains itself": edited(lambda file: file.__setitem__("border/again", file["border"])),
     "a group that contains the root": edited(lambda file: file.__setitem__("border/blocks/root", file["/"])),
     "3,000 nested groups": edited(deep),
     "3,000 groups among the blocks": edited(
-        lambda file: [file.create_group(f"border/blocks/g{i}") for i in range(3000)]
-    ),
-    "2 GB of zeros in a chunk of 2 GB": edited(
-        lambda file: replaced(file, "mu_ratio", zeros(2**31), shape=(10,), maxshape=(None,), chunks=(2**28,),
-                              compression="gzip")
-    ),
-    "2 GB of zeros in a chunk of 80 bytes": edited(
-        lambda file: replaced(file, "v_tilde", zeros(2**31), shape=(10,), chunks=(10,), compression="gzip")
-    ),
-    "2 GB of zeros, compressed twice": edited(
-        lambda file: replaced(file, "v_tilde", zlib.compress(zeros(2**31), 9), shape=(10,), chunks=(10,),
-                              compression="gzip")
-    ),
-    "a variable of 160 GB without stored data": edited(
-        lambda file: replaced(file, "mu_ratio", shape=(2_000_000_000, 10), chunks=(1000, 10), compression="gzip")
-    ),
-    "a variable of 31 dimensions": edited(lambda file: replaced(file, "v_tilde", shape=(2,) * 31, chunks=(1,) * 31)),
-    "a variable in another file": edited(
-        lambda file: replaced(file, "v_tilde", shape=(31,), external=[("/dev/zero", 0, 31 * 8)])
-    ),
-    "a variable with another filter": edited(
-        lambda file: replaced(file, "v_tilde", shape=(31,), chunks=(31,), compression="lzf")
-    ),
+        lambda file: [file.create_group(f"border/blocks/g{i}") for i in range(3000)]),
+    "2 GB of zeros in a chunk of 2 GB": variable("mu_ratio", ZEROS, **{**TEN, "maxshape": (None,), "chunks": (2**28,)}),
+    "2 GB of zeros in a chunk of 80 bytes": variable("v_tilde", ZEROS, **TEN),
+    "2 GB of zeros, compressed twice": variable("v_tilde", lambda: zlib.compress(ZEROS(), 9), **TEN),
+    "a variable of 160 GB without stored data": variable(
+        "mu_ratio", shape=(2_000_000_000, 10), chunks=(1000, 10), compression="gzip"),
+    "a variable of 31 dimensions": variable("v_tilde", shape=(2,) * 31, chunks=(1,) * 31),
+    "a variable in another file": variable("v_tilde", shape=(31,), external=[("/dev/zero", 0, 31 * 8)]),
+    "a variable with another filter": variable("v_tilde", shape=(31,), chunks=(31,), compression="lzf"),
+    "a grid of another shape": variable("mu_ratio", shape=(3, 3)),
     "a link to another file": edited(lambda file: links(file, h5py.ExternalLink(SMALLEST, "/border/blocks/corner"))),
     "a link to itself": edited(lambda file: links(file, h5py.SoftLink("/border/blocks/corner"))),
     "a variable in place of a group": edited(lambda file: links(file, np.zeros(3))),
     "a type in place of a group": edited(lambda file: links(file, np.dtype("f8"))),
-    "60 kB of text in an attribute": edited(
-        lambda file: file.attrs.create("many", np.array(["x" * 1000] * 60, dtype=object), dtype=h5py.string_dtype())
-    ),
+    "60 kB of text in an attribute": edited(lambda file: file.attrs.create(
+        "many", np.array(["x" * 1000] * 60, dtype=object), dtype=h5py.string_dtype())),
     "50 attributes of 60 kB": edited(lambda file: [file.attrs.__setitem__(f"a{i}", "x" * 60_000) for i in range(50)]),
     "5,000 attributes": edited(lambda file: [file.attrs.__setitem__(f"a{i}", i) for i in range(5000)]),
     "a tolerance that is text": attribute("tolerance", "1e-4"),
@@ -149,7 +139,6 @@ HOSTILE: dict[str, Make] = {
     "a border of 1e300, checksum right": signed(lambda table: table.border[1].values.fill(1e300)),
     "amplitudes of 1e300, checksum right": signed(lambda table: setattr(table, "y_tilde", table.y_tilde * 1e300)),
     "errors of 1e308, checksum right": signed(lambda table: table.blocks[0].errors["mu_ratio"].fill(1e308)),
-    "a grid of another shape": edited(lambda file: replaced(file, "mu_ratio", shape=(3, 3))),
 }  # fmt: skip
 #: a table with other numbers and a matching checksum is a different table; any answer is allowed
 ANOTHER = {

@@ -7,8 +7,6 @@ the tests of every row run without a fault, and must pass.  Exit code 1 if a fau
 exactly once.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex
@@ -99,7 +97,6 @@ FAULTS = [Fault(*row) for row in (
 
 
 def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    """A command in the copy, with the copy first on the path."""
     variables = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False, timeout=900)
 
@@ -134,13 +131,12 @@ def in_a_copy(tests: str, fault: Fault | None = None) -> str:
         return {0: "SURVIVED", 1: "killed"}.get(code, f"pytest ended with {code}")
 
 
-def mutants(only: str, jobs: int, at_once: bool) -> str:
-    """Try all faults, or those whose file or text holds ``only``; ``at_once``: without the run that has no fault."""
+def mutants(only: str, jobs: int) -> str:
+    """Try all faults, or those whose file or text holds ``only``."""
     chosen = [fault for fault in FAULTS if only in f"{fault.file} {fault.new}"]
     suites = list(dict.fromkeys(fault.tests for fault in chosen))
     with ThreadPoolExecutor(jobs) as pool:
-        results = [""] * len(suites) if at_once else pool.map(in_a_copy, suites)
-        broken = dict(zip(suites, results, strict=True))
+        broken = dict(zip(suites, pool.map(in_a_copy, suites), strict=True))
 
         def one(fault: Fault) -> list[str]:
             row = [fault.file, fault.new.splitlines()[0], broken[fault.tests] or in_a_copy(fault.tests, fault)]
@@ -157,7 +153,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="faults whose file or text holds this")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--at-once", action="store_true", help="without the run that has no fault")
     text = mutants(**vars(parser.parse_args()))
     print(text)
     found = text.split()[-4:]

@@ -6,8 +6,6 @@ They go over sockets to a running service.  The seed of a share of the work is i
 reproduced: ``--again NUMBER`` sends one share and prints the failing requests.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import random
@@ -25,7 +23,7 @@ import numpy as np
 import orjson
 import pyarrow as pa
 
-from benchmarks.measuring import ROOT, main, markdown, progress
+from benchmarks.measuring import ROOT, main, markdown, progress, sections
 from tests.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
@@ -38,16 +36,11 @@ BATCH = "/v1/mu-macro/batch"
 
 
 class Request(NamedTuple):
-    """One request."""
-
     method: str
     path: str
     query: bytes
     headers: list[tuple[bytes, bytes]]
     body: bytes
-
-
-# --- valid requests -----------------------------------------------------------------------------------
 
 
 def case(chance: random.Random) -> dict[str, float]:
@@ -81,7 +74,6 @@ def document(chance: random.Random) -> tuple[str, Any]:
 
 
 def arrow(chance: random.Random) -> bytes:
-    """A valid Arrow stream."""
     n = chance.choice([0, 1, 3, 50])
     rng = np.random.default_rng(chance.randrange(1 << 30))
     kinds = [pa.float64()] * 8 + [pa.float32(), pa.int64(), pa.uint8(), pa.float16()]
@@ -93,8 +85,6 @@ def arrow(chance: random.Random) -> bytes:
             writer.write_table(table)
     return bytes(sink.getvalue().to_pybytes())
 
-
-# --- what is changed ----------------------------------------------------------------------------------
 
 #: texts that replace a value
 NUMBERS = (
@@ -257,17 +247,12 @@ def head_request(chance: random.Random) -> Request:
 
 
 KINDS: dict[str, tuple[int, Callable[[random.Random], Request]]] = {
-    "JSON": (35, json_request),
-    "lines": (15, lines_request),
-    "CSV": (10, csv_request),
-    "Arrow": (15, arrow_request),
-    "queries": (15, query_request),
-    "methods, paths and headers": (10, head_request),
-}
+    "JSON": (35, json_request), "lines": (15, lines_request), "CSV": (10, csv_request), "Arrow": (15, arrow_request),
+    "queries": (15, query_request), "methods, paths and headers": (10, head_request),
+}  # fmt: skip
 
 
 def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
-    """Requests of one share of the work."""
     chance = random.Random(seed)  # noqa: S311
     names, weights = list(KINDS), [weight for weight, _ in KINDS.values()]
     for _ in range(count):
@@ -275,11 +260,7 @@ def work(seed: int, count: int) -> Iterator[tuple[str, Request]]:
         yield name, KINDS[name][1](chance)
 
 
-# --- sending ------------------------------------------------------------------------------------------
-
-
 def wire(request: Request) -> bytes:
-    """The request as bytes."""
     target = quote(request.path, safe="/%.") + ("?" + request.query.decode("latin-1") if request.query else "")
     lines = [f"{request.method} {target} HTTP/1.1".encode("latin-1", "replace")]
     lines += [name + b": " + value for name, value in request.headers]
@@ -303,8 +284,6 @@ def asked(raw: socket.socket, request: Request) -> tuple[int, bool, str]:
 
 
 class Found:
-    """Results of many requests."""
-
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.statuses: Counter[int] = Counter()
@@ -356,7 +335,5 @@ def strange_requests(share: float, again: int = 0) -> str:
     return f"{markdown(('what is changed', 'requests'), rows)}\n\n{text}"
 
 
-SECTIONS = {"strange_requests": strange_requests}
-
 if __name__ == "__main__":
-    main(__doc__, SECTIONS, share=1.0, again=0)
+    main(__doc__, sections(strange_requests), share=1.0, again=0)

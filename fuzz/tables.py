@@ -6,8 +6,6 @@ Files are opened by other processes (``python fuzz/tables.py open``), which may 
 opening the intact table; a process that crashes is a failure.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 import os
@@ -25,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.measuring import ROOT, main, markdown
+from benchmarks.measuring import ROOT, main, markdown, sections
 from fuzz.hostile_tables import HOSTILE, SMALLEST
 from mumacro import Surrogate, TableError
 from mumacro.table import parse_table
@@ -134,7 +132,6 @@ def damaged(share: float, change: str) -> list[Outcome]:
 
 
 def row(name: str, found: Sequence[Outcome]) -> list[str]:
-    """One row of the table."""
     count = Counter(outcome.what for outcome in found)
     numbers = [len(found), *(count[what] for what in (REFUSED, SAME, TEXTS))]
     numbers.append(sum(count[what] for what in (DIFFERS, ESCAPED, DIED)))
@@ -143,7 +140,6 @@ def row(name: str, found: Sequence[Outcome]) -> list[str]:
 
 
 def damaged_tables(share: float) -> str:
-    """Truncations and flipped bytes."""
     rows = [row(name, damaged(share, change)) for change, name in CHANGES.items()]
     left_out = "" if share == 1.0 else f"One byte of {round(1.0 / share)} was tried, {share:.1%} of the full run. "
     return f"{markdown(HEAD, rows)}\n\n{left_out}Seconds are processor time."
@@ -170,10 +166,8 @@ def hostile_tables(share: float) -> str:  # noqa: ARG001 (all of them)
     return markdown(("content of the file", "result", "reason", "seconds", "memory so far [MB]"), rows, 3)
 
 
-SECTIONS = {"damaged_tables": damaged_tables, "hostile_tables": hostile_tables}
-
 if __name__ == "__main__":
     if sys.argv[1:2] == ["open"]:
         open_all(sys.argv[2:])
     else:
-        main(__doc__, SECTIONS, share=1.0)
+        main(__doc__, sections(damaged_tables, hostile_tables), share=1.0)

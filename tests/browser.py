@@ -9,9 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tests.cases import Case
+
 PATIENCE_S = 120  # a browser on a busy machine can be slow
 #: the case that the page starts with
-START = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
+START: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 2 * math.pi * 20e3, "v0": 0.01}
 
 #: the service as it is; what it is asked is kept, for Page.asked
 RECORDED = """(path, options = {}) => {
@@ -54,18 +56,11 @@ class Opened:
     """Opens a state of the page by its address; loads a new document only if needed."""
 
     def __init__(self, browser: Any, url: Any) -> None:
-        self.browser, self.url, self.shown = browser, url, None
+        self.browser, self.url = browser, url
+        self.shown: Any = None
 
-    def __call__(
-        self,
-        address: str = "",
-        width: int = 1400,
-        height: int = 1000,
-        url: Any = None,
-        path: str = "",
-        new: bool = False,
-        wait: bool = True,
-    ) -> Any:
+    def __call__(self, address: str = "", width: int = 1400, height: int = 1000, url: Any = None, path: str = "",
+                 new: bool = False, wait: bool = True) -> Any:  # fmt: skip
         wanted = (width, height, url or self.url, path)
         page = Page(self.browser, url or self.url)
         if new or wanted != self.shown or path:
@@ -99,8 +94,6 @@ class Opened:
 
 
 class Page:
-    """The page as a user sees it."""
-
     def __init__(self, browser: Any, url: Any) -> None:
         self.browser, self.url = browser, url
 
@@ -147,7 +140,6 @@ class Page:
         return float(self.text(selector))
 
     def shown(self) -> Any:
-        """Names and values beside the result."""
         return dict(zip(self.texts("dt"), self.texts("dd"), strict=True))
 
     def value(self, selector: str) -> Any:

@@ -30,12 +30,10 @@ def as_csv(rows: Sequence[Row]) -> str:
 
 
 def as_ndjson(rows: Sequence[Row]) -> str:
-    """One case per line."""
     return "".join(json.dumps(row) + "\n" for row in rows)
 
 
 def as_table(rows: Sequence[Row]) -> Any:
-    """Columns of pyarrow."""
     return pa.table({name: pa.array([number(row[name]) for row in rows], pa.float64()) for name in rows[0]})
 
 
@@ -48,7 +46,6 @@ def stream_of(table: Any, **options: Any) -> bytes:
 
 
 def as_arrow(rows: Sequence[Row]) -> bytes:
-    """An Arrow stream."""
     return stream_of(as_table(rows))
 
 
@@ -56,19 +53,16 @@ WRITERS = {"csv": as_csv, "ndjson": as_ndjson, "arrow": as_arrow}
 
 
 def posted(client: Any, form: str, body: Any, **params: Any) -> Any:
-    """The response to a batch in a form."""
     return client.post(BATCH, content=body, params=params, headers={"Content-Type": TYPES[form]})
 
 
 def asked(client: Any, form: str, rows: Sequence[Row], **params: Any) -> list[Row]:
-    """The answers to cases, one by one."""
     response = posted(client, form, WRITERS[form](rows), **params)
     assert (response.status_code, response.headers["content-type"]) == (200, TYPES[form]), response.text
     return read(form, response)
 
 
 def read(form: str, response: Any) -> list[Row]:
-    """The cases of an answer."""
     if form == "arrow":
         return list(pa.ipc.open_stream(response.content).read_all().to_pylist())
     return rows_of(form, response.text)

@@ -1,7 +1,5 @@
 """A server process on a loopback port, for tests, benchmarks and fuzz."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -9,14 +7,16 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-__all__ = ["CASE", "Server", "chunk", "connect", "head", "running", "serving", "to_end"]
+__all__ = ["CASE", "Server", "asking", "chunk", "connect", "head", "running", "serving", "to_end"]
 
 ROOT = Path(__file__).resolve().parent.parent
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -86,16 +86,13 @@ class Server:
         return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks.iterdir()) / 1e9
 
     def errors(self) -> list[str]:
-        """Lines of the service's log about unexpected errors."""
         return [line for line in self.lines if '"logger": "mumacro.error"' in line]
 
     def stop(self, number: int = signal.SIGTERM) -> int:
-        """Send a signal; returns the exit code."""
         self.process.send_signal(number)
         return self.wait()
 
     def wait(self) -> int:
-        """The exit code, after the end."""
         return self.process.wait(timeout=120)
 
     def kill(self) -> None:
@@ -128,11 +125,27 @@ def running(command: Sequence[str], log: Path, **environment: str) -> Iterator[S
         server.kill()
 
 
-# --- HTTP as bytes --------------------------------------------------------------------------------------
+@contextmanager
+def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
+    """Ask ``/livez`` on new connections until the context ends; it must always answer 200.  The waits [s]."""
+    stop, waits = threading.Event(), list[float]()
+
+    def ask() -> None:
+        while not waits or not stop.wait(pause):
+            started = time.perf_counter()
+            assert server.ask("GET", "/livez")[0] == 200
+            waits.append(time.perf_counter() - started)
+
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(ask)
+        try:
+            yield waits
+        finally:
+            stop.set()
+        asked.result()
 
 
 def connect(server: Server, receive_buffer: int | None = None) -> socket.socket:
-    """A connection."""
     raw = socket.socket()
     if receive_buffer is not None:
         raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)

@@ -34,25 +34,18 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)  # JSON only: the progress bar goes to stderr
     opened = Surrogate.open(out)
-    assert report["table"] == str(out)
-    assert report["content_sha256"] == opened.checksum
+    assert (report["table"], report["content_sha256"]) == (str(out), opened.checksum)
     assert report["tolerance"] == opened.tolerance == 1e-3
     assert report["verified_max_abs_error"] == opened.max_abs_error <= 1e-3
     assert report["verified_max_rel_error"] == opened.max_rel_error <= ABS_TO_REL * 1e-3
     assert report["bytes"] == out.stat().st_size
-    assert report["n_solves"] == opened.attributes["n_solves"] > 10_000
+    assert report["n_solves"] == opened.attributes["n_solves"]
+    assert report["n_solves"] > 10_000
     assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]  # no checkpoint, no partial file
 
     verified = run_builder("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
-    assert json.loads(verified.stdout)["holds"] is True
-    assert json.loads(verified.stdout)["not_covered"] == 0
-
-
-def test_build_refuses_a_folder_as_its_output(run_builder: Run, tmp_path: Path) -> None:
-    (tmp_path / "taken.nc").mkdir()
-    refused(run_builder("build", "--tolerance", "1e-2", "--out", tmp_path / "taken.nc"), "--out", "is a folder")
-    assert [path.name for path in tmp_path.iterdir()] == ["taken.nc"]
+    assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
 
 
 def test_solve_answers_at_the_ends_of_its_range(run_builder: Run) -> None:
@@ -65,14 +58,8 @@ def test_solve_answers_at_the_ends_of_its_range(run_builder: Run) -> None:
         assert answer["status"] == 0
         assert 0.0 < answer["mu_ratio"] <= 1.0
         assert 0.0 <= answer["error_estimate"] < 2e-15
-
-
-def test_solve_far_below_the_border_leaves_out_what_it_did_not_compute(run_builder: Run) -> None:
-    done = run_builder("solve", "--v", "1e-9", "--y", "0.5")
-    assert done.returncode == 0, done.stderr
-    answer = json.loads(done.stdout)
-    assert answer["regime"] == "stick_slip"
-    assert answer["min_slip_speed"] is None
+    answer = json.loads(run_builder("solve", "--v", "1e-9", "--y", "0.5").stdout)
+    assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)  # far below the border: not computed
     assert answer["stick_fraction"] > 0.99
 
 
@@ -93,51 +80,26 @@ def test_verify_refuses_a_damaged_table(run_builder: Run, tables_dir: Path, tmp_
     refused(run_builder("verify", cut), "cut.nc", "not a readable netCDF-4 table")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("build", "--tolerance", "0.5", "--out", "x.nc"), ("--tolerance", "must be from 1e-12 to 0.01")),
-        (("build", "--tolerance", "-1e-8", "--out", "x.nc"), ("--tolerance",)),
-        (("build", "--tolerance", "1e-3"), ("--out",)),
-        (("build", "--tolerance", "1e-3", "--out", "x.nc", "--workers", "2000"), ("--workers",)),
-        (("build", "--tolerance", "1e-3", "--out", "x.nc", "--sideways"), ("--sideways",)),
-        (("verify", "x.nc", "--points", "99999999"), ("--points",)),
-        (("verify", "x.nc", "--seed", "-1"), ("--seed",)),
-        (("verify", "x.nc", "--workers", "0"), ("--workers",)),
-        (("build", "--tolerance", "1e-15", "--out", "x.nc"), ("1e-15",)),
-        (("build", "--tolerance", "nan", "--out", "x.nc"), ("--tolerance",)),
-        (("build", "--tolerance", "1e-3", "--out", "no/such/folder/x.nc"), ("no/such/folder",)),
-        (("build", "--tolerance", "1e-3", "--out", "x.nc", "--workers", "0"), ("--workers",)),
-        (("verify", "no-such-table.nc"), ("no-such-table.nc",)),
-        (("verify", "README.md"), ("README.md",)),
-        (("verify", "x.nc", "--points", "1"), ("--points",)),
-        (("figures", "--out", "no/such/folder"), ("--out",)),
-        (("figures", "--out", ".", "--table", "no-such-table.nc"), ("no-such-table.nc",)),
-        (("bake",), ("bake",)),
-        (("solve", "--v", "-1", "--y", "1"), ("--v",)),
-        (("solve", "--v", "1", "--y", "0"), ("--y",)),
-        (("solve", "--v", "nan", "--y", "1"), ("--v",)),
-        (("solve", "--v", "fast", "--y", "1"), ("--v",)),
-        (("solve", "--v", "1"), ("--y",)),
-        (("verify",), ("required: table",)),
-        (("solve", "--v", "", "--y", "1"), ("--v",)),
-        (("solve", "--v", "1", "--y=-inf"), ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers")),
-        (("solve", "--v", "1e999", "--y", "1"), ("--v", "from 1e-60 to 1e+10", "got inf")),
-        (("solve", "--v", "1e-61", "--y", "1"), ("--v", "from 1e-60 to 1e+10", "got 1e-61")),
-        (("solve", "1", "2"), ()),
-    ],
-)  # fmt: skip
-def test_bad_arguments_are_refused_before_any_work(
-    run_builder: Run, arguments: Any, parts: Any, repository: Path
-) -> None:
-    refused(run_builder(*arguments), *parts)
-    assert not (repository / "x.nc").exists()
-    assert not (repository / "x.nc.checkpoint").exists()
+ROUGH, V_RANGE = "build --tolerance 1e-3 --out x.nc", "from 1e-60 to 1e+10"
+REFUSED: dict[str, tuple[str, ...]] = {
+    "build --tolerance 0.5 --out x.nc": ("--tolerance", "must be from 1e-12 to 0.01"),
+    **dict.fromkeys((f"build --tolerance {x} --out x.nc" for x in ("-1e-8", "nan")), ("--tolerance",)),
+    "build --tolerance 1e-15 --out x.nc": ("--tolerance", "1e-15"), "build --tolerance 1e-3": ("--out",),
+    **dict.fromkeys((f"{ROUGH} --workers {n}" for n in ("0", "2000")), ("--workers",)),
+    f"{ROUGH} --sideways": ("--sideways",), "build --tolerance 1e-2 --out tables": ("--out", "is a folder"),
+    "build --tolerance 1e-3 --out no/such/folder/x.nc": ("no/such/folder",),
+    **dict.fromkeys(("verify x.nc --points 1", "verify x.nc --points 99999999"), ("--points",)),
+    "verify x.nc --seed -1": ("--seed",), "verify x.nc --workers 0": ("--workers",), "verify": ("required: table",),
+    "verify no-such-table.nc": ("no-such-table.nc",), "verify README.md": ("README.md",), "bake": ("bake",),
+    "figures --out no/such/folder": ("--out",), "figures --out . --table no-such-table.nc": ("no-such-table.nc",),
+    **dict.fromkeys((f"solve --v={v} --y 1" for v in ("-1", "nan", "fast", "")), ("--v",)),
+    "solve --v 1 --y 0": ("--y",), "solve --v 1": ("--y",), "solve 1 2": (),
+    "solve --v 1 --y=-inf": ("--y", "from 1e-15 to 1e+14", "-inf", "a table answers"),
+    "solve --v 1e999 --y 1": ("--v", V_RANGE, "got inf"), "solve --v 1e-61 --y 1": ("--v", V_RANGE, "got 1e-61"),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("command", [(), ("build",), ("solve",), ("verify",)])
-def test_every_command_explains_itself(run_builder: Run, command: tuple[str, ...]) -> None:
-    done = run_builder(*command, "--help")
-    assert done.returncode == 0
-    assert "usage: " in done.stdout
-    assert "Traceback" not in done.stderr
+@pytest.mark.parametrize("words", REFUSED)
+def test_bad_arguments_are_refused_before_any_work(run_builder: Run, words: str, repository: Path) -> None:
+    refused(run_builder(*words.split()), *REFUSED[words])
+    assert not list(repository.glob("x.nc*"))

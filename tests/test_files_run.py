@@ -1,6 +1,5 @@
 """``mumacro eval`` killed, stopped, cut, changed: the same command goes on with the same bytes, or says why not."""
 
-import json
 import os
 import shutil
 import signal
@@ -10,11 +9,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from mumacro import Surrogate
-from tests.cases import Capture
+from tests.cases import Capture, opened
+from tests.test_files_formats import cases as random_cases
+from tests.test_files_formats import write
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
@@ -22,7 +21,7 @@ import pyarrow.parquet as pq  # noqa: E402
 from mumacro.__main__ import main  # noqa: E402
 from mumacro.files import FilesError, evaluate_files, reading, run  # noqa: E402
 
-NAMES = ("mu0", "Fz", "k", "y0", "omega", "v0")
+TABLE = opened(1e-12)
 KINDS = ("csv", "csv.gz", "ndjson", "parquet")
 
 
@@ -34,30 +33,22 @@ def small_blocks() -> Any:
 
 
 def table_of(n: int) -> Any:
-    rng = np.random.default_rng(1)
-    low, high = np.array([-2, -1, 4, -8, 2, -5]), np.array([0, 3, 8, -4, 6, 1])
-    values = 10.0 ** rng.uniform(low, high, (n, 6))
-    values[::999, 0] *= -1.0  # rejected
-    return pa.table(dict(zip(NAMES, values.T, strict=True)))
+    given = random_cases(n)
+    mu0 = given["mu0"].to_numpy().copy()
+    mu0[::999] *= -1.0  # rejected
+    return given.set_column(0, "mu0", pa.array(mu0))
 
 
 @pytest.fixture(scope="module")
-def cases(tmp_path_factory: pytest.TempPathFactory, surrogate: Surrogate, small_blocks: Any) -> Any:  # noqa: ARG001
+def cases(tmp_path_factory: pytest.TempPathFactory, small_blocks: Any) -> Any:  # noqa: ARG001
     """3,000 cases in every format, and the output of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("cases")
-    pq.write_table(table_of(3000), folder / "cases.parquet", row_group_size=1000)
-    rows = table_of(3000).to_pylist()
-    (folder / "cases.ndjson").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    lines = [",".join(NAMES), *(",".join(map(repr, row.values())) for row in rows), ""]
-    (folder / "cases.csv").write_text("\n".join(lines))
-    subprocess.run(["gzip", "-kn", folder / "cases.csv"], check=True)
     for kind in KINDS:
-        evaluate_files([folder / f"cases.{kind}"], folder / f"whole.{kind}", surrogate)
+        evaluate_files([write(table_of(3000), folder / f"cases.{kind}")], folder / f"whole.{kind}", TABLE)
     return folder
 
 
 def copied(cases: Any, kind: Any, folder: Path) -> Any:
-    """An input of this test's own."""
     return shutil.copy(cases / f"cases.{kind}", folder)
 
 
@@ -65,7 +56,7 @@ def left(folder: Path) -> Any:
     return sorted(path.name for path in folder.iterdir())
 
 
-def stopped(source: Any, out: Any, surrogate: Surrogate, share: float = 0.5, **options: Any) -> None:
+def stopped(source: Any, out: Any, share: float = 0.5, **options: Any) -> None:
     """A run that is interrupted when ``share`` of its input is read."""
 
     def stop(done: Any, _rows: Any, _rejected: Any) -> None:
@@ -73,7 +64,7 @@ def stopped(source: Any, out: Any, surrogate: Surrogate, share: float = 0.5, **o
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        evaluate_files([source], out, surrogate, progress=stop, **options)
+        evaluate_files([source], out, TABLE, progress=stop, **options)
 
 
 def assert_whole(out: Any, cases: Any) -> None:
@@ -88,13 +79,11 @@ def assert_whole(out: Any, cases: Any) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("share", [-1.0, 0.4, 0.8])
-def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, share: Any
-) -> None:
-    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
-    stopped(source, out, surrogate, share)
+def test_a_stopped_run_goes_on_with_the_same_bytes(tmp_path: Path, cases: Any, kind: Any, share: Any) -> None:
+    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
+    stopped(source, out, share)
     assert not out.exists()
-    summary = evaluate_files([source], out, surrogate, say=said.append)
+    summary = evaluate_files([source], out, TABLE, say=said.append)
     assert (summary.rows, summary.rejected) == (3000, 4)
     assert said == [f"{out}.parts: {summary.resumed:,} rows are done already ({said[0].partition('(')[2]}"]
     assert 3000 * (share - 0.1) <= summary.resumed < 3000
@@ -103,11 +92,9 @@ def test_a_stopped_run_goes_on_with_the_same_bytes_and_says_what_it_found(
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed", "gone", "longer"])
-def test_finished_pieces_that_are_cut_or_changed_are_done_again(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, harm: Any
-) -> None:
-    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", []
-    stopped(source, out, surrogate)
+def test_finished_pieces_cut_or_changed_are_done_again(tmp_path: Path, cases: Any, kind: Any, harm: Any) -> None:
+    source, out, said = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}", list[str]()
+    stopped(source, out)
     part = tmp_path / f"out.{kind}.parts" / "log"
     data = part.read_bytes()
     if harm == "gone":
@@ -116,16 +103,14 @@ def test_finished_pieces_that_are_cut_or_changed_are_done_again(
         at = 2 * len(data) // 3
         swapped = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
         part.write_bytes({"cut": data[:at], "changed": swapped, "longer": data + data[at:]}[harm])
-    summary = evaluate_files([source], out, surrogate, say=said.append)
+    summary = evaluate_files([source], out, TABLE, say=said.append)
     assert summary.rows == 3000
     assert ("is done again" in "".join(said)) == (harm != "gone")
     assert_whole(out, cases)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, monkeypatch: pytest.MonkeyPatch, kind: Any
-) -> None:
+def test_a_stop_at_any_step_ends_well(tmp_path: Path, cases: Any, monkeypatch: pytest.MonkeyPatch, kind: Any) -> None:
     """Before each file that is put into place or deleted; then the same command completes the run."""
     source, steps = copied(cases, kind, tmp_path), 0
     while True:
@@ -143,24 +128,22 @@ def test_a_run_that_is_stopped_at_any_step_of_its_end_ends_well(
             return counted
 
         with monkeypatch.context() as patch:
-            for place, name in ((run, "put"), (run, "write_whole"), (run.Path, "unlink")):
+            for place, name in ((run, "put"), (run, "write_whole"), (Path, "unlink")):
                 patch.setattr(place, name, step(getattr(place, name)))
             try:
-                evaluate_files([source], out, surrogate)
+                evaluate_files([source], out, TABLE)
             except KeyboardInterrupt:
                 pass
             else:
                 break
-        assert evaluate_files([source], out, surrogate).rows == 3000
+        assert evaluate_files([source], out, TABLE).rows == 3000
         assert_whole(out, cases)
         steps += 1
     assert steps > 6
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_command_given_again_after_its_end_finds_all_done(
-    tmp_path: Path, cases: Any, capsys: Capture, kind: Any
-) -> None:
+def test_the_command_given_again_finds_all_done(tmp_path: Path, cases: Any, capsys: Capture, kind: Any) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     words = ["eval", str(source), "-o", str(out)]
     assert [main(words), main(words)] == [3, 3]
@@ -200,14 +183,9 @@ def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path: Path, repository: Pa
     assert not list(tmp_path.glob("*.parts"))
 
 
-# --- inputs that change, outputs that are inputs -----------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("harm", ["cut", "changed"])
-def test_an_input_that_changes_during_the_run_is_not_reported_complete(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any, harm: Any
-) -> None:
+def test_an_input_that_changes_is_not_reported_complete(tmp_path: Path, cases: Any, kind: Any, harm: Any) -> None:
     source, out = tmp_path / f"cases.{kind}", tmp_path / f"out.{kind}"
     copied(cases, kind, tmp_path)
     data, times = source.read_bytes(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
@@ -220,28 +198,26 @@ def test_an_input_that_changes_during_the_run_is_not_reported_complete(
             os.utime(source, ns=times)
 
     with pytest.raises(FilesError, match=r"changed while it was read|damaged"):
-        evaluate_files([source], out, surrogate, progress=change)
+        evaluate_files([source], out, TABLE, progress=change)
     assert left(tmp_path) == [source.name]
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": "ball"}, {"direction": "along"}])
-def test_another_content_contact_or_direction_is_another_run(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, kind: Any
-) -> None:
+def test_another_content_contact_or_direction_is_another_run(tmp_path: Path, cases: Any, kind: Any) -> None:
     source, out = tmp_path / "cases.csv", tmp_path / "out.csv"
     copied(cases, "csv", tmp_path)
-    stopped(source, out, surrogate, **kind)
+    stopped(source, out, **kind)
     data, times = source.read_bytes(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
     if not kind:  # of the same size and time
         source.write_bytes(data.replace(b"e-05", b"e-06"))
         os.utime(source, ns=times)
     what = "options" if kind else "inputs"
     with pytest.raises(FilesError, match=rf"parts of another run \({what} differ\); --force deletes them"):
-        evaluate_files([source], out, surrogate)
+        evaluate_files([source], out, TABLE)
     source.write_bytes(data)  # and the same content of another time is the same input
-    assert evaluate_files([source], out, surrogate, **kind).resumed
+    assert evaluate_files([source], out, TABLE, **kind).resumed
     if kind:
-        evaluate_files([source], tmp_path / "whole.csv", surrogate, **kind)
+        evaluate_files([source], tmp_path / "whole.csv", TABLE, **kind)
         assert out.read_bytes() == (tmp_path / "whole.csv").read_bytes() != (cases / "whole.csv").read_bytes()
     else:
         assert_whole(out, cases)
@@ -249,9 +225,7 @@ def test_another_content_contact_or_direction_is_another_run(
 
 @pytest.mark.parametrize("name", ["out.csv", "out.csv.rejects.csv"])
 @pytest.mark.parametrize("given", ["", "link.csv"])
-def test_an_output_never_overwrites_an_input(
-    tmp_path: Path, capsys: Capture, cases: Any, name: str, given: Any
-) -> None:
+def test_an_output_never_replaces_an_input(tmp_path: Path, capsys: Capture, cases: Any, name: str, given: Any) -> None:
     shutil.copy(cases / "cases.csv", tmp_path / name)
     if given:
         (tmp_path / given).hardlink_to(tmp_path / name)
@@ -260,10 +234,8 @@ def test_an_output_never_overwrites_an_input(
     assert (tmp_path / name).read_bytes() == (cases / "cases.csv").read_bytes()
 
 
-def test_files_that_are_not_of_a_run_are_kept_and_a_second_run_to_one_output_is_refused(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, capsys: Capture
-) -> None:
-    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", []
+def test_other_files_are_kept_and_a_second_run_is_refused(tmp_path: Path, cases: Any, capsys: Capture) -> None:
+    source, out, said = copied(cases, "csv", tmp_path), tmp_path / "out.csv", list[str]()
     (tmp_path / "out.csv.parts").mkdir()
     (tmp_path / "out.csv.parts" / "precious.txt").write_text("mine")
 
@@ -272,16 +244,14 @@ def test_files_that_are_not_of_a_run_are_kept_and_a_second_run_to_one_output_is_
             assert main(["eval", str(source), "-o", str(out), "--force"]) == 1
             said.append(capsys.readouterr().err)
 
-    assert evaluate_files([source], out, surrogate, force=True, progress=other).rows == 3000
+    assert evaluate_files([source], out, TABLE, force=True, progress=other).rows == 3000
     assert "out.csv.parts: another process is at work here; wait for it, or stop it" in said[0]
     assert (tmp_path / "out.csv.parts" / "precious.txt").read_text() == "mine"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no limit of file sizes")
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_a_full_disk_is_reported_in_one_line_and_the_run_goes_on_later(
-    tmp_path: Path, surrogate: Surrogate, cases: Any, repository: Path, kind: Any
-) -> None:
+def test_a_full_disk_is_told_and_the_run_goes_on_later(tmp_path: Path, cases: Any, repository: Path, kind: Any) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"
     program = (
         "import resource, sys; from mumacro.files import reading; reading.ROWS = 400; "
@@ -294,7 +264,7 @@ def test_a_full_disk_is_reported_in_one_line_and_the_run_goes_on_later(
     assert len(done.stderr.splitlines()) == 1
     assert "File too large" in done.stderr
     assert not out.exists()
-    assert evaluate_files([source], out, surrogate).resumed
+    assert evaluate_files([source], out, TABLE).resumed
     assert_whole(out, cases)
 
 

@@ -1,18 +1,14 @@
-"""One table of cases through every way of asking: values, names, order, units, gaps, rigid contact, f, reasons."""
+"""One table of cases through every way of asking the service: values, names, order, gaps, rigid contact, reasons."""
 
 import json
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
 import pytest
 
-from mumacro import InputError, Surrogate
-from mumacro.__main__ import main
-from tests.comparing import close
-from tests.forms import BATCH, WRITERS, Row, as_table, asked, number, posted, rows_of
+from mumacro import Surrogate
+from tests.forms import BATCH, Row, asked, number
 from tests.serving import CASE
 
 COLUMNS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
@@ -46,9 +42,6 @@ def expected(good: list[Row]) -> list[Row]:
     """The same for all rows; a bad one has empty columns and its reason."""
     empty, rest = dict.fromkeys(COLUMNS), iter(good)
     return [{**(empty if reason else next(rest)), "error": reason} for reason in REASONS]
-
-
-# --- the service ----------------------------------------------------------------------------------------
 
 
 def of_one(document: Row) -> Row:
@@ -111,45 +104,6 @@ def test_the_service_answers_in_every_format_what_the_library_does(client: Any, 
     assert {tuple(row) for row in found} == {(*COLUMNS, "error")}
 
 
-# --- the library and the command -----------------------------------------------------------------------
-
-
-def test_arrays_hold_what_single_cases_do(surrogate: Surrogate, good: list[Row]) -> None:
-    answer = surrogate.evaluate({name: [number(row[name]) for row in GOOD] for name in NAMES})
-    rows = zip(*(getattr(answer, name).tolist() for name in COLUMNS), strict=True)
-    assert [dict(zip(COLUMNS, row, strict=True)) for row in rows] == good
-    for name in ("y0", "mu0"):
-        with pytest.raises(InputError, match=f"{name} {BAD[name][1]}"):
-            surrogate.evaluate({**CASE, name: float(BAD[name][0])})
-
-
-@pytest.mark.parametrize("i", [0, 1, 3, 5, 8])
-def test_the_command_answers_one_case(capsys: Any, good: list[Row], i: int) -> None:
-    assert main([" ".join(f"{name}={value}" for name, value in GOOD[i].items()), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert {name: document[name] for name in COLUMNS} == good[i]
-    assert document["inputs"] == {name: None if value == "rigid" else value for name, value in GOOD[i].items()}
-
-
-@pytest.mark.parametrize("made", ["csv", "ndjson", "parquet"])
-@pytest.mark.parametrize("given", ["csv", "ndjson", "parquet"])
-def test_eval_answers_files_of_every_format(tmp_path: Path, good: list[Row], given: str, made: str) -> None:
-    source, out = tmp_path / f"cases.{given}", tmp_path / f"out.{made}"
-    if given == "parquet":
-        pq.write_table(as_table(ROWS), source)
-    else:
-        source.write_text(str(WRITERS[given](ROWS)), "utf-8")
-    assert main(["eval", str(source), "-o", str(out)]) == 3  # some rows are rejected
-    found = pq.read_table(out).to_pylist() if made == "parquet" else rows_of(made, out.read_text("utf-8"))
-    assert all(tuple(row) == (*NAMES, *COLUMNS) for row in found)
-    assert [{name: row[name] for name in COLUMNS} for row in found] == good
-    assert [row["mu0"] for row in found] == [row["mu0"] for row in GOOD]
-    rejected = rows_of("csv", (tmp_path / f"out.{made}.rejects.csv").read_text("utf-8"))
-    assert [f"{row['field']}: {row['reason']}" for row in rejected] == [reason for reason in REASONS if reason]
-
-
-# --- what include adds ----------------------------------------------------------------------------------
-
 INCLUDED = ["groups", "limits", "gradient", "power", "stick_fraction", "settling", "std"]
 
 
@@ -184,18 +138,3 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
         rows = asked(client, form, GOOD, **query)
         assert form == "ndjson" or list(rows[0]) == [*names, "error"]
         assert [{name: row[name] for name in names} for row in map(flat, rows)] == single
-
-
-# --- units ----------------------------------------------------------------------------------------------
-
-
-def test_units_in_heads_and_the_frequency_mean_the_same_everywhere(client: Any, surrogate: Any, tmp_path: Path) -> None:
-    f = 20690.14
-    plain = surrogate.evaluate({**CASE, "omega": 2.0 * math.pi * f}).mu_macro
-    given = {**{name: x for name, x in CASE.items() if name != "omega"}, "f": f}
-    assert client.post("/v1/mu-macro", json=given).json()["mu_macro"] == plain
-    text = f"mu0,Fz,k [N/mm],y0 [um],f [kHz],v0 [mm/s]\n0.3,10,1000,2,{f / 1e3},10\n"
-    (tmp_path / "cases.csv").write_text(text, "utf-8")
-    assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / "out.csv")]) == 0
-    for answer in (posted(client, "csv", text).text, (tmp_path / "out.csv").read_text("utf-8")):
-        assert rows_of("csv", answer)[0]["mu_macro"] == close(plain, rel=1e-14)

@@ -37,12 +37,10 @@ sys.exit(0 if result.attempted and not result.failed else 1)
 
 
 def blocks(page: Path, language: str) -> list[str]:
-    """The fenced blocks of a page in one language."""
     return [text for kind, text in BLOCK.findall(page.read_text("utf-8")) if kind == language]
 
 
 def having(language: str) -> list[Path]:
-    """The pages with such a block."""
     return [page for page in PAGES if blocks(page, language)]
 
 
@@ -53,7 +51,6 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The programs of an environment with the wheel and what it requires."""
     return Installed(tmp_path_factory.mktemp("bare"), wheel).bin
 
 
@@ -78,18 +75,14 @@ def service(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[st
         yield server.url
 
 
-def environment(programs: Path) -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
-    return {**kept, "PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
-
-
 def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
-    return request.getfixturevalue("bare" if page.stem in BARE else "full")
+    found: Path = request.getfixturevalue("bare" if page.stem in BARE else "full")
+    return found
 
 
 def run(programs: Path, folder: Path, *words: str | Path) -> str:
-    """The output of a command with these programs, which must succeed."""
-    env = environment(programs)
+    env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
+    env |= {"PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
     done = subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -103,7 +96,6 @@ def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequ
 
 
 def parts(text: str) -> tuple[list[str], list[float]]:
-    """Words and numbers of a command's output."""
     return NUMBER.sub("#", text).split(), [float(found) for found in NUMBER.findall(text)]
 
 

@@ -1,7 +1,6 @@
 """What a notebook shows: tables in HTML, pictures by one call, data frames; and the notebook in examples runs."""
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,22 +10,21 @@ import pytest
 
 from mumacro import MumacroError, Surrogate, fit
 from mumacro.fitted import Fit
+from tests.cases import Case
 from tests.comparing import close
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
 SPEEDS = np.geomspace(1e-3, 1.0, 30)
 
 
-def test_every_cell_of_the_notebook_runs_and_finds_what_the_points_were_made_from(
-    repository: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_cell_of_the_notebook_runs_and_finds_the_truth(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("scipy")
     pytest.importorskip("pandas")
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("MPLBACKEND", "Agg")
     notebook = json.loads((repository / "examples" / "friction.ipynb").read_text("utf-8"))
     assert notebook["nbformat"] == 4
-    names = {}
+    names: dict[str, Any] = {}
     for i, cell in enumerate(notebook["cells"]):
         if cell["cell_type"] == "code":
             assert not cell["outputs"]
@@ -48,9 +46,8 @@ def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate: Surrogate) 
     one = surrogate.evaluate(**CASE, v0=0.01)._repr_html_()
     assert one.count("<tr>") == 2
     assert "more" not in one
-    found = fit(
-        {"v0": SPEEDS, "mu_macro": answer.mu_macro + 1e-3 * np.cos(17.0 * np.arange(30))}, Fz=10, y0=2e-6, f=2e4
-    )
+    mu = answer.mu_macro + 1e-3 * np.cos(17.0 * np.arange(30))
+    found = fit({"v0": SPEEDS, "mu_macro": mu}, Fz=10, y0=2e-6, f=2e4)
     assert f"<td>k</td><td>{found.values['k']:.6g}</td>" in found._repr_html_()
 
 
@@ -81,7 +78,7 @@ def test_the_map_of_a_normal_force_ends_where_it_lifts_off(surrogate: Surrogate)
     figure = pytest.importorskip("matplotlib.figure").Figure()
     normal = surrogate.plot(figure.add_subplot(), direction="normal")
     v, y = normal.lines[0].get_data()
-    assert math.isclose(y[-1], 0.999)
+    assert y[-1] == close(0.999, rel=1e-9)
     assert v.tolist() == close(y.tolist(), rel=1e-15)  # normal: the border is the amplitude itself
 
 

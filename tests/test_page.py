@@ -16,27 +16,12 @@ from mumacro import Surrogate
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs import UNITS_OF
 from service.app import create_app
-from service.routes.page import ASSETS, POLICY
 from service.settings import Settings
 from tests.browser import START
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 AXE = "tests/data/axe-core/axe.min.js"
-
-
-def test_the_page_comes_with_a_strict_policy(client: Any) -> None:
-    page = client.get("/")
-    assert page.headers["content-type"].startswith("text/html")
-    assert page.headers["content-security-policy"] == POLICY
-    assert ("unsafe" in POLICY, "default-src 'none'" in POLICY) == (False, True)
-    assert not re.search(r"<script(?![^>]*src=)|<style|style=|\son\w+=|https?:|//", page.text)
-
-    for name, kind in ASSETS.items():  # every part is served, and names no other host
-        part = client.get(f"/static/page/{name}")
-        assert (part.status_code, part.headers["content-type"].split(";")[0]) == (200, kind)
-        assert "://" not in part.text.replace("http://www.w3.org/2000/svg", "")  # a name, not an address
-        assert set(re.findall(r'from "\./([^"]+)"', part.text)) <= ASSETS.keys()
 
 
 def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate) -> None:
@@ -75,9 +60,7 @@ def test_without_a_table_the_page_is_there_and_the_map_is_not(tmp_path: Path, pr
         problem(client.get("/static/page/map.json"), 503)
 
 
-def test_the_built_documentation_is_served_where_a_folder_is_named(
-    tmp_path: Path, tables_dir: Path, client: Any, problem: Any
-) -> None:
+def test_built_documentation_is_served_if_named(tmp_path: Path, tables_dir: Path, client: Any, problem: Any) -> None:
     (tmp_path / "how-to").mkdir()
     (tmp_path / "index.html").write_text("<h1>Guide</h1>")
     (tmp_path / "how-to" / "index.html").write_text("<h1>How to</h1>")
@@ -123,7 +106,7 @@ def test_what_is_typed_and_asked_without_a_browser(client: Any, repository: Path
     done = subprocess.run([node, "--test", "tests/page"], cwd=repository, env={**os.environ, "PAGE_NAMES": str(told)},
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 0, done.stdout
-    assert int(re.search(r"^(?:#|ℹ) pass (\d+)$", done.stdout, re.MULTILINE)[1]) > 50
+    assert int(re.findall(r"^(?:#|ℹ) pass (\d+)$", done.stdout, re.MULTILINE)[0]) > 50
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (320, 640), (1024, 768), (1440, 900)])
@@ -218,38 +201,33 @@ def test_the_description_is_accessible_and_leads_back(open_page: Any, repository
 
 
 def test_the_pages_ask_for_the_key_and_use_it(open_page: Any, serving: Any, tables_dir: Path, tmp_path: Path) -> None:
-    with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
-        ask_for_the_key(open_page(url=server.url, path="docs"), tmp_path)
-
-
-def ask_for_the_key(page: Any, folder: Path) -> None:
-    """The pages of a service with an API key in force."""
-
     def enter(key: Any) -> None:
         page.type("#key", key, commit=False)
         page.find("#key-form button").click()
 
-    page.wait_until_shown("#key-form")
-    enter("open-sesame")
-    page.wait_for("#swagger-ui", "mu_macro over a range of one input")
-    assert not page.find("#key-form").is_displayed()
-    page.find("#back").click()  # the tab keeps the key until it is deleted
-    page.wait_for("#mu", r"^0\.\d+$")
-    page.find("#forget").click()
-    page.wait_for("#mu", "^…$")
-    page.wait_until_shown("#key-form")
-    assert page.run("return sessionStorage.length;") == 0
-    for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
-        enter(wrong)
-        page.wait_for("#key-status", said)
-        assert page.text("#mu") == "…"
-    enter("open-sesame")
-    page.wait_for("#mu", r"^0\.\d+$")
-    page.settle()
-    assert not page.find("#key-form").is_displayed()
-    assert "k=1N/um" in page.address()
-    assert "sesame" not in page.browser.current_url
-    assert len(page.download("#csv", folder, "friction-law-v0.csv")) > 10_000
-    page.run("sessionStorage.clear();")
-    # a browser logs every response with 401; nothing else may be logged
-    assert [entry for entry in page.complaints() if "401" not in entry] == []
+    with serving(tables_dir, MUMACRO_API_KEY="open-sesame") as server:
+        page = open_page(url=server.url, path="docs")
+        page.wait_until_shown("#key-form")
+        enter("open-sesame")
+        page.wait_for("#swagger-ui", "mu_macro over a range of one input")
+        assert not page.find("#key-form").is_displayed()
+        page.find("#back").click()  # the tab keeps the key until it is deleted
+        page.wait_for("#mu", r"^0\.\d+$")
+        page.find("#forget").click()
+        page.wait_for("#mu", "^…$")
+        page.wait_until_shown("#key-form")
+        assert page.run("return sessionStorage.length;") == 0
+        for wrong, said in (("two words", "no spaces"), ("nonsense", "not the key")):
+            enter(wrong)
+            page.wait_for("#key-status", said)
+            assert page.text("#mu") == "…"
+        enter("open-sesame")
+        page.wait_for("#mu", r"^0\.\d+$")
+        page.settle()
+        assert not page.find("#key-form").is_displayed()
+        assert "k=1N/um" in page.address()
+        assert "sesame" not in page.browser.current_url
+        assert len(page.download("#csv", tmp_path, "friction-law-v0.csv")) > 10_000
+        page.run("sessionStorage.clear();")
+        # a browser logs every response with 401; nothing else may be logged
+        assert [entry for entry in page.complaints() if "401" not in entry] == []

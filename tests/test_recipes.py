@@ -17,7 +17,6 @@ CASES: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": np.array([1e-6,
 
 
 def run(heading: str, *needs: str) -> dict[str, Any]:
-    """The variables after running the blocks below a heading in order."""
     for package in needs:
         pytest.importorskip(package)
     section = PAGE.split(f"# {heading}\n")[1].split("\n##")[0]

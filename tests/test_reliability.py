@@ -16,13 +16,13 @@ from builder.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer
 from mumacro.files import evaluate_files
+from tests import cases as ordinary
+from tests.cases import Case
 
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 from fuzz import answers, faults, tables
-from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE
-
-# --- untrusted tables --------------------------------------------------------------------------------
+from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +40,8 @@ def test_a_hostile_file_is_refused_before_memory_is_taken(opened: dict[str, tabl
 
 @pytest.mark.parametrize("change", tables.CHANGES)
 def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
-    size = tables.SMALLEST.stat().st_size
-    images = {}
+    size = SMALLEST.stat().st_size
+    images: dict[int, bytes] = {}
     for start in range(0, size, 4096 if change == "cut" else 1201):
         images.update(tables.work(start, 1, change))
     assert len(images) > 30
@@ -51,19 +51,14 @@ def test_damaged_files_are_refused_or_answer_the_same(change: str) -> None:
     assert sum(one.what == tables.REFUSED for one in found) > 0.6 * len(found)
 
 
-# --- answers ------------------------------------------------------------------------------------------
+table = ordinary.tables(1e-4, 1e-12)
 
 
-@pytest.fixture(scope="module", params=[1e-4, 1e-12])
-def table(request: pytest.FixtureRequest) -> Surrogate:
-    return Surrogate.open(request.param)
+SLOW: dict[object, list[Any]] = {answers.fresh_solves: [pytest.mark.slow]}
+PROMISES = [pytest.param(check, id=name, marks=SLOW.get(check, [])) for name, check in answers.PROMISES.items()]
 
 
-@pytest.mark.parametrize(
-    "check",
-    [pytest.param(check, id=name, marks=[pytest.mark.slow] if check is answers.fresh_solves else [])
-     for name, check in answers.PROMISES.items()],
-)  # fmt: skip
+@pytest.mark.parametrize("check", PROMISES)
 def test_answers_have_their_properties_over_the_full_double_range(table: Surrogate, check: Any) -> None:
     found = check(table, 0.02)
     assert found.tried >= 500
@@ -79,7 +74,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate,
     def expected(v: float, y: float) -> float:
         r = np.sqrt(last) / (v / np.sqrt(y))
         layer = (solve(last / r, last).mu_ratio - float(outer(r))) * r
-        return float(outer(y / v)) + layer * (v / y)
+        return float(outer(y / v) + layer * (v / y))
 
     v = x * np.sqrt(y)
     found, bound, _ = table.ratio_with_bound(v, y)
@@ -93,7 +88,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate,
 
 def test_a_ratio_beyond_double_range_is_bounded(table: Surrogate) -> None:
     """y0 omega/v0 beyond double range: eq. (35) is 2.5e-306 there, not 0."""
-    case = {"mu0": 1.0, "Fz": 1.0, "k": None, "y0": 1.7976931348623157e308, "v0": 1e160}
+    case: Case = {"mu0": 1.0, "Fz": 1.0, "k": None, "y0": 1.7976931348623157e308, "v0": 1e160}
     inside, beyond = (table.evaluate(**case, omega=omega) for omega in (1e160, np.nextafter(1e160, 1e161)))
     assert inside.mu_ratio > 2.5e-306
     assert abs(inside.mu_ratio - beyond.mu_ratio) <= inside.error_bound + beyond.error_bound
@@ -127,9 +122,6 @@ def test_numbers_in_text_have_the_bits_of_float_or_are_refused(tmp_path: Path, r
     evaluate_files([source], out, Surrogate.open(1e-4))
     found = [json.loads(line)["mu_macro"] for line in out.read_text("utf-8").splitlines()]
     assert found == [float(text) for text in texts if right]
-
-
-# --- disks, permissions, processes --------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -19,9 +19,6 @@ def one(client: Any, case: Case) -> Any:
     return client.post("/v1/mu-macro", json=case).json()
 
 
-# --- bad cases among good ones --------------------------------------------------------------------------
-
-
 BAD_ROWS = [
     ({"mu0": 0}, "mu0", "must be finite and > 0"), (17, None, "must be an object"), (None, None, "must be an object"),
     ({"Fz": ...}, "Fz", "is required"), ({"speed": 1}, "speed", "unknown"), ({"v0": True}, "v0", "must be a number"),
@@ -75,9 +72,6 @@ def test_explicit_nulls_are_read_like_absent_names(client: Any, case: Case) -> N
     assert [row["mu_macro"] for row in answer["results"]] == [one(client, row)["mu_macro"] for row in hertz]
 
 
-# --- order, sizes, options ------------------------------------------------------------------------------
-
-
 def test_a_large_batch_keeps_its_order(client: Any, case: Case, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-9, 1e9, 100_000)
     response = client.post(BATCH, json={**case, "v0": v0.tolist()}, params={"tolerance": surrogate.tolerance})
@@ -113,24 +107,13 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client: Any
     assert (response.status_code, response.content) == (200, b"")
 
 
-# --- lines ----------------------------------------------------------------------------------------------
-
-
 def test_a_line_is_answered_like_a_batch_or_a_case(client: Any, case: Case) -> None:
-    columns, rows = {**case, "v0": [0.1, -1, 0.2]}, [case, 17]
+    columns: Case = {**case, "v0": [0.1, -1, 0.2]}
+    rows: Any = [case, 17]
     first, second, third = read("ndjson", posted(client, "ndjson", as_ndjson([columns, rows, case])))
     assert first == client.post(BATCH, json=columns).json()
     assert second == client.post(BATCH, json=rows).json()
     assert third == one(client, case)
-
-
-def test_lines_keep_their_order_however_they_arrive(client: Any, case: Case) -> None:
-    text = as_ndjson([{**case, "v0": [0.001 * i, 0.002 * i]} for i in range(1, 200)]).replace("\n", "\r\n").encode()
-    whole = posted(client, "ndjson", text)
-    assert whole.text.count("\n") == 199
-    for size in (1, 7, 1000, 100_000):
-        pieces = (text[start : start + size] for start in range(0, len(text), size))
-        assert posted(client, "ndjson", pieces).content == whole.content
 
 
 def test_options_of_a_stream_come_with_its_query_or_its_lines(client: Any, case: Case, problem: Any) -> None:
@@ -160,9 +143,7 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(client: Any, case: Cas
         assert answers[1]["type"].endswith("malformed-body") == (status == 400)
 
 
-def test_bad_lines_among_many_plain_ones_are_reported_by_their_number(
-    client: Any, case: Case, surrogate: Surrogate
-) -> None:
+def test_bad_lines_among_many_plain_ones_are_reported_by_number(client: Any, case: Case, surrogate: Surrogate) -> None:
     lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(3000)]
     expected = surrogate.evaluate({**case, "v0": [line["v0"] for line in lines]}).mu_macro.tolist()
     bad = range(3, 3000, 7)
@@ -186,9 +167,6 @@ def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started: Any, 
         assert len(cut.text.splitlines()) <= 1
 
 
-# --- CSV and Arrow --------------------------------------------------------------------------------------
-
-
 def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client: Any, case: Case) -> None:
     rows = read("csv", posted(client, "csv", as_csv([case] * 2).replace("\r\n", ",7\r\n").replace("v0,7", "v0", 1)))
     assert [row["error"] for row in rows] == ["case: has 7 cells where the head has 6"] * 2
@@ -196,9 +174,7 @@ def test_a_line_of_csv_with_too_many_cells_affects_only_itself(client: Any, case
     assert good[0]["mu_macro"] == one(client, case)["mu_macro"]
 
 
-def test_arrow_keeps_order_over_record_batches_and_names_its_table(
-    started: Any, case: Case, surrogate: Surrogate
-) -> None:
+def test_arrow_keeps_order_over_batches_and_names_its_table(started: Any, case: Case, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-6, 1e3, 150_000)
     columns = {**{name: np.full(v0.size, value) for name, value in case.items()}, "v0": v0}
     whole = pa.record_batch(columns)

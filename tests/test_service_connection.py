@@ -47,7 +47,6 @@ def raw(live_server: Any) -> Any:
 
 
 def answer(raw: Any) -> Any:
-    """One answer."""
     response = http.client.HTTPResponse(raw, method="POST")
     response.begin()
     return response.status, response.read()
@@ -55,9 +54,6 @@ def answer(raw: Any) -> Any:
 
 def posted(path: Any, body: Any) -> Any:
     return head(path, len(body)) + body
-
-
-# --- framing --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000])
@@ -104,7 +100,7 @@ HEADS = [
 
 
 @pytest.mark.parametrize(("text", "status"), HEADS, ids=range(len(HEADS)))
-def test_a_head_is_refused_with_its_status(raw: Any, text: str, status: Any) -> None:
+def test_a_head_is_refused_with_its_status(raw: Any, text: bytes, status: Any) -> None:
     raw.sendall(text)
     found, content = answer(raw)
     assert found == status
@@ -116,8 +112,6 @@ def test_a_head_without_an_end_is_cut_at_its_limit(raw: Any) -> None:
         raw.sendall(GET[:-2] + b"A: " + b"b" * 10_000_000)
     assert not to_end(raw).startswith(b"HTTP/1.1 200")
 
-
-# --- clients that stop, drip, do not read, or leave -----------------------------------------------------
 
 #: what a client sends, what it sends again and again, and what is in the answer before the connection ends
 SLOW = {
@@ -136,7 +130,7 @@ SLOW = {
 }
 
 
-def given_up(server: Any, text: str, drop: Any) -> Any:
+def given_up(server: Any, text: bytes, drop: Any) -> Any:
     """All that a client gets until it is disconnected."""
     received, until = b"", time.monotonic() + PATIENCE_S
     with connect(server) as raw, suppress(ConnectionError):
@@ -187,9 +181,6 @@ def test_a_refused_body_is_read_for_a_while_so_that_its_sender_gets_the_reason(s
     assert json.loads(content)["max_bytes"] == 65536
 
 
-# --- many clients ---------------------------------------------------------------------------------------
-
-
 def test_batches_have_slots_and_streams_without_a_line_and_small_ones_take_none(strict: Any) -> None:
     large, law = columns(20_000), {**CASE, "v0": None, "start": 1e-3, "stop": 1.0}
     compact = orjson.dumps({**CASE, "v0": [1] * 25_000, "include": ["limits", "gradient", "power"]})
@@ -231,13 +222,8 @@ def test_health_is_answered_when_all_connections_are_open(strict: Any) -> None:
     assert strict.ask("GET", "/v1/table")[0] == 200
 
 
-# --- bodies and streams ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("kind", "step"), [("application/json", 1000), (NDJSON, 300_000)])
-def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(
-    live_server: Any, raw: Any, kind: Any, step: Any
-) -> None:
+def test_a_body_is_read_in_any_pieces_after_100_continue(live_server: Any, raw: Any, kind: Any, step: Any) -> None:
     body = columns(20_000)
     raw.sendall(head(BATCH, len(body), kind, "Expect: 100-continue\r\n"))
     said = b""
@@ -255,7 +241,7 @@ def test_a_body_is_read_in_pieces_of_any_size_after_100_continue(
 def test_no_piece_of_a_stream_is_lost(raw: Any) -> None:
     # Lines end inside pieces and between pieces, and both directions are busy at the same time.
     lines = b"".join(json.dumps({**CASE, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))
-    answers = []
+    answers: list[Any] = []
     reader = threading.Thread(target=lambda: answers.extend(map(json.loads, answer(raw)[1].splitlines())))
     reader.start()
     raw.sendall(head(BATCH, None, NDJSON))
@@ -270,7 +256,8 @@ def test_no_piece_of_a_stream_is_lost(raw: Any) -> None:
 
 @pytest.mark.slow
 def test_the_memory_of_a_stream_does_not_grow_with_its_length(live_server: Any) -> None:
-    line, sizes, received = columns(1000) + b"\n", [], [0, b""]
+    line, sizes = columns(1000) + b"\n", []
+    received: list[Any] = [0, b""]
     with connect(live_server) as raw:
 
         def read() -> None:

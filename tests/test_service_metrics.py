@@ -23,7 +23,6 @@ def samples(text: str) -> Any:
 
 @pytest.fixture
 def fresh(started: Any) -> Any:
-    """A client of an application with all counters at zero."""
     with started() as client:
         yield client
 
@@ -52,7 +51,7 @@ def test_requests_are_counted_by_route_method_and_status(fresh: Any, case: Case)
         assert found["mumacro_requests_total", *sorted((route, method, status))] == number
     assert found["mumacro_request_duration_seconds_count", PATH] == 5
     assert found["mumacro_request_duration_seconds_bucket", *sorted((PATH, "+Inf"))] == 5
-    assert 0 < found["mumacro_request_duration_seconds_sum", PATH] < 60
+    assert found["mumacro_request_duration_seconds_sum", PATH] > 0
     for path in fresh.get("/openapi.json").json()["paths"]:
         fresh.put(path)
     found = scrape(fresh)
@@ -86,7 +85,7 @@ def test_cases_are_counted_by_source_and_regime(fresh: Any, case: Case, surrogat
     fresh.post(f"{PATH}/batch", content="\n".join(map(json.dumps, rows)), headers={"Content-Type": "application/jsonl"})
     fresh.post(f"{PATH}/batch", json={**case, "v0": [rows[4]["v0"]] * 1000})
     found = scrape(fresh)
-    expected = {}
+    expected: dict[tuple[str, ...], int] = {}
     for answer in [*answers * 3, answers[1], answers[2], *[answers[4]] * 1000]:
         key = ("mumacro_cases_total", *sorted((surrogate.id, answer["source"], answer["regime"])))
         expected[key] = expected.get(key, 0) + 1
@@ -96,9 +95,7 @@ def test_cases_are_counted_by_source_and_regime(fresh: Any, case: Case, surrogat
 
 
 @pytest.mark.slow
-def test_several_workers_serve_behind_a_key_count_together_and_stop(
-    serving: Any, surrogate: Surrogate, case: dict[str, Any]
-) -> None:
+def test_several_workers_behind_a_key_count_together_and_stop(serving: Any, surrogate: Surrogate, case: Case) -> None:
     body, asked, key = json.dumps(case), 40, {"X-API-Key": "k3y"}
     with serving(surrogate.path, "--workers", "2", MUMACRO_API_KEY="k3y") as server:
         server.wait_until_ready(2)

@@ -42,9 +42,6 @@ def accesses(lines: Any) -> Any:
     return [line for line in fields_of(lines) if line["logger"] == "mumacro.access"]
 
 
-# --- start and end --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGTERM), pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case: Case, number: Any) -> None:
     with serving(surrogate.path, MUMACRO_ROOT_PATH="/friction") as server:
@@ -83,9 +80,7 @@ def command(repository: Path, *arguments: Any) -> Any:
     )  # fmt: skip
 
 
-def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure(
-    live_server: Any, repository: Path, surrogate: Surrogate
-) -> None:
+def test_the_health_check_and_a_port_that_is_taken(live_server: Any, repository: Path, surrogate: Surrogate) -> None:
     assert command(repository, "healthcheck", "--port", str(live_server.port)).returncode == 0
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
@@ -93,9 +88,6 @@ def test_its_own_command_checks_its_health_and_a_port_that_is_taken_is_a_failure
     failed = command(repository, "--tables", str(surrogate.path), "--port", str(live_server.port))
     assert failed.returncode == 1
     assert "Traceback" not in failed.stdout + failed.stderr
-
-
-# --- the log --------------------------------------------------------------------------------------------
 
 
 def test_no_client_can_forge_a_log_line_and_no_key_is_logged_or_shown(
@@ -135,8 +127,9 @@ def unread(repository: Path, surrogate: Surrogate) -> Any:
     words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
     variables = {name: value for name, value in os.environ.items() if not name.startswith("MUMACRO_")}
     process = subprocess.Popen(words, cwd=repository, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert process.stdout is not None
     try:
-        lines = []
+        lines: list[bytes] = []
         while not (found := re.search(rb"running on http://[^ ]+:(\d+) ", lines[-1] if lines else b"")):
             lines.append(process.stdout.readline())
             assert lines[-1], b"".join(lines)
@@ -150,7 +143,6 @@ def unread(repository: Path, surrogate: Surrogate) -> Any:
 
 
 def statuses(port: Any, path: Any, many: Any) -> Any:
-    """Responses to the same request on one connection."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     found = []
     for _ in range(many):

@@ -13,6 +13,7 @@ import mumacro
 from mumacro import Surrogate
 from mumacro.geometries import contact_of
 from mumacro.law import APPROXIMATIONS, BORDERS
+from tests.cases import Case
 from tests.comparing import close
 from tests.serving import CASE
 
@@ -27,15 +28,9 @@ def answered(client: Any, path: Any, given: Any, **changed: Any) -> Any:
     return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
-# --- solve-for ------------------------------------------------------------------------------------------
-
-
 def test_a_root_gives_its_target_back(client: Any) -> None:
     answer = answered(client, "solve-for", SOLVE)
-    assert answer.keys() == {"unknown", "unit", "quantity", "range", "reachable", "results", "table", "api_version"}
-    assert (answer["unknown"], answer["unit"], answer["api_version"]) == ("y0", "m", "1")
     ((root,),) = [result["roots"] for result in answer["results"]]
-    assert root.keys() == {"value", "low", "high", "mu_macro", "regime"}
     forward = answered(client, "mu-macro", CASE, y0=root["value"])
     assert (forward["mu_macro"], forward["regime"]) == (root["mu_macro"], root["regime"])
     assert root["mu_macro"] == close(0.15, rel=1e-14)
@@ -78,9 +73,6 @@ def test_folded_roots_are_all_returned_within_the_range(client: Any) -> None:
     assert answer["range"] == within
 
 
-# --- law ------------------------------------------------------------------------------------------------
-
-
 def test_a_law_is_single_answers_in_a_row(client: Any) -> None:
     law = answered(client, "law", LAW, points=33.0)  # an integer may be written so
     assert (law["along"], law["unit"]) == ("v0", "m/s")
@@ -95,7 +87,6 @@ def test_a_law_is_single_answers_in_a_row(client: Any) -> None:
     assert border["value"] == close(limits["v0_crit"], rel=1e-9)
     assert border["mu_macro"] == close(limits["mu_crit"], rel=1e-9)
     assert law["mu_static"] == [close(limits["mu_static"], rel=1e-14)] * 33
-    assert "approximations" not in law
 
 
 @pytest.mark.parametrize("along", ["mu0", "Fz", "k", "y0", "omega", "f"])
@@ -116,13 +107,14 @@ def test_a_law_goes_along_any_input_and_has_approximations(client: Any, along: A
 
 
 def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
-    law = answered(client, "law", LAW, y0=1e-5, include=["approximations"])
+    law = answered(client, "law", LAW, y0=1e-5, include=["approximations", "power"])
     assert set(law["approximations"]["small_amplitude"]) == {None}  # outside its range
-    response = client.get("/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "approximations"})
+    response = client.get("/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "approximations,power"})
     assert response.headers["content-type"].startswith("text/csv")
     assert 'filename="friction-law-v0.csv"' in response.headers["content-disposition"]
     columns = {
         "v0 [m/s]": law["values"], **{f"{name} [-]": law[name] for name in ("mu_macro", "mu_ratio", "error_bound")},
+        **{f"{name}.{part} [W]": law[name][part] for name in ("power", "power_bound") for part in law[name]},
         "mu_static [-]": law["mu_static"],
         **{f"{name} [-]": law["approximations"][name] for name in APPROXIMATIONS},
         **{f"border_{name} [m/s]": law["border_speeds"][name] for name in BORDERS},
@@ -136,14 +128,6 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
     head = client.head("/v1/law.csv", params=LAW)
     assert (head.status_code, head.content) == (200, b"")
 
-
-def test_the_table_for_spreadsheets_has_what_is_included(client: Any) -> None:
-    law = answered(client, "law", LAW, include=["power"])
-    header, *rows = csv.reader(io.StringIO(client.get("/v1/law.csv", params={**LAW, "include": "power"}).text))
-    assert [float(row[header.index("power.saved [W]")]) for row in rows] == law["power"]["saved"]
-
-
-# --- stiffness and fit ----------------------------------------------------------------------------------
 
 STEEL = {"E": 210e9, "nu": 0.3, "Fz": 10.0}
 BODIES = [
@@ -162,7 +146,7 @@ def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> 
 def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-3, 1.0, 20)
     mu = surrogate.evaluate({**CASE, "v0": v0}, contact="ball").mu_macro + 1e-3 * np.cos(17.0 * np.arange(20))
-    rig = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
+    rig: Case = {"Fz": 10.0, "y0": 2e-6, "omega": 1.3e5}
     found = mumacro.fit({"v0": v0, "mu_macro": mu}, contact="ball", surrogate=surrogate, **rig)
     body = {"v0": v0.tolist(), "mu_macro": mu.tolist(), **rig, "contact": "ball"}
     answer = answered(client, "fit", body)

@@ -33,11 +33,9 @@ REFUSED = [
     ("POST mu-macro", {"f/~z": 1}, "#/f~1~0z", "mu0, Fz, k, y0, omega, f, v0, Fz_amplitude, k_range, k_low, k_high"),
     ("POST mu-macro", {"\ud800": 1}, "#/?", "unknown"),
     ("POST mu-macro?v0=1", {}, "?v0", "belongs in the body"),
-    ("GET mu-macro", {"fz": 1}, "?fz", "mean Fz?"),
+    *(("GET mu-macro", {name: 1}, f"?{name}", f"mean {meant}?")
+      for name, meant in (("fz", "Fz"), ("K", "k"), ("stiffness", "k"), ("frequency", "f"))),
     ("GET mu-macro?v0=1", {}, "?v0", "is given more than once"),
-    ("GET mu-macro", {"K": 1}, "?K", "mean k?"),
-    ("GET mu-macro", {"stiffness": 1}, "?stiffness", "mean k?"),
-    ("GET mu-macro", {"frequency": 1}, "?frequency", "mean f?"),
     ("GET mu-macro.txt", {"value": "power"}, "?value", "is not in the answer"),
     ("GET table", {"id": "../x"}, "?id", "unknown"),
     ("GET table?tolerance=1", {"tolerance": 1}, "?tolerance", "is given more than once"),
@@ -49,11 +47,9 @@ REFUSED = [
       for text in ("abc", "", " ", "1_000", "0x10", "１", "1e", "1,5", "--1", "1 2", "null")),
     *((f"POST {path}", {name: zero}, f"#/{name}", "finite and > 0")
       for path in ("mu-macro", "mu-macro/batch") for name in ("mu0", "Fz", "k", "tolerance") for zero in (0, -0.0)),
-    ("GET mu-macro", {"k": "0"}, "?k", "finite and > 0"),
-    ("GET mu-macro", {"k": ""}, "?k", "rigid"),
-    ("GET mu-macro", {"v0": "0,01"}, "?v0", "0.01"),
-    ("GET mu-macro", {"y0": "2um"}, "?y0", "give metres, 2e-06"),
-    ("GET mu-macro", {"v0": "5 mm/s"}, "?v0", "give metres per second, 0.005"),
+    *(("GET mu-macro", {name: text}, f"?{name}", words) for name, text, words in (
+        ("k", "0", "finite and > 0"), ("k", "", "rigid"), ("v0", "0,01", "0.01"), ("y0", "2um", "give metres, 2e-06"),
+        ("v0", "5 mm/s", "give metres per second, 0.005"))),
     *((f"POST {path}", {"tolerance": 1e-30}, "#/tolerance", "must be >= 1e-12: no loaded table is tighter")
       for path in ("mu-macro", "mu-macro/batch", "law", "solve-for", "fit")),
     *((f"GET {path}", {"tolerance": 1e-30}, "?tolerance", "no loaded table is tighter")
@@ -76,31 +72,25 @@ REFUSED = [
     ("GET mu-macro", {"include": "std", "std_omega": 1.0, "std_f": 1.0}, "?std_f", "not of both"),
     ("POST mu-macro/batch?include=std", {}, "?std_mu0", "is required"),
     # contact, direction, interval
-    ("POST mu-macro", {"contact": "cone"}, "#/contact", "spring, ball"),
-    ("POST mu-macro", {"direction": "up"}, "#/direction", "across, along, normal"),
-    ("POST mu-macro", {"contact": "ball", "direction": "normal"}, "#/direction", "contact radius"),
-    ("POST mu-macro", {"direction": "normal"}, "#/y0", "Fz_amplitude"),
-    ("POST mu-macro", {**NORMAL, "Fz_amplitude": 10.0}, "#/Fz_amplitude", "lifts off"),
-    ("POST mu-macro", {"Fz_amplitude": 1.0}, "#/Fz_amplitude", "amplitude is y0"),
-    ("POST mu-macro", {"k_range": [1e6, 2e6]}, "#/k", "interval"),
-    ("POST mu-macro", {**RANGE, "k_low": 1e6}, "#/k_low", "beside k_range"),
-    ("POST mu-macro", {**RANGE, "k_range": [2e6, 1e6]}, "#/k_range", "low <= high"),
-    ("POST mu-macro", {**RANGE, "k_range": [1e6]}, "#/k_range", "two stiffnesses"),
-    ("POST mu-macro", {"k": ..., "k_low": 1e6}, "#/k_high", "required"),
-    ("POST mu-macro", {**RANGE, "k_range": [1e6, "rigid"]}, "#/k_high", "number"),
-    ("POST mu-macro", {**NORMAL, "include": ["power"]}, "#/include", "load"),
-    ("POST mu-macro", {"direction": "along", "include": ["settling"]}, "#/include", "across"),
-    ("POST mu-macro", {**RANGE, "include": ["std"], "std": {"v0": 1e-3}}, "#/include", "one k"),
-    ("POST mu-macro", {**NORMAL, "include": ["std"], "std": {"y0": 1e-6}}, "#/std", "y0"),
-    ("POST mu-macro/batch", {"include": ["model"]}, "#/include", "one case"),
+    *(("POST mu-macro", changed, f"#/{place}", words) for changed, place, words in (
+        ({"contact": "cone"}, "contact", "spring, ball"), ({"direction": "up"}, "direction", "across, along, normal"),
+        ({"contact": "ball", "direction": "normal"}, "direction", "contact radius"),
+        ({"direction": "normal"}, "y0", "Fz_amplitude"), ({"Fz_amplitude": 1.0}, "Fz_amplitude", "amplitude is y0"),
+        ({**NORMAL, "Fz_amplitude": 10.0}, "Fz_amplitude", "lifts off"), ({"k_range": [1e6, 2e6]}, "k", "interval"),
+        ({**RANGE, "k_low": 1e6}, "k_low", "beside k_range"), ({"k": ..., "k_low": 1e6}, "k_high", "required"),
+        ({**RANGE, "k_range": [2e6, 1e6]}, "k_range", "low <= high"),
+        ({**RANGE, "k_range": [1e6]}, "k_range", "two stiffnesses"),
+        ({**RANGE, "k_range": [1e6, "rigid"]}, "k_high", "number"),
+        ({**NORMAL, "include": ["power"]}, "include", "load"),
+        ({"direction": "along", "include": ["settling"]}, "include", "across"),
+        ({**RANGE, "include": ["std"], "std": {"v0": 1e-3}}, "include", "one k"),
+        ({**NORMAL, "include": ["std"], "std": {"y0": 1e-6}}, "std", "y0"))),
     # columns
-    ("POST mu-macro/batch", {"v0": [1, 2, 3], "y0": [1e-6, 2e-6]}, "#/v0", "one length; given y0: 2, v0: 3"),
-    ("POST mu-macro/batch", {"y0": [1e-6]}, "#/v0", "one length"),
-    ("POST mu-macro/batch", {"y0": []}, "#/v0", "one length"),
-    ("POST mu-macro/batch", {"k": None}, "#/k", "is missing; write rigid or a number"),
-    ("POST mu-macro/batch", {"Fz": ...}, "#/Fz", "is required"),
-    ("POST mu-macro/batch", {"speed": [1]}, "#/speed", "unknown"),
-    ("POST mu-macro/batch", {"y0": {}}, "#/y0", "must be a number"),
+    *(("POST mu-macro/batch", changed, f"#/{place}", words) for changed, place, words in (
+        ({"v0": [1, 2, 3], "y0": [1e-6, 2e-6]}, "v0", "one length; given y0: 2, v0: 3"),
+        ({"y0": [1e-6]}, "v0", "one length"), ({"y0": []}, "v0", "one length"), ({"Fz": ...}, "Fz", "is required"),
+        ({"k": None}, "k", "is missing; write rigid or a number"), ({"speed": [1]}, "speed", "unknown"),
+        ({"y0": {}}, "y0", "must be a number"), ({"include": ["model"]}, "include", "one case"))),
     ("POST mu-macro/batch?nonsense=1", {}, "?nonsense", "is no option"),
     ("POST mu-macro/batch?mu0=1", {}, "?mu0", "inputs belong in the body"),
     ("POST mu-macro/batch?include=limits", {"include": ["groups"]}, "#/include", "in the query and in the body"),
@@ -147,11 +137,8 @@ def test_a_bad_field_is_refused_by_its_place(
     method, _, path = request_line.partition(" ")
     path, _, query = path.partition("?")
     given = {name: value for name, value in {**ASKED[path], **changed}.items() if value is not ...}
-    if method == "GET":
-        response = client.get(f"/v1/{path}?{urlencode(given)}&{query}")
-    else:
-        response = client.post(f"/v1/{path}?{query}", content=json.dumps(given))
-    document = problem(response, 422)
+    body, query = ("", f"{urlencode(given)}&{query}") if method == "GET" else (json.dumps(given), query)
+    document = problem(client.request(method, f"/v1/{path}?{query}", content=body), 422)
     faults = {fault.get("pointer", f"?{fault.get('parameter')}"): fault for fault in document["errors"]}
     assert place in faults, document
     assert words in f"{faults[place]['reason']}; {faults[place].get('bound')}"
@@ -253,15 +240,13 @@ def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_na
      ("csv", "mu0,Fz,k,y0,omega,f,v0", "f: omega is given, too: give exactly one of omega")],
 )  # fmt: skip
 def test_columns_that_do_not_fit_are_refused(client: Any, problem: Any, form: Any, columns: Any, words: Any) -> None:
-    body = f"{columns}\r\n1\r\n"
+    body: Any = f"{columns}\r\n1\r\n"
     if form == "arrow":
         given = {**{name: [value] for name, value in CASE.items()}, **columns}
         body = stream_of(pa.record_batch({name: pa.array(x) for name, x in given.items() if x is not ...}))
     document = problem(posted(client, form, body), 422)
     assert any(words in f"{fault['field']}: {fault['reason']}" for fault in document["errors"]), document
 
-
-# --- bodies as a whole ----------------------------------------------------------------------------------
 
 CASES = "must be an object of columns or a list of rows"
 
@@ -321,12 +306,11 @@ def test_json_is_read_whatever_the_case_of_its_type_and_without_one(client: Any,
 
 @pytest.fixture(scope="module")
 def few(started: Any) -> Any:
-    """A client of an application for batches of three cases."""
     with started(max_batch=3) as client:
         yield client
 
 
-FORMS = {
+FORMS: dict[str, tuple[str, Any]] = {
     "CSV": ("csv", as_csv), "CSV, CR": ("csv", lambda rows: as_csv(rows).replace("\r\n", "\r")),
     "CSV, LF": ("csv", lambda rows: as_csv(rows).replace("\r\n", "\n")), "rows": ("json", json.dumps),
     "rows with words": ("json", lambda rows: json.dumps([{**row, "k": "Rigid"} for row in rows])),

@@ -17,7 +17,7 @@ DEFAULT = {"mu_macro", "mu_ratio", "regime", "error_bound", "source", "table", "
 PATH = "/v1/mu-macro"
 STD = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "y0": 1e-7, "omega": 1e3, "v0": 1e-3}
 
-positive = st.floats(min_value=1e-300, max_value=1e300)
+positive = st.floats(min_value=5e-324, max_value=1.7e308) | st.floats(1e-6, 1e6)
 not_negative = st.just(0.0) | positive
 cases = st.fixed_dictionaries(
     {"mu0": positive, "Fz": positive, "k": positive | st.none(), "y0": not_negative, "omega": not_negative,
@@ -34,7 +34,7 @@ def ask(client: Any, case: Case, **options: Any) -> Any:
 @settings(max_examples=200, deadline=None)
 @given(given_case=cases)
 def test_the_answer_is_the_surrogates_and_always_json(client: Any, surrogate: Surrogate, given_case: Any) -> None:
-    answer = ask(client, given_case, include=["groups", "limits"])
+    answer = ask(client, given_case, include=["groups", "limits", "stick_fraction"])
     expected = surrogate.evaluate(**given_case)
     assert answer["error_bound"] == (expected.error_bound if math.isfinite(expected.error_bound) else None)
     for name in ("mu_macro", "mu_ratio", "regime", "source"):
@@ -42,33 +42,17 @@ def test_the_answer_is_the_surrogates_and_always_json(client: Any, surrogate: Su
     assert 0.0 <= answer["mu_ratio"] <= 1.0
     assert list(answer["groups"]) == ["v_tilde", "y_tilde", "l0"]
     assert list(answer["limits"]) == ["mu_static", "v0_crit", "mu_crit"]
+    if answer["groups"]["y_tilde"] == 0.0 < given_case["y0"] * given_case["omega"]:
+        assert answer["stick_fraction_bound"] == 1.0  # the groups do not show whether it sticks
     plain = {name: answer[name] for name in DEFAULT}
     assert ask(client, given_case) == plain
     query = {name: "rigid" if value is None else repr(value) for name, value in given_case.items()}
     assert client.get(PATH, params=query).json() == plain
 
 
-@pytest.mark.parametrize(
-    "extreme",
-    [{"y0": 1e300, "k": 1e300}, {"y0": 1e-300, "k": 1e-300}, {"mu0": 1e300, "Fz": 1e300}, {"mu0": 1e-300, "Fz": 1e-300},
-     {"omega": 1e300, "mu0": 1e300}, {"v0": 1e308, "omega": 1e-300}, {"v0": 5e-324}, {"omega": 5e-324},
-     {"Fz": 1e300, "k": 1e-20, "y0": 1e-200}],
-)  # fmt: skip
-def test_products_beyond_double_range_are_answered(client: Any, case: Case, extreme: Any) -> None:
-    answer = ask(client, {**case, **extreme}, include=["groups", "limits", "stick_fraction"])
-    assert 0.0 <= answer["mu_ratio"] <= 1.0
-    if answer["groups"]["y_tilde"] == 0.0:  # the groups do not show whether it sticks
-        assert answer["stick_fraction_bound"] == 1.0
-
-
-# --- how it is asked ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("include", ["groups,limits", "limits, groups,groups", "groups&include=limits"])
 @pytest.mark.parametrize("k", ["1e+6", "1000000", "rigid", "Rigid"])
-def test_a_query_may_be_written_in_other_words(
-    client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any
-) -> None:
+def test_a_query_may_have_other_words(client: Any, case: Case, surrogate: Surrogate, include: Any, k: Any) -> None:
     expected = ask(client, {**case, "k": 1e6 if "1" in k else None}, include=["limits", "groups"])
     assert expected["table"] == {"id": surrogate.id, "tolerance": surrogate.tolerance}
     query = "&".join(f"{name}={value}" for name, value in {**case, "k": k, "include": include}.items())
@@ -103,9 +87,7 @@ def test_one_value_is_returned_as_text_and_answers_may_be_cached(client: Any, ca
     [*(({name: 0, **rest}, (0.3, 0.0, 0.3), 0.0) for name in ("y0", "omega") for rest in ({}, {"k": None})),
      ({"k": None}, (0.0, 0.0, 0.0), None)],
 )  # fmt: skip
-def test_without_oscillation_or_stiffness_nothing_sticks(
-    client: Any, case: Case, change: Any, limits: Any, power: Any
-) -> None:
+def test_nothing_sticks_without_oscillation_or_k(client: Any, case: Case, change: Any, limits: Any, power: Any) -> None:
     answer = ask(client, {**case, **change}, include=["limits", "power", "stick_fraction"])
     assert tuple(answer["limits"].values()) == limits
     assert (answer["mu_macro"] == 0.3) == (limits[0] == 0.3)
@@ -113,23 +95,6 @@ def test_without_oscillation_or_stiffness_nothing_sticks(
     assert answer["power"]["saved"] == close((0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300)
     assert answer["stick_fraction"] == answer["stick_fraction_bound"] == 0.0
     assert 0.0 <= answer["power_bound"]["saved"] <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
-
-
-@pytest.mark.parametrize("y0", [3e-8, 2e-6, 3e-6, 3e-5, 3e-3])
-def test_the_static_limit_and_the_border_lie_on_the_friction_law(client: Any, case: Case, y0: Any) -> None:
-    limits = ask(client, {**case, "y0": y0}, include=["limits"])["limits"]
-    at_rest = ask(client, {**case, "y0": y0, "v0": 0})
-    assert at_rest["regime"] == "static"
-    assert limits["mu_static"] == close(at_rest["mu_macro"], rel=1e-12, abs=1e-300)
-    assert limits["mu_static"] == close(0.3 * math.sqrt(max(0.0, 1.0 - (y0 / 3e-6) ** 2)), rel=1e-12, abs=3e-9)
-    there = ask(client, {**case, "y0": y0, "v0": limits["v0_crit"]})
-    assert there["mu_macro"] == close(limits["mu_crit"], rel=1e-9)
-    assert limits["mu_static"] <= limits["mu_crit"] <= case["mu0"]
-    for factor, regime in ((0.99, "stick_slip"), (1.01, "continuous")):
-        assert ask(client, {**case, "y0": y0, "v0": factor * limits["v0_crit"]})["regime"] == regime
-
-
-# --- what include adds; slopes, powers, and groups are those of test_service_contacts.py -----------------
 
 
 @pytest.mark.parametrize("k", [1e6, None])
@@ -145,12 +110,10 @@ def test_the_standard_deviation_is_the_root_of_squares(client: Any, case: Case, 
     assert ask(client, case, include=["std"], std={})["std"] == 0.0
 
 
-@pytest.mark.parametrize(
-    "change", [{}, {"v0": 1e-4, "y0": 1e-7}, {"v0": 5.0, "y0": 1e-4}, {"omega": 0}, {"k": None}, {"v0": 0}]
-)
-def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate, change: Any) -> None:
-    at = {**case, **change}
-    answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
-    for name, value in {**answer["settling"], "error_bound": answer["settling_bound"]["periods"]}.items():
-        assert value == (getattr(expected, name) if math.isfinite(getattr(expected, name)) else None), name
-    assert (answer["settling"]["time"] is None) == ("v0" in change and change["v0"] == 0)  # it never slips
+def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate) -> None:
+    for change in ({}, {"v0": 1e-4, "y0": 1e-7}, {"v0": 5.0, "y0": 1e-4}, {"omega": 0}, {"k": None}, {"v0": 0}):
+        at: Case = {**case, **change}
+        answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
+        for name, value in {**answer["settling"], "error_bound": answer["settling_bound"]["periods"]}.items():
+            assert value == (getattr(expected, name) if math.isfinite(getattr(expected, name)) else None), name
+        assert (answer["settling"]["time"] is None) == (at["v0"] == 0)  # it never slips
