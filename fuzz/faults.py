@@ -97,7 +97,7 @@ def left(folder: Path) -> list[str]:
 def full_disk_in_a_build(folder: Path) -> str:
     with small_disk(folder, "96k") as disk:
         said = run(*build(disk / "rough.nc"), code=1)
-        assert "No space left on device; give the same command again" in said, said
+        assert "No space left on device; repair that and give the same command again: it resumes" in said, said
         assert not [name for name in left(disk) if name.endswith(".growing")], left(disk)
         kept = len(left(disk))
         subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
