@@ -86,7 +86,8 @@ def test_a_stopped_run_goes_on_with_the_same_bytes(tmp_path: Path, cases: Any, k
     summary = evaluate_files([source], out, TABLE, say=said.append)
     assert (summary.rows, summary.rejected) == (3000, 4)
     assert said == [f"{out}.parts: {summary.resumed:,} rows are done already ({said[0].partition('(')[2]}"]
-    assert 3000 * (share - 0.1) <= summary.resumed < 3000
+    known = 0.0 if kind == "csv.gz" else share  # Python 3.12 and newer read far ahead of what they unpack
+    assert 3000 * (known - 0.1) <= summary.resumed < 3000
     assert_whole(out, cases)
 
 
