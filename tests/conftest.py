@@ -174,7 +174,7 @@ def unexpected_skips(config: pytest.Config) -> list[str]:
         return []
     missing = os.environ.get("CI_MISSING", "").split()
     expected = re.compile("|".join([*EXPECTED_SKIPS, *map(re.escape, missing)]))
-    reports = config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    reports = getattr(config.pluginmanager.get_plugin("terminalreporter"), "stats", {}).get("skipped", [])
     reasons = {str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr) for report in reports}
     return sorted(reason for reason in reasons if not expected.search(reason))
 

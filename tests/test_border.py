@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from builder import steady
-from builder.steady import NOT_CONVERGED, border, solve
+from builder.sections import NOT_CONVERGED
+from builder.steady import border, solve
 from builder.sweep import Sweep
 from mumacro import InputError, Surrogate
 from mumacro.charts import BORDER_PIECES, Y_CONT, Y_TAIL

@@ -17,7 +17,7 @@ from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE
 from mumacro.inputs import FIELDS
 from tests import naive
-from tests.cases import CASE, UNIT, Array, log_uniform, opened, tables
+from tests.cases import CASE, UNIT, Array, Case, log_uniform, opened, tables
 from tests.comparing import close
 
 table = tables()
@@ -31,13 +31,13 @@ def fine() -> Surrogate:
 # --- inputs with groups that are not doubles ----------------------------------------------------------
 
 
-def exact_groups(case: dict[str, float]) -> tuple[Fraction, Fraction]:
+def exact_groups(case: Case) -> tuple[Fraction, Fraction]:
     """(v~, y~ - 1) of the doubles, in rational arithmetic."""
     mu0, Fz, k, y0, omega, v0 = (Fraction(case[name]) for name in FIELDS)
     return v0 * k / (mu0 * Fz * omega), y0 * k / (mu0 * Fz) - 1
 
 
-def corner_ratio(case: dict[str, float]) -> float:
+def corner_ratio(case: Case) -> float:
     """mu~ next to the corner from exact groups: the root of mu~^3 + 2 (y~ - 1) mu~ = pi v~, off by O(mu~^3)."""
     v, eta = exact_groups(case)
     with workdps(60):
@@ -202,11 +202,11 @@ def full_model(sweep: Sweep, columns: Array) -> Array:
     """mu_macro [-] of the full model for columns (6, n) of the six inputs, without a table."""
     mu0, load, k, y0, omega, v0 = columns
     length = mu0 * load / k
-    return mu0 * np.asarray(sweep.solve("full", v0 / (length * omega), y0 / length)["mu_ratio"])
+    return np.asarray(mu0 * sweep.solve("full", v0 / (length * omega), y0 / length)["mu_ratio"])
 
 
 @at_every_place
-def test_the_gradient_is_that_of_the_full_model(fine: Surrogate, sweep: Sweep, case: dict[str, float]) -> None:
+def test_the_gradient_is_that_of_the_full_model(fine: Surrogate, sweep: Sweep, case: Case) -> None:
     gradient = fine.evaluate(case, gradient=True).gradient
     for i, (name, value) in enumerate(case.items()):
         moved = np.repeat(np.array([*case.values()])[:, None], 4, axis=1)
@@ -217,9 +217,7 @@ def test_the_gradient_is_that_of_the_full_model(fine: Surrogate, sweep: Sweep, c
 
 
 @at_every_place
-def test_first_order_uncertainty_agrees_with_the_full_model(
-    fine: Surrogate, sweep: Sweep, case: dict[str, float]
-) -> None:
+def test_first_order_uncertainty_agrees_with_the_full_model(fine: Surrogate, sweep: Sweep, case: Case) -> None:
     """The standard deviation of mu_macro to first order, compared with solves at random inputs."""
     values = np.array([*case.values()])[:, None]
     std = values * np.array([[0.004], [0.003], [0.004], [0.003], [0.002], [0.005]])
@@ -262,9 +260,9 @@ def test_the_gradient_of_rigid_contact_and_at_rest_is_that_of_the_closed_form(fi
 
 @pytest.mark.slow
 @at_every_place
-def test_the_power_is_that_of_a_plain_time_integration(fine: Surrogate, case: dict[str, float]) -> None:
+def test_the_power_is_that_of_a_plain_time_integration(fine: Surrogate, case: Case) -> None:
     answer = fine.evaluate(case)
-    v, y, means = answer.v_tilde, answer.y_tilde, []
+    v, y, means = float(answer.v_tilde), float(answer.y_tilde), []
     for steps in (20_000, 40_000):
         orbit = naive.march(v, y, steps, 1 + naive.periods_until_steady(v, y))
         # midpoint rule: velocities at the middle of a step, elongations at both ends

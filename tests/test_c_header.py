@@ -194,7 +194,8 @@ def test_arithmetic_without_infinities_is_refused(folder: Path, name: str, optio
 def test_numbers_are_exact_through_text(table: Surrogate) -> None:
     text = files(table.table)["mumacro_table.c"]
     arrays = dict(re.findall(r"static const double mumacro_table_(\w+)\[\d+\] = \{([^}]*)\}", text))
-    data = table._with("power") and table._with("stick_fraction")
+    table._with("power")
+    data = table._with("stick_fraction")
     read = {name: np.array(row.split(","), dtype=np.float64) for name, row in arrays.items()}
     for name in ("border", "pieces", "blocks", "outer"):
         assert same(read[name], getattr(data, name).ravel())

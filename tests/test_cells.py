@@ -1,20 +1,20 @@
 """From Chebyshev nodes to cells: exact for polynomials, close for smooth functions; and how the kernel reads cells."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from mumacro import charts
 from mumacro.cells import WIDTH, cell_positions, cells_1d, cells_2d, chebyshev_coefficients, interpolation_matrix, nodes
 from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
 from mumacro.library import Kernel, kernels
+from tests.cases import Array
 from tests.comparing import close
 from tests.made_cells import Cells
 
-Array = NDArray[np.float64]
 PLAIN = Axis("y", 0.0, 1.0)
 AXES = sorted({axis for chart in CHARTS for axis in (chart.a, chart.b)}, key=repr)
 S = Axis("s", 0.0, 1.0)
@@ -48,7 +48,7 @@ def test_coefficients_interpolate_along_every_axis(n: int) -> None:
     values = rng.normal(size=n)
     assert interpolation_matrix(n, nodes(n, -1.0, 1.0)) @ chebyshev_coefficients(values) == close(values, abs=1e-13)
     expected = rng.normal(size=(n, 9))
-    plane = chebyshev.chebgrid2d(nodes(n, -1.0, 1.0), nodes(9, -1.0, 1.0), expected)
+    plane: Any = chebyshev.chebgrid2d(nodes(n, -1.0, 1.0), nodes(9, -1.0, 1.0), expected)
     assert chebyshev_coefficients(plane) == close(expected, abs=1e-13)
 
 
@@ -56,7 +56,8 @@ def test_coefficients_interpolate_along_every_axis(n: int) -> None:
 def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
     rng = np.random.default_rng(cells)
     c = rng.normal(size=WIDTH)
-    local = cells_1d(0, chebyshev.chebval(nodes(20, -1.0, 1.0), c), cells)  # of v~crit, in y~^2
+    values: Any = chebyshev.chebval(nodes(20, -1.0, 1.0), c)
+    local = cells_1d(0, values, cells)  # of v~crit, in y~^2
     assert local.shape == (cells, WIDTH)
     for x in np.linspace(0.0, 1.0, 57):
         i = min(int(x * cells), cells - 1)
@@ -68,7 +69,7 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
 def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[int, int]) -> None:
     rng = np.random.default_rng(sum(cells))
     c = rng.normal(size=(WIDTH, WIDTH))
-    values = chebyshev.chebgrid2d(nodes(12, -1.0, 1.0), nodes(15, -1.0, 1.0), c)
+    values: Any = chebyshev.chebgrid2d(nodes(12, -1.0, 1.0), nodes(15, -1.0, 1.0), c)
     coef = cells_2d(PLAIN, PLAIN, values, cells)
     assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
     for x, z in rng.random((80, 2)):
@@ -221,7 +222,7 @@ def test_cells_along_s_are_on_the_nodes_axis_and_have_an_edge_at_the_knot(chart:
         else:
             assert np.all((s[i] > edges[i]) & (s[i] < edges[i + 1]))
     x, t = cell_positions(chart.a, 3)
-    assert x.shape == t.shape == (3 * WIDTH,)
+    assert x.size == t.size == 3 * WIDTH
     assert np.all(np.abs(t) < 1.0)
 
 

@@ -11,11 +11,11 @@ from scipy.special import ellipe, ellipk
 
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
-from tests.cases import CASE, UNIT, opened
+from tests.cases import CASE, UNIT, Case, opened
 from tests.comparing import close
 from tests.naive import march_ball
 
-BALL = {"contact": "ball"}
+BALL: Case = {"contact": "ball"}
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +38,11 @@ def by_quad(table: Surrogate, name: str, v: float, y: float) -> float:
     def share(xi: float) -> float:
         s = 1.0 - xi * xi
         weight = 1.5 * s * (1.5 * s if name == "power" else 1.0)
-        return weight * table.quantity(name, v / (1.5 * s), y / (1.5 * s))[0]
+        return float(weight * table.quantity(name, v / (1.5 * s), y / (1.5 * s))[0])
 
     def beyond(xi: float) -> float:
         s = 1.0 - xi * xi
-        return v / (1.5 * s) - table.v_tilde_crit(y / (1.5 * s))
+        return float(v / (1.5 * s) - table.v_tilde_crit(y / (1.5 * s)))
 
     xi = 1.0 - np.geomspace(1.0, 1e-9, 4000)
     slides = np.array([beyond(x) >= 0.0 for x in xi])

@@ -12,11 +12,12 @@ from scipy.optimize import brentq
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.closed_forms import master_curve_limit
-from tests.cases import CASE, UNIT, opened, without
+from tests.cases import CASE, UNIT, Case, opened, without
 from tests.comparing import close
 from tests.test_tight_bounds import play
 
-ALONG, NORMAL = {"direction": "along"}, {"direction": "normal"}
+ALONG: Case = {"direction": "along"}
+NORMAL: Case = {"direction": "normal"}
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from builder.c.source import write_c
 from mumacro import REGIMES, Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.table import read_table
+from tests.cases import Case
 from tests.test_c_header import LANES, STRICT
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")]
@@ -41,7 +42,7 @@ def cases() -> list[tuple[int, int, tuple[float, ...]]]:
     rng, found = np.random.default_rng(4), []
     for contact, direction in ((0, 0), (1, 0), (0, 1), (1, 1), (0, 2)):
         for i in range(40):
-            six = [0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01] * 10.0 ** rng.uniform(-1, 1, 6)
+            six = np.array([0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]) * 10.0 ** rng.uniform(-1, 1, 6)
             if direction == 2:
                 six[3] = six[1] * rng.uniform(0.0, 0.99)
             if i < 6:
@@ -71,7 +72,7 @@ def test_the_bits_of_the_library(tables_dir: Path, tmp_path: Path, form: Any, la
     for (contact, direction, six), line in zip(given, lines, strict=False):
         words = line.split()
         names = ("mu0", "Fz", "k", "Fz_amplitude" if direction == 2 else "y0", "omega", "v0")
-        kind = {"contact": CONTACTS[contact], "direction": DIRECTIONS[direction]}
+        kind: Case = {"contact": CONTACTS[contact], "direction": DIRECTIONS[direction]}
         a = s.evaluate({n: [x] for n, x in zip(names, six, strict=True)}, gradient=True, **kind)
         source = a.source_code[0]
         assert int(words[1]) == source

@@ -8,9 +8,10 @@ import pytest
 
 from mumacro import Element, InputError, Surrogate
 from mumacro.closed_forms import master_curve_limit
+from tests.cases import Case
 from tests.comparing import close
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
 
 
 def means(

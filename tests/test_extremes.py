@@ -204,7 +204,7 @@ def test_error_estimate_covers_the_other_section() -> None:
     rng = np.random.default_rng(5)
     both = 0
     for y in log_uniform(rng, 0.01, 1.0, 1000):  # above y~ = 1 the time section is ill conditioned
-        v = steady.border_guess(y) * 10.0 ** rng.uniform(-3.0, -0.1)
+        v = sections.border_guess(y) * 10.0 ** rng.uniform(-3.0, -0.1)
         mu, other, deficit = through_the_other_section(v, y, y - 1.0)
         if math.isfinite(other):
             both += 1

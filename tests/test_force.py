@@ -16,7 +16,7 @@ from tests.cases import Case
 from tests.comparing import close
 
 REST = 1e-4
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
 #: below and above y~ = 1 and on it; without oscillation; rigid; creeping and fast at v_rest
 CASES = [CASE, {**CASE, "y0": 3e-6}, {**CASE, "y0": 9e-6}, {**CASE, "y0": 0.0}, {**CASE, "omega": 0.0},
          {**CASE, "k": math.inf}, {**CASE, "omega": 1e9}, {**CASE, "omega": 1.0}]  # fmt: skip

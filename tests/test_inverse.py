@@ -19,7 +19,7 @@ def only_root(solution: Any) -> Any:
     return root
 
 
-def decade(low: Any, high: Any) -> Any:
+def decade(low: float, high: float) -> Any:
     return st.floats(low, high).map(lambda x: 10.0**x)
 
 
@@ -35,7 +35,7 @@ cases = st.fixed_dictionaries(
 def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any) -> None:
     said, fields, case = as_kind(case, pair, share)
     unknown = fields[place]
-    forward = surrogate.evaluate(**case, **said)
+    forward: Any = surrogate.evaluate(**case, **said)
     solution = solve_for(surrogate, unknown, forward.mu_macro, without(case, unknown), **said)
     if solution.constant or not solution.roots[0]:
         # within the surrogate's error the input has no influence here, or its end equals the limit
@@ -60,7 +60,7 @@ def test_a_root_is_enclosed_to_the_tables_error(surrogate: Surrogate) -> None:
 
 def test_an_enclosure_on_a_plateau_spans_it(surrogate: Surrogate) -> None:
     # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of this one on
-    case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
+    case: Case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
     root = only_root(solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, without(case, "k")))
     assert root.low < 10.0 < 1e9 < root.high
 
@@ -190,7 +190,7 @@ def test_a_bad_question_names_its_field(surrogate: Surrogate, field: str, argume
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
 @settings(max_examples=15, deadline=None)
 @given(v0=decade(-5, 0), share=st.floats(0.001, 0.999))
-def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: str, unknown: Any, v0: Any, share: Any) -> None:
+def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: Any, unknown: Any, v0: Any, share: Any) -> None:
     case, ray = {**CASE, "v0": v0}, CASE[unknown] * np.geomspace(1e-9, 1e9, 20_001)
     mu = surrogate.evaluate(**{**case, unknown: ray}, contact=contact).mu_macro
     target = float(mu[int(share * 20_000)])

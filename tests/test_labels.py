@@ -12,8 +12,8 @@ import xarray as xr
 
 from mumacro import REGIMES, SOURCES, InputError, Surrogate
 from mumacro.inputs import FIELDS
+from tests.cases import CASE, Case
 
-CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 N = 60
 VALUES = ("mu_macro", "mu_ratio", "error_bound", "source_code", "v_tilde", "y_tilde", "length_scale")
 
@@ -23,7 +23,7 @@ def table() -> Surrogate:
     return Surrogate.open(1e-7)
 
 
-def columns(n: int = N) -> dict[str, Any]:
+def columns(n: int = N) -> Case:
     """Cases of every regime, including rigid and illegal ones."""
     rng = np.random.default_rng(5)
     found = {name: np.full(n, value) for name, value in CASE.items()}

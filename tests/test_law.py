@@ -13,7 +13,7 @@ from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, approximations, bord
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.comparing import close
 
-INTERVAL = {"k_range": (0.8e6, 1.2e6)}
+INTERVAL: Case = {"k_range": (0.8e6, 1.2e6)}
 LINE = without({**CASE, "y0": 4e-6}, "v0")
 SPEEDS = sweep_values("v0", 1e-4, 2.0, 25, "log")
 
@@ -68,7 +68,7 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
     assert law.answer.mu_macro == close(moving.mu_macro, rel=1e-15)
     assert law.mu_static == close(still.mu_macro, rel=1e-9, abs=1e-15)
     assert np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1]) == len(law.border)
-    columns = (values if name == along else np.array([case[name]]) for name in fields)
+    columns: Any = (values if name == along else np.array([case[name]]) for name in fields)
     found = surrogate.evaluate_columns(*columns, **said)
     for column, name in zip(found, ("mu_macro", "mu_ratio", "error_bound", "source_code"), strict=True):
         np.testing.assert_array_equal(column, getattr(law.answer, name))
@@ -96,7 +96,7 @@ def test_the_band_holds_every_stiffness_of_its_interval(surrogate: Surrogate, pa
     assert middle.border == law.border
     assert middle.answer.mu_macro == close(law.answer.mu_macro, rel=1e-14)
     again = friction_law(surrogate, "v0", SPEEDS, single, **said, **INTERVAL)  # as a keyword, too
-    assert np.array_equal(again.band, law.band)
+    np.testing.assert_array_equal(again.band, law.band)
 
 
 @every_pair
@@ -158,7 +158,7 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
 
 # --- the approximations of one spring -----------------------------------------------------------------
 
-CONTACT = {"mu0": 0.25, "Fz": 1.0, "k": 4.0, "omega": 3.0}  # l0 = 1/16 m
+CONTACT: Case = {"mu0": 0.25, "Fz": 1.0, "k": 4.0, "omega": 3.0}  # l0 = 1/16 m
 LENGTH = 0.0625
 
 
@@ -167,7 +167,7 @@ def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
     law = friction_law(surrogate, "v0", np.asarray(v) * LENGTH * 3.0, {**CONTACT, "y0": y * LENGTH})
     borders = border_speeds(surrogate, law)
     found = {name: x / 0.25 for name, x in approximations(surrogate, law).items()}
-    assert (found.keys(), borders.keys()) == (APPROXIMATIONS.keys(), BORDERS.keys())
+    assert (list(found), list(borders)) == (list(APPROXIMATIONS), list(BORDERS))
     return law, found, {name: x / (LENGTH * 3.0) for name, x in borders.items()}
 
 
@@ -192,7 +192,7 @@ def test_every_equation_number_names_a_column() -> None:
 def test_the_approximations_hold_where_they_should(
     surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any
 ) -> None:
-    law, found, _ = columns(surrogate, y, np.geomspace(*ends, 31))
+    law, found, _ = columns(surrogate, y, np.geomspace(ends[0], ends[1], 31))
     assert np.max(np.abs(found[name] - law.answer.mu_ratio)) < off
 
 

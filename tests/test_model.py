@@ -42,8 +42,8 @@ def witness(v: float, y: float, start: float, angle: float, end: float, **how: A
         out[:, 0] = [-v * cos - y * c * sin, -sin, sin, y * c * cos - v * sin, y * c * cos]
         return out
 
-    implicit = {"jac": jacobian} if how["method"] == "Radau" else {}
-    return solve_ivp(rate, (start, end), [angle, 0, 0, 0, 0], **implicit, **how).y[:, -1]
+    implicit: Any = {"jac": jacobian} if how["method"] == "Radau" else {}
+    return np.asarray(solve_ivp(rate, (start, end), [angle, 0, 0, 0, 0], **implicit, **how).y[:, -1])
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (2.0, 1.0), (0.01, 0.7), (3.0, 30.0), (40.0, 5.0)])

@@ -9,7 +9,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep, last_double
-from tests.cases import CASE, without
+from tests.cases import CASE, Array, without
 from tests.comparing import close
 
 
@@ -24,8 +24,8 @@ class Known:
         return SimpleNamespace(mu_macro=self.function(x)), self.slope(x)
 
 
-def curve(sweep: Any, *x: Any) -> Any:
-    x = np.array(x)
+def curve(sweep: Any, *ends: float) -> Curve:
+    x = np.array(ends)
     return Curve(sweep, x, sweep.function(x))
 
 
@@ -131,9 +131,13 @@ def test_the_cusp_of_the_static_limit_is_met(surrogate: Surrogate) -> None:
 
 def test_an_ordinary_target_takes_few_evaluations(surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep = sweep_over(surrogate, "v0")
-    calls = []
-    inner = sweep.with_slope
-    monkeypatch.setattr(sweep, "with_slope", lambda x: calls.append(x.size) or inner(x))
+    calls, inner = list[int](), sweep.with_slope
+
+    def counted(x: Array) -> Any:
+        calls.append(x.size)
+        return inner(x)
+
+    monkeypatch.setattr(sweep, "with_slope", counted)
     x = np.geomspace(1e-8, 1e8, 97)
     piece = Curve(sweep, x, sweep.mu(x))
     piece.meet(np.linspace(0.23, 0.29, 1000))

@@ -15,18 +15,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from mumacro import InputError, Surrogate, TableError, batch
 from mumacro.processors import processors
 from mumacro.table import read_table
+from tests.cases import CASE, UNIT, Array
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
-Array = NDArray[np.float64]
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 N = 200_000
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 
@@ -44,8 +42,7 @@ def points(n: int, seed: int = 1) -> tuple[Array, Array]:
 def everything(table: Surrogate, n: int = N, seed: int = 1) -> bytes:
     """The bits of all quantities of a table at some points."""
     v, y = points(n, seed)
-    inputs = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": y, "omega": 1.0, "v0": v}
-    answer = table.evaluate(inputs, gradient=True)
+    answer = table.evaluate(**UNIT, y0=y, v0=v, gradient=True)
     parts = [table.mu_ratio(v, y), *table.power_with_bound(v, y), *table.stick_fraction_with_bound(v, y)]
     parts += [*table.slopes(v, y, "power", bounds=True), answer.mu_macro, answer.error_bound, answer.source_code]
     parts += [*(answer.gradient or {}).values(), *(answer.gradient_bound or {}).values()]

@@ -10,6 +10,7 @@ import pytest
 from mumacro import InputError, Surrogate, stiffness
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
+from tests.cases import Case
 from tests.comparing import close
 
 STEEL, RUBBER, RIGID = Material(210e9, 0.3), Material(5e6, 0.5), Material(math.inf, 0.3)
@@ -162,7 +163,7 @@ def test_arguments_are_read_with_units() -> None:
 
 
 def test_a_result_can_be_passed_on(surrogate: Surrogate) -> None:
-    case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+    case: Case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
     punch, ball = flat_punch(1e-3, 10.0, STEEL, STEEL), ball_on_flat(5e-3, 10.0, STEEL, STEEL)
     assert surrogate.evaluate(**punch, **case).mu_macro == surrogate.evaluate(k=punch.k, **case).mu_macro
     assert dict(ball) == {"k": ball.k, "contact": "ball"}

@@ -27,7 +27,7 @@ from mumacro.table import MOST_BYTES, MOST_CELLS, Block, Table, _digest, read_ta
 from mumacro.writing import BusyError, alone_in, write_whole
 
 Array = NDArray[np.float64]
-Edit = Callable[[Any], object]
+Edit = Callable[..., object]
 CORNER, BLOCK = NAMES.index("corner"), "border/blocks/corner"
 PLAIN = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
 ROOT = Path(__file__).resolve().parent.parent
@@ -96,7 +96,7 @@ def test_an_edited_file_is_refused_by_name(tmp_path: Path, name: str) -> None:
     assert str(path) in str(caught.value)
 
 
-def of_axis(index: int, axis: str) -> Callable[[Table], None]:
+def of_axis(index: int, axis: str) -> Edit:
     # the last digit may be that of another mathematical library
     own = getattr(CHARTS[index], axis)
     off = 2e-15 * max(abs(own.low), abs(own.high))
@@ -105,7 +105,7 @@ def of_axis(index: int, axis: str) -> Callable[[Table], None]:
 
 CELLS = f"cells must be whole numbers from 1 to {MOST_CELLS}"
 #: what is changed before the file is written with a checksum that fits -> why it is refused
-SIGNED: dict[str, tuple[Callable[[Table], object], str]] = {
+SIGNED: dict[str, tuple[Edit, str]] = {
     **{f"{axis} of {chart.name}": (
         of_axis(i, axis), f"{chart.name}: the nodes of '{getattr(chart, axis).name}' are not those of this program's")
        for i, chart in enumerate(CHARTS) for axis in ("a", "b")},
@@ -170,7 +170,8 @@ def test_another_atlas_is_refused_whatever_the_checksum(
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
-    for name, kind in (("foreign.nc", "NETCDF4"), ("classic.nc", "NETCDF3_CLASSIC")):
+    kinds: Any = (("foreign.nc", "NETCDF4"), ("classic.nc", "NETCDF3_CLASSIC"))
+    for name, kind in kinds:
         with netCDF4.Dataset(str(tmp_path / name), "w", format=kind) as root:
             root.createDimension("x", 2)
     (tmp_path / "text.nc").write_text("mu_macro,0.3\n")
@@ -191,7 +192,7 @@ def test_one_checksum_covers_every_number_that_takes_part(sound: Table) -> None:
     def shift(x: Array) -> None:
         x.flat[x.size // 2] = np.nextafter(x.flat[x.size // 2], np.inf)
 
-    def changes() -> Iterator[Callable[[Table], None]]:
+    def changes() -> Iterator[Edit]:
         for name in PLAIN:
             yield lambda t, name=name: shift(getattr(t, name))
         yield lambda t: t.attributes.update(tolerance=2e-4)
