@@ -12,8 +12,10 @@ from builder.c.source import write_c
 from mumacro import Element, Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from tests import compilers
-from tests.cases import Case
+from tests.cases import Case, every_pair
 from tests.comparing import close
+
+pytestmark = pytest.mark.slow
 
 REST = 1e-4
 CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
@@ -84,11 +86,7 @@ def test_the_force_is_odd_smooth_and_rises(library: Any, table: Surrogate, case:
     assert (at - before) / step == close(slope, rel=1e-3, abs=1e-3 * at / REST)
 
 
-@pytest.mark.parametrize(
-    "pair",
-    [("spring", "across"), ("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")],
-    ids="-".join,
-)
+@every_pair
 @pytest.mark.parametrize("share", [0.0, 0.3, -0.7, 20.0, -500.0])
 def test_the_force_of_every_contact_has_its_derivatives(library: Any, table: Surrogate, pair: Any, share: Any) -> None:
     amplitude = {"Fz_amplitude": 4.0} if pair[1] == "normal" else {"y0": CASE["y0"]}  # [N], [m]
