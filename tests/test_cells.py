@@ -32,16 +32,6 @@ def at(coef: Array, cells: tuple[int, int], x: float, z: float) -> float:
     return value(coef[i * cells[1] + j], 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0)
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 40])
-def test_nodes_are_the_zeros_of_the_chebyshev_polynomial(n: int) -> None:
-    x = nodes(n, -3.0, 5.0)
-    assert x.shape == (n,)
-    assert np.all(np.diff(x) > 0.0)
-    assert x[0] > -3.0
-    assert x[-1] < 5.0
-    assert chebyshev.chebval((x - 1.0) / 4.0, [0] * n + [1]) == close(np.zeros(n), abs=1e-13)
-
-
 @pytest.mark.parametrize("n", [1, 3, 8, 21])
 def test_coefficients_interpolate_along_every_axis(n: int) -> None:
     rng = np.random.default_rng(n)
@@ -74,29 +64,6 @@ def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[in
     assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
     for x, z in rng.random((80, 2)):
         assert at(coef, cells, x, z) == close(chebyshev.chebval2d(2 * x - 1, 2 * z - 1, c), abs=2e-10)
-
-
-def test_error_of_the_cells_falls_with_the_eighth_power_of_their_size() -> None:
-    values = np.exp(np.sin(3.0 * nodes(60, 0.0, 1.0)))
-    errors = []
-    for cells in (2, 4, 8):
-        local = cells_1d(0, values, cells)
-        x = np.linspace(0.0, 1.0, 500, endpoint=False)
-        i = (x * cells).astype(int)
-        found = np.array([np.polyval(local[k], 2.0 * (t * cells - k) - 1.0) for t, k in zip(x, i, strict=True)])
-        errors.append(np.abs(found - np.exp(np.sin(3.0 * x))).max())
-    assert math.log2(errors[0] / errors[1]) == close(WIDTH, abs=1.5)
-    assert math.log2(errors[1] / errors[2]) == close(WIDTH, abs=1.0)
-
-
-def test_neighbouring_cells_meet() -> None:
-    x, z = nodes(40, 0.0, 1.0), nodes(40, 0.0, 1.0)
-    values = np.exp(-x[:, None]) * np.cos(2.0 * z[None, :]) + x[:, None] * z[None, :] ** 2
-    coef = cells_2d(PLAIN, PLAIN, values, (6, 6))
-    for i in range(5):
-        for t in np.linspace(-1.0, 1.0, 9):
-            assert value(coef[i * 6 + 2], 1.0, t) == close(value(coef[(i + 1) * 6 + 2], -1.0, t), abs=2e-12)
-            assert value(coef[12 + i], t, 1.0) == close(value(coef[13 + i], t, -1.0), abs=2e-12)
 
 
 # --- what the kernel reads ------------------------------------------------------------------------------

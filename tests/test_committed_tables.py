@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from numpy.typing import NDArray
 
 from builder.assemble import ABS_TO_REL, build_table
 from builder.quantities import SOLVER_NOISE, STICK_NOISE, solver_noise
@@ -24,9 +23,9 @@ from mumacro.charts import CONTINUOUS, REGIME_OF_SOURCE, REGIMES, Y_CONT, Y_HIGH
 from mumacro.inputs import FIELDS
 from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
 from mumacro.table import read_table
+from tests.cases import Array
 from tests.comparing import close
 
-Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent
 #: the most bytes of a file
 BYTES = {"mumacro-1e-4": 135_000, "mumacro-1e-7": 215_000, "mumacro-1e-10": 360_000, "mumacro-1e-12": 450_000}
@@ -164,34 +163,6 @@ def test_slopes_go_on_across_seams_and_stay_bounded_down_to_the_border(fine: Sur
         assert np.abs(below - above).max() <= 3e-6 + 3.0 * distance
 
 
-@pytest.mark.slow
-def test_slopes_agree_with_differences_of_the_full_model(fine: Surrogate, sweep: Sweep) -> None:
-    v, y = draw("random", 2000, fine, seed=9)
-    keep = np.abs(np.log(v / fine.v_tilde_crit(y))) > 2e-3  # the stencil must not straddle the border's kink
-    keep &= np.hypot(y - 1.0, np.cbrt(v)) > 0.1
-    v, y, h = v[keep], y[keep], 3e-4
-
-    def difference(n: int, a: int, b: int) -> Array:
-        up, down = (sweep.solve("full", v * math.exp(s * n * h * a), y * math.exp(s * n * h * b)) for s in (1, -1))
-        return up["mu_ratio"] - down["mu_ratio"]
-
-    for slope, step in zip(fine.slopes(v, y)[1:], ((1, 0), (0, 1)), strict=True):
-        expected = (8.0 * difference(1, *step) - difference(2, *step)) / (12.0 * h)
-        assert np.abs(slope - expected).max() <= 1e-7
-
-
-def test_the_gradient_at_the_edges(fine: Surrogate) -> None:
-    base = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "y0": 0.5, "omega": 1.0, "v0": 0.0}
-    static, corner, above, still = (
-        fine.evaluate({**base, **change}, gradient=True).gradient
-        for change in ({}, {"y0": 1.0}, {"y0": 2.0}, {"y0": 0.0, "v0": 1.0})
-    )
-    assert static["v0"] == close(0.5 * math.pi / (2 * (1 - 0.25)), rel=1e-14)
-    assert math.isinf(corner["v0"])
-    assert above["v0"] == close(0.5 * 1.74344269, rel=1e-8)
-    assert still == {"mu0": 1.0, "Fz": 0.0, "k": 0.0, "y0": 0.0, "omega": 0.0, "v0": 0.0}
-
-
 # --- the files --------------------------------------------------------------------------------------------
 
 
@@ -236,25 +207,6 @@ def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: 
         # to the digits stored in the file, with the error stated there
         assert np.all(np.abs(mu[::7, ::7] - solved["mu_ratio"]) <= error[::7, ::7])
         np.testing.assert_allclose(stick[::7, ::7], solved["stick_fraction"], rtol=data.tolerance / STEPS, atol=1e-9)
-
-
-def test_every_variable_in_every_group_has_a_description() -> None:
-    with xr.open_datatree(PATHS[0]) as tree:
-        assert tree.attrs["Conventions"] == "CF-1.11"
-        assert tree.mu_ratio.dims == ("v_tilde", "y_tilde")
-        assert tree.mu_ratio.attrs["ancillary_variables"] == "error_estimate"
-        assert tree.attrs.keys() >= {
-            "title", "summary", "history", "source", "references", "license", "product_version", "format_version",
-            "tolerance", "verified_max_abs_error", "verified_max_rel_error", "n_solves", "builder_options",
-            "content_sha256", "verified_max_stick_error", "verified_max_rel_power_error", "verified_max_slope_error",
-        }  # fmt: skip
-        variables = [v for node in tree.subtree for v in node.to_dataset(inherit=False).variables.values()]
-    assert len(variables) > 50
-    for variable in variables:
-        assert variable.attrs["units"] == "1"
-        assert variable.attrs["long_name"]
-        assert "_FillValue" not in variable.encoding
-        assert variable.dtype == np.float64
 
 
 @pytest.mark.slow

@@ -56,6 +56,7 @@ def by_quad(table: Surrogate, name: str, v: float, y: float) -> float:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "y"), [(0.05, 0.4), (0.3, 2.5), (1.2, 1.0)])
 def test_marched_springs(table: Surrogate, v: Any, y: Any) -> None:
     coarse, fine = (march_ball(v, y, 300, steps) for steps in (1500, 3000))

@@ -172,6 +172,7 @@ def test_jax_checks_the_gradients(jax: ModuleType, in_jax: Any, name: str) -> No
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_jax_checks_the_gradient_by_the_six_inputs(jax: ModuleType, in_jax: Any) -> None:
     from jax.test_util import check_grads
 
@@ -212,14 +213,10 @@ def test_jax_in_single_precision_is_refused(jax: ModuleType, in_jax: Any) -> Non
 
 @pytest.mark.parametrize(
     ("attributes", "arguments", "message"),
-    [
-        ({"table": 5}, 2, "this table is not open here"),  # as in a program from another process
-        ({"order": 3}, 2, "not a call that mumacro.jax makes"),
-        ({"order": 2}, 6, "not a call that mumacro.jax makes"),
-        ({"quantity": 99}, 2, "not a call that mumacro.jax makes"),
-        ({}, 3, "not a call that mumacro.jax makes"),
-    ],
-)
+    [({"table": 5}, 2, "this table is not open here"), ({"order": 3}, 2, "not a call that mumacro.jax makes"),
+     ({"order": 2}, 6, "not a call that mumacro.jax makes"),
+     ({"quantity": 99}, 2, "not a call that mumacro.jax makes"), ({}, 3, "not a call that mumacro.jax makes")],
+)  # fmt: skip
 def test_a_jax_program_that_the_kernel_cannot_run_is_an_error_and_no_crash(
     jax: ModuleType, in_jax: Any, table: Surrogate, attributes: dict[str, int], arguments: int, message: str
 ) -> None:

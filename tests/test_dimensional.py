@@ -65,16 +65,11 @@ def test_groups_are_right_whatever_overflows_on_the_way(table: Surrogate, case: 
 
 @pytest.mark.parametrize(
     "inputs",
-    [
-        (1.0, 1e300, 1e300, 1e300, 1.0, 1e300),
-        (1e-300, 1e-300, 1e-300, 1e-300, 1.0, 1e-300),
-        (1e200, 1e200, 1e200, 1e200, 1.0, 1e200),
-        (1e-5, 1e-310, 1e-300, 1e-15, 1e-20, 1e-300),
-        (0.5, 1.0, 1e-320, 1.0, 1.0, 1.0),
-        (0.5, 5e-324, 5e-324, 0.25, 1.0, 0.5),
-        (1e-200, 1e-200, 1e-200, 1e-200, 1e-200, 1e-200),
-    ],
-)
+    [(1.0, 1e300, 1e300, 1e300, 1.0, 1e300), (1e-300, 1e-300, 1e-300, 1e-300, 1.0, 1e-300),
+     (1e200, 1e200, 1e200, 1e200, 1.0, 1e200), (1e-5, 1e-310, 1e-300, 1e-15, 1e-20, 1e-300),
+     (0.5, 1.0, 1e-320, 1.0, 1.0, 1.0), (0.5, 5e-324, 5e-324, 0.25, 1.0, 0.5),
+     (1e-200, 1e-200, 1e-200, 1e-200, 1e-200, 1e-200)],
+)  # fmt: skip
 def test_groups_at_the_ends_of_double_precision(table: Surrogate, inputs: tuple[float, ...]) -> None:
     has_exact_groups(table, dict(zip(FIELDS, inputs, strict=True)))
 
@@ -108,13 +103,6 @@ def test_rigid_contact_is_the_elliptic_integral(table: Surrogate, y0: float, ome
         expected = float(2 / pi * ellipk(-((mpf(y0) * mpf(omega) / mpf(v0)) ** 2)))
     assert found.mu_ratio == close(expected, rel=1e-15)
     assert (found.source, found.length_scale, found.v_tilde, found.y_tilde) == ("rigid", 0.0, math.inf, math.inf)
-
-
-def test_rigid_contact_is_what_ever_stiffer_springs_tend_to(table: Surrogate) -> None:
-    rigid = table.evaluate(**{**CASE, "k": None}).mu_macro
-    gaps = [abs(table.evaluate(**{**CASE, "k": k}).mu_macro - rigid) for k in (1e9, 1e10, 1e11, 1e200)]
-    assert gaps[0] > gaps[1] > gaps[2]
-    assert gaps[3] < 1e-15
 
 
 @pytest.mark.parametrize(
@@ -258,16 +246,10 @@ def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
         table.evaluate(**CASE, f=frequency)
     with pytest.raises(InputError, match=r"omega must be given or f \[Hz\]"):
         table.evaluate(**rest, f=None, omega=None)
-
-
-@pytest.mark.parametrize("bad", [-2e4, math.nan, math.inf])
-def test_a_bad_frequency_is_named_as_it_was_given(table: Surrogate, bad: float) -> None:
-    rest = without(CASE, "omega")
-    for given_f, index in ((bad, None), ([2e4, bad], 1)):
+    for bad, index in ((x, i) for x in (-2e4, math.nan, math.inf) for i in (None, 1)):
         with pytest.raises(InputError) as caught:
-            table.evaluate(**rest, f=given_f, illegal="raise")
-        assert (caught.value.field, caught.value.index) == ("f", index)
-        assert repr(caught.value.value) == repr(bad)
+            table.evaluate(**rest, f=[2e4, bad] if index else bad, illegal="raise")
+        assert (caught.value.field, caught.value.index, repr(caught.value.value)) == ("f", index, repr(bad))
 
 
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:

@@ -71,13 +71,6 @@ def test_the_static_limit_at_creep(y: float) -> None:
         assert found.power / v == close(expected, rel=1e-12 if y > 0.99 else 1e-14)
 
 
-def test_the_linear_term_below_one() -> None:
-    for y in (0.3, 0.6, 0.9):
-        v = 1e-9
-        rise = solve(v, y).mu_ratio - math.sqrt((1.0 - y) * (1.0 + y))
-        assert rise == close(math.pi / (2.0 * (1.0 - y * y)) * v, rel=1e-3)
-
-
 @pytest.mark.parametrize("eta", [0.0, 1e-17, -1e-17, 3e-30, -3e-30, 1e-60, -1e-90])
 def test_the_corner_at_any_speed_is_the_normal_form(eta: float) -> None:
     for v in (10.0**exponent for exponent in range(-30, -61, -3)):

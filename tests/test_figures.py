@@ -39,24 +39,6 @@ def labelled(panel: Panel, part: str) -> Curve:
     return found
 
 
-def test_every_curve_fills_its_figure_with_numbers(shown: dict[str, list[Panel]]) -> None:
-    for name, panels in shown.items():
-        for panel in panels:
-            (_, x_low, x_high), (_, y_low, y_high) = panel.x, panel.y
-            inside = []
-            for curve in panel.curves:
-                x, y = (curve.x, curve.y) if curve.z is None else np.meshgrid(curve.x, curve.y)
-                assert x.shape == y.shape == (x if curve.z is None else curve.z).shape, name
-                at = (x_low <= x) & (x <= x_high) & (y_low <= y) & (y <= y_high)
-                assert at.any() or curve.label == "stick", (name, curve.label)  # none in continuous sliding
-                inside.append(x[at])
-            if panel.settings.get("aspect") != "equal":  # both halves of the axis have curves
-                shares = (np.concatenate(inside) - x_low) / (x_high - x_low)
-                assert shares.min() < 0.1, name
-                assert shares.max() > 0.9, name
-            assert all(x_low <= x <= x_high and y_low <= y <= y_high for x, y in panel.notes), name
-
-
 LENGTH, OMEGA = 1e-6, 2.0 * np.pi * 20e3
 MU = Surrogate.open().mu_ratio
 #: figure, the start or a part of a curve's label, what it shows as a function of x, relative and absolute tolerance

@@ -35,7 +35,7 @@ NO_NUMBERS: dict[str, Any] = {
     "records": np.zeros(3, dtype=[("a", "f8")]), "objects": np.array([object()]), "void": np.void(b"12345678"),
     "long": ["x" * 100_000] * 100,
 }  # fmt: skip
-OUT_OF_BOUNDS = [-1.0, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
+OUT_OF_BOUNDS = [-1.0, -1e6, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
 
 
 @pytest.fixture(scope="module")
@@ -60,12 +60,6 @@ def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, metho
         table.v_tilde_crit(NO_NUMBERS[bad])
 
 
-def test_an_infinite_amplitude_is_refused_by_name(table: Surrogate) -> None:
-    with pytest.raises(InputError) as caught:
-        table.mu_ratio(1.0, math.inf)
-    assert caught.value.field == "y_tilde"
-
-
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", OUT_OF_BOUNDS, ids=repr)
 def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate, method: str, bad: Any) -> None:
@@ -78,15 +72,6 @@ def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate,
         for one, column in zip(parts(ask(table, 0.1, 0.5)), parts(many), strict=True):
             assert column[0] == column[2] == one
             assert column[1] == -1 if column.dtype == np.int8 else math.isnan(column[1])
-
-
-@pytest.mark.parametrize(("v", "y"), [(0.1, -1e6), (0.1, -2.0), (-1e6, 0.1), (math.nan, -1e6), (-0.1, -math.inf)])
-def test_quantities_beyond_the_quadrant_are_refused_not_read(table: Surrogate, v: float, y: float) -> None:
-    for method, ask in PLANE.items():
-        with pytest.raises(InputError):
-            ask(table, v, y)
-        assert np.isnan(parts(ask(table, [v], y))[0]).all(), method
-        assert np.isnan(parts(ask(table, np.full(5000, v), np.full(5000, y)))[0]).all(), method
 
 
 @pytest.mark.parametrize("method", PLANE)
@@ -130,8 +115,9 @@ def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
     assert np.isnan(found).tolist() == [False, True, False]
     assert table.evaluate({**CASE, "v0": masked}).source_code.tolist()[1] == -1
     assert masked.data.tolist() == [1, 2, 3]
-    with pytest.raises(InputError, match="v_tilde"):
-        table.mu_ratio(np.ma.masked, 0.5)
+    for v, y, field in ((np.ma.masked, 0.5, "v_tilde"), (1.0, math.inf, "y_tilde")):
+        with pytest.raises(InputError, match=f"^{field}"):
+            table.mu_ratio(v, y)
 
 
 def test_the_callers_floating_point_settings_are_unchanged(table: Surrogate) -> None:

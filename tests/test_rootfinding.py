@@ -9,7 +9,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep, last_double
-from tests.cases import CASE, Array, without
+from tests.cases import CASE, without
 from tests.comparing import close
 
 
@@ -127,20 +127,3 @@ def test_the_cusp_of_the_static_limit_is_met(surrogate: Surrogate) -> None:
     expected = 3e-6 * np.sqrt((1.0 - level / 0.3) * (1.0 + level / 0.3))
     assert piece.meet(level) == close(expected, rel=4e-16)
     assert piece.meet(np.array([0.0]))[0] == close(3e-6, rel=4e-16)
-
-
-def test_an_ordinary_target_takes_few_evaluations(surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch) -> None:
-    sweep = sweep_over(surrogate, "v0")
-    calls, inner = list[int](), sweep.with_slope
-
-    def counted(x: Array) -> Any:
-        calls.append(x.size)
-        return inner(x)
-
-    monkeypatch.setattr(sweep, "with_slope", counted)
-    x = np.geomspace(1e-8, 1e8, 97)
-    piece = Curve(sweep, x, sweep.mu(x))
-    piece.meet(np.linspace(0.23, 0.29, 1000))
-    # a bisection of the bits takes 50 or more
-    assert len(calls) <= 12
-    assert sum(calls) <= 6 * 1000

@@ -147,30 +147,6 @@ def test_tables_are_read_by_many_threads_at_once() -> None:
         assert all(found == expected for found in pool.map(work, range(8)))
 
 
-def test_tables_are_opened_while_others_evaluate(table: Surrogate, tmp_path: Path) -> None:
-    (tmp_path / "damaged.nc").write_bytes(table.path.read_bytes()[:50_000])
-    expected, stop, wrong = everything(table, 20_000), threading.Event(), []
-
-    def evaluate() -> None:
-        while not stop.is_set():
-            if everything(table, 20_000) != expected:
-                wrong.append("other numbers")
-
-    workers = [threading.Thread(target=evaluate) for _ in range(2)]
-    for worker in workers:
-        worker.start()
-    try:
-        for _ in range(5):
-            assert everything(Surrogate.open(table.path, threads=1), 20_000) == expected
-            with pytest.raises(TableError):
-                Surrogate.open(tmp_path / "damaged.nc")
-    finally:
-        stop.set()
-        for worker in workers:
-            worker.join()
-    assert wrong == []
-
-
 def test_a_small_call_does_not_wait_for_a_large_one(table: Surrogate) -> None:
     v, y = (np.tile(x, 10) for x in points(2_000_000))
     begun, ended = threading.Event(), threading.Event()
@@ -248,35 +224,10 @@ def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
 
 @forks
 @pytest.mark.filterwarnings("ignore:.*fork.*")
-@pytest.mark.parametrize("kind", ["pool", "executor"])
-def test_forked_workers_give_the_same_bits(inherited: Surrogate, kind: str) -> None:
+def test_forked_workers_give_the_same_bits(inherited: Surrogate) -> None:
     expected, context = [everything(inherited, N, seed) for seed in range(4)], multiprocessing.get_context("fork")
-    if kind == "pool":
-        with context.Pool(2) as pool:
-            assert pool.map_async(_ask, range(4)).get(timeout=120) == expected
-    else:
-        with ProcessPoolExecutor(2, mp_context=context) as executor:
-            assert list(executor.map(_ask, range(4), timeout=120)) == expected
-
-
-def _fail(what: str) -> None:
-    if what == "input":
-        Surrogate.open(1e-4).evaluate({**CASE, "v0": [0.1, -1.0]}, illegal="raise")
-    Surrogate.open("no-such-table.nc")
-
-
-@forks
-@pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_errors_of_workers_reach_their_caller() -> None:
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
-        with pytest.raises(InputError) as caught:
-            pool.submit(_fail, "input").result(timeout=60)
-        assert (caught.value.field, caught.value.value, caught.value.index) == ("v0", -1.0, 1)
-        assert str(caught.value) == "v0 at index 1 must be finite and >= 0, got -1.0"
-        with pytest.raises(TableError, match=r"no-such-table\.nc: no such file") as broken:
-            pool.submit(_fail, "table").result(timeout=60)
-        assert broken.value.path == Path("no-such-table.nc")
-        assert pool.submit(len, "alive").result(timeout=60) == 5
+    with ProcessPoolExecutor(2, mp_context=context) as executor:
+        assert list(executor.map(_ask, range(4), timeout=120)) == expected
 
 
 @pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))

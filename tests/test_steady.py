@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import fixed_quad
 
 from builder import model, sections, steady
@@ -20,17 +19,12 @@ from builder.sweep import Sweep
 from mumacro import InputError
 from mumacro.closed_forms import outer, second_order
 from tests import naive
+from tests.cases import log_uniform
 from tests.comparing import close
-
-Array = NDArray[np.float64]
 
 ORDINARY = [(0.1, 0.5), (2.0, 1.0), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (0.02, 1.05), (1.5, 20.0)]
 STICKING = [(0.1, 0.5), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (1e-6, 0.7), (1e-6, 1.0), (1e-5, 5.0), (1.5, 20.0)]
 SLIDING = [(2.0, 1.0), (0.5, 0.3), (1.0, 3.0), (20.0, 0.01), (30.0, 400.0), (0.05, 0.3)]
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
-    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
 
 
 # --- against the reference ----------------------------------------------------------------------------
@@ -224,16 +218,6 @@ def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> Non
     found = solve(v, y)
     assert found.ok
     assert found.mu_ratio == close(steady.border(y)[1], rel=1e-14)
-
-
-def test_mu_minus_its_smooth_continuation_starts_quadratically_below_the_border(sweep: Sweep) -> None:
-    y = np.array([0.3, 1.0, 5.0])
-    crit = sweep.solve("border", np.ones(3), y)["deficit"]
-    gaps = []
-    for distance in (2e-4, 1e-4):
-        v = crit * (1.0 - distance)
-        gaps.append(sweep.solve("full", v, y)["mu_ratio"] - sweep.solve("continuous", v, y)["mu_ratio"])
-    assert np.log2(np.abs(gaps[0] / gaps[1])) == close(2.0, abs=0.02)
 
 
 # --- inputs and failures ------------------------------------------------------------------------------

@@ -137,16 +137,14 @@ def test_a_named_geometry_is_its_function() -> None:
 
 @pytest.mark.parametrize(
     ("geometry", "given", "said"),
-    [
-        ("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
-        ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
-        ("cylinder", {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3}, "oscillation must be given: how"),
-        ("ball", {"length": 1.0}, "length must be left out: unknown field"),
-        ("ball", {"radius": "5mm"}, "radius must be a real number"),
-        ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
-        ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0"),
-    ],
-)
+    [("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
+     ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
+     ("cylinder", {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3}, "oscillation must be given: how"),
+     ("ball", {"length": 1.0}, "length must be left out: unknown field"),
+     ("ball", {"radius": "5mm"}, "radius must be a real number"),
+     ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
+     ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0")],
+)  # fmt: skip
 def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         contact_of(geometry, **given)

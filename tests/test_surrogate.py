@@ -2,13 +2,11 @@
 
 import json
 import math
-import threading
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from builder.assemble import ABS_TO_REL
 from builder.measure import SEAMS
@@ -17,7 +15,7 @@ from builder.sweep import Sweep
 from mumacro import InputError, Surrogate
 from mumacro.charts import NAMES, SIGMA_CUT, SOURCES, Y_STICK_HI, Y_STICK_LO
 from mumacro.closed_forms import outer
-from tests.cases import CASE, UNIT, Array, Case, log_uniform, opened, tables
+from tests.cases import CASE, Array, Case, log_uniform, opened, tables
 from tests.comparing import close
 
 table = tables()
@@ -176,13 +174,6 @@ def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
             assert one.gradient_bound[name] == whole.gradient_bound[name][i]
 
 
-def test_an_answer_shows_what_it_holds_and_no_more(fine: Surrogate) -> None:
-    found, columns = fine.evaluate(**CASE, gradient=True), fine.evaluate(**{**CASE, "v0": np.array([0.0, 0.01])})
-    assert all(f"{part}=" in repr(found) for part in ("mu_macro", "regime", "source", "v_tilde", "gradient_bound"))
-    assert not any(part in repr(columns) for part in ("gradient", "v_tilde"))
-    assert not hasattr(found, "__dict__")
-
-
 @pytest.mark.parametrize("n", [1, 2, 300])
 def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(fine: Surrogate, n: int) -> None:
     v0 = np.linspace(0.0, 0.02, n)
@@ -218,46 +209,7 @@ def test_description_is_plain_data_and_the_self_check_passes(table: Surrogate) -
 # --- threads and xarray -------------------------------------------------------------------------------
 
 
-def test_threads_may_evaluate_at_once(fine: Surrogate) -> None:
-    rng = np.random.default_rng(4)
-    v, y = log_uniform(rng, 1e-3, 1e3, 30_000), log_uniform(rng, 1e-3, 1e3, 30_000)
-
-    def ask() -> tuple[Array, ...]:
-        return fine.mu_ratio(v, y), fine.evaluate(**UNIT, y0=y, v0=v, gradient=True).gradient["v0"], fine.power(v, y)
-
-    expected, wrong = ask(), list[object]()
-
-    def work() -> None:
-        try:
-            for _ in range(4):
-                wrong.extend(
-                    name for name, a, b in zip("mgp", ask(), expected, strict=True) if not np.array_equal(a, b)
-                )
-        except Exception as error:
-            wrong.append(error)
-
-    threads = [threading.Thread(target=work) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert wrong == []
-
-
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])
 def test_threads_out_of_bounds_are_refused(fine: Surrogate, threads: Any) -> None:
     with pytest.raises(InputError, match="threads"):
         Surrogate.open(fine.path, threads=threads)
-
-
-def test_xarray_applies_it_also_on_dask_chunks(fine: Surrogate) -> None:
-    dask_array = pytest.importorskip("dask.array", reason="dask is an optional way to spread the work")
-    values = np.geomspace(1e-3, 1e3, 40)
-    v = xr.DataArray(dask_array.from_array(values, chunks=7), dims="v_tilde", coords={"v_tilde": values})
-    y = xr.DataArray(dask_array.from_array(values[:30], chunks=11), dims="y_tilde")
-    plane = xr.apply_ufunc(fine.mu_ratio, v, y, dask="parallelized", output_dtypes=[float])
-    assert plane.chunks is not None
-    assert plane.dims == ("v_tilde", "y_tilde")
-    for one in (plane.compute(), xr.apply_ufunc(fine.mu_ratio, v.compute(), y.compute())):
-        assert np.array_equal(one.values, fine.mu_ratio(values[:, None], values[:30]))
-        assert np.array_equal(one.v_tilde, values)

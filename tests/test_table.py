@@ -15,18 +15,17 @@ from typing import Any
 import netCDF4
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from builder.assemble import build_table
-from builder.rounding import STEPS, bits, round_block, to_bits, to_step
+from builder.rounding import STEPS, bits, to_bits, to_step
 from builder.sweep import Sweep
 from mumacro import InputError, Surrogate, TableError, charts
 from mumacro.cells import nodes
 from mumacro.charts import BORDER_PIECES, CHARTS, NAMES
-from mumacro.table import MOST_BYTES, MOST_CELLS, Block, Table, _digest, read_table, write_table
+from mumacro.table import MOST_BYTES, MOST_CELLS, Table, _digest, read_table, write_table
 from mumacro.writing import BusyError, alone_in, write_whole
+from tests.cases import Array
 
-Array = NDArray[np.float64]
 Edit = Callable[..., object]
 CORNER, BLOCK = NAMES.index("corner"), "border/blocks/corner"
 PLAIN = ("v_tilde", "y_tilde", "mu_ratio", "stick_fraction", "error_estimate", "v_tilde_crit")
@@ -369,13 +368,3 @@ def test_digits_are_kept_at_every_size(values: Array, digits: int) -> None:
         mantissa = np.ldexp(np.frexp(rounded)[0], digits)
         assert np.array_equal(mantissa, np.rint(mantissa))
     assert np.all(np.diff(near[np.argsort(values)]) >= 0.0)
-
-
-def test_a_rounded_block_keeps_all_but_its_last_digits() -> None:
-    nodes = {"mu_ratio": np.full((2, 1), 1.0 / 3.0), "power": np.full((2, 1), 2.0 / 3.0)}
-    block = Block(np.zeros(2), np.zeros(1), (1, 2), nodes)
-    block.errors["power"] = np.array([0.5, 0.0, 0.25])
-    rounded = round_block(block, 1e-3)
-    assert rounded.nodes.keys() == nodes.keys()
-    assert (rounded.cells, rounded.errors) == (block.cells, block.errors)
-    assert all(np.array_equal(rounded.nodes[name], to_step(nodes[name], 1e-3)) for name in nodes)
