@@ -16,15 +16,13 @@ from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE
 from mumacro.inputs import FIELDS
 from tests import naive
-from tests.cases import CASE, UNIT, Array, Case, log_uniform, opened, tables
+from tests.cases import CASE, UNIT, Array, Case, log_uniform, tables
 from tests.comparing import close
 
 table = tables()
 
 
-@pytest.fixture(scope="module")
-def fine() -> Surrogate:
-    return opened(1e-12)
+fine = tables(1e-12)
 
 
 # --- inputs with groups that are not doubles ----------------------------------------------------------
@@ -157,9 +155,7 @@ def test_slopes_lie_within_their_bounds(table: Surrogate, sweep: Sweep, case: st
 
 @pytest.mark.slow
 @pytest.mark.parametrize("distance", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
-def test_slopes_of_mu_lie_within_their_bounds_beside_the_border(
-    table: Surrogate, sweep: Sweep, distance: float
-) -> None:
+def test_slopes_of_mu_lie_within_bounds_beside_the_border(table: Surrogate, sweep: Sweep, distance: float) -> None:
     y = np.tile(np.geomspace(1e-3, 1e5, 60), 2)
     side = np.repeat([-distance, distance], 60)
     assert uncovered(table, sweep, "mu_ratio", table.v_tilde_crit(y) * (1.0 + side), y) == []

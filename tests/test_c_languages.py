@@ -12,7 +12,7 @@ from builder.export import export_table
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from tests import compilers
-from tests.cases import Case
+from tests.cases import Case, tables
 from tests.comparing import close
 from tests.serving import CASE
 
@@ -22,9 +22,7 @@ OBJECTS = ("mumacro.o", "mumacro_table.o")
 V0 = [1e-6, 1e-3, 0.01, 0.0711, 0.5, 20.0]
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Any:
-    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+table = tables(1e-4)
 
 
 #: the Fortran compiler for code of Abaqus, whose dummy arguments are not all used

@@ -8,7 +8,7 @@ import pytest
 from numpy.polynomial import chebyshev
 
 from mumacro import charts
-from mumacro.cells import WIDTH, cell_positions, cells_1d, cells_2d, chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.cells import WIDTH, cell_positions, cells_1d, cells_2d, nodes
 from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
 from mumacro.library import Kernel, kernels
 from tests.cases import Array
@@ -30,16 +30,6 @@ def at(coef: Array, cells: tuple[int, int], x: float, z: float) -> float:
     """Value at (x, z) in [0, 1]^2 of cells in the layout of :func:`cells_2d`."""
     i, j = min(int(x * cells[0]), cells[0] - 1), min(int(z * cells[1]), cells[1] - 1)
     return value(coef[i * cells[1] + j], 2.0 * (x * cells[0] - i) - 1.0, 2.0 * (z * cells[1] - j) - 1.0)
-
-
-@pytest.mark.parametrize("n", [1, 3, 8, 21])
-def test_coefficients_interpolate_along_every_axis(n: int) -> None:
-    rng = np.random.default_rng(n)
-    values = rng.normal(size=n)
-    assert interpolation_matrix(n, nodes(n, -1.0, 1.0)) @ chebyshev_coefficients(values) == close(values, abs=1e-13)
-    expected = rng.normal(size=(n, 9))
-    plane: Any = chebyshev.chebgrid2d(nodes(n, -1.0, 1.0), nodes(9, -1.0, 1.0), expected)
-    assert chebyshev_coefficients(plane) == close(expected, abs=1e-13)
 
 
 @pytest.mark.parametrize("cells", [1, 3, 8])

@@ -23,7 +23,7 @@ from mumacro.charts import CONTINUOUS, REGIME_OF_SOURCE, REGIMES, Y_CONT, Y_HIGH
 from mumacro.inputs import FIELDS
 from mumacro.surrogate import KNOWN_CONTINUOUS, KNOWN_STICK_SLIP
 from mumacro.table import read_table
-from tests.cases import Array
+from tests.cases import Array, tables
 from tests.comparing import close
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -38,9 +38,7 @@ def table(request: pytest.FixtureRequest) -> Surrogate:
     return Surrogate.open(request.param)
 
 
-@pytest.fixture(scope="module")
-def fine() -> Surrogate:
-    return Surrogate.open(PATHS[2])
+fine = tables(1e-10)
 
 
 # --- against fresh solves -------------------------------------------------------------------------------
@@ -81,6 +79,8 @@ def test_bounds_hold_on_the_border_in_the_corner_and_at_creeping_speeds(table: S
     gaps = np.concatenate([-np.geomspace(1e-12, 0.2, 12), [0.0], np.geomspace(1e-12, 0.4, 12)])
     compare(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, 1.0 + gaps)))
     compare(table, sweep, *(a.ravel() for a in np.broadcast_arrays(v, np.geomspace(1e-2, 1e12, 30))))
+    # one digit of y~ changes mu~ by at most the root of two digits, also at the cusp
+    assert table.ratio_with_bound(np.geomspace(1e-300, 1e-9, 400), 1.0)[1].max() <= 1e-7 + table.tolerance
 
 
 def test_the_reference_lies_within_tolerance_and_bounds(table: Surrogate, reference: Any) -> None:
@@ -116,7 +116,8 @@ def test_a_table_meets_the_check_values_of_six_inputs_within_its_bounds(table: S
 def test_known_answers_are_the_models_and_a_wrong_table_does_not_meet_them() -> None:
     assert solve(0.1, 0.5).mu_ratio == close(KNOWN_STICK_SLIP, abs=2e-16)
     assert solve(2.0, 1.0).mu_ratio == close(KNOWN_CONTINUOUS, abs=2e-16)
-    Surrogate.open(PATHS[1]).self_check()
+    for path in PATHS:
+        Surrogate.open(path).self_check()
     wrong = read_table(PATHS[1])
     for block in wrong.blocks:
         block.nodes["mu_ratio"] *= 1.001
@@ -135,22 +136,6 @@ def test_seams_are_invisible_and_mu_rises_with_speed_and_falls_with_amplitude(ta
         v = np.array([1e-9, 1e-3, 0.1, 0.5, 3.0, 40.0, 1e4])
         mu = np.stack([table.mu_ratio(v, b) for b in (math.nextafter(y, 0.0), y, math.nextafter(y, math.inf))])
         assert np.all(np.ptp(mu, axis=0) <= 2.0 * ABS_TO_REL * table.tolerance * mu.max(axis=0) + 1e-14)
-
-
-def test_range_limits_and_ends(table: Surrogate) -> None:
-    rng = np.random.default_rng(2)
-    v, y = 10.0 ** rng.uniform(-300, 300, 20_000), 10.0 ** rng.uniform(-300, 300, 20_000)
-    mu = table.mu_ratio(v, y)
-    assert np.all((mu >= 0.0) & (mu <= 1.0))
-    assert np.all(table.mu_ratio(v, 0.0) == 1.0)
-    assert table.mu_ratio(math.inf, 2.0) == 1.0
-    assert table.mu_ratio(0.0, 0.6) == close(0.8, rel=1e-15)
-    assert table.mu_ratio(0.0, 1.0) == table.mu_ratio(0.0, 3.0) == 0.0
-    y = np.array([0.1, 0.5, 0.74, 0.76, 0.9, 0.999])
-    assert table.mu_ratio(1e-290, y) == close(np.sqrt((1.0 - y) * (1.0 + y)), abs=table.tolerance)
-    assert table.mu_ratio(1e-250, 2.0) == close(1.74344269e-250, rel=max(1e-8, 10 * table.tolerance))
-    v = np.array([1e-30, 1e-18, 1e-12])
-    assert table.mu_ratio(v, 1.0) == close(np.cbrt(math.pi * v), rel=1e-7 + 10 * table.tolerance)
 
 
 def test_slopes_go_on_across_seams_and_stay_bounded_down_to_the_border(fine: Surrogate) -> None:

@@ -11,16 +11,14 @@ from scipy.special import ellipe, ellipk
 
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
-from tests.cases import CASE, UNIT, Case, opened
+from tests.cases import CASE, UNIT, Case, opened, tables
 from tests.comparing import close
 from tests.naive import march_ball
 
 BALL: Case = {"contact": "ball"}
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-12)
+table = tables(1e-12)
 
 
 def points(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

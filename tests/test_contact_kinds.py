@@ -11,7 +11,7 @@ import pytest
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.contact import kind_of
-from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, opened, without
+from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, opened, tables, without
 from tests.comparing import close
 
 BALL: Case = {"contact": "ball"}
@@ -19,9 +19,7 @@ NORMAL: Case = {"direction": "normal"}
 every_other_pair = pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-10)
+table = tables(1e-10)
 
 
 @every_other_pair

@@ -12,16 +12,14 @@ from mpmath import ellipk, mpf, pi, workdps
 
 from mumacro import InputError, Surrogate
 from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, as_columns, check_inputs
-from tests.cases import CASE, Case, log_uniform, opened, without
+from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
 
 positive = st.floats(min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False)
 any_inputs = st.fixed_dictionaries(dict.fromkeys(FIELDS, positive))
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-10)
+table = tables(1e-10)
 
 
 def exactly(numerator: list[float], denominator: list[float]) -> float:
@@ -119,9 +117,7 @@ def test_rigid_contact_is_the_elliptic_integral(table: Surrogate, y0: float, ome
         ({"v0": 0.0, "k": None}, 0.0),
     ],
 )
-def test_groups_that_leave_double_precision_still_have_their_limit(
-    table: Surrogate, inputs: Case, expected: float
-) -> None:
+def test_groups_that_leave_double_precision_have_their_limit(table: Surrogate, inputs: Case, expected: float) -> None:
     found = table.evaluate(**{**CASE, **inputs})
     assert abs(found.mu_ratio - expected) <= found.error_bound / CASE["mu0"] + 1e-15
     assert found.mu_ratio == close(expected, rel=1e-12, abs=1e-280)
@@ -187,9 +183,7 @@ def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: st
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
-def test_an_illegal_value_of_an_array_affects_only_its_case(
-    table: Surrogate, field: str, bad: float, asked: Case
-) -> None:
+def test_an_illegal_value_of_an_array_spoils_its_case(table: Surrogate, field: str, bad: float, asked: Case) -> None:
     column = [CASE[field], bad, CASE[field]]
     found = table.evaluate(**{**CASE, field: column}, **asked)
     sound = table.evaluate(**CASE, gradient=True)

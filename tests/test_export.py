@@ -20,7 +20,7 @@ from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table
 from mumacro import Surrogate
 from mumacro.errors import TableError
 from mumacro.table import Table, read_table
-from tests.cases import Capture
+from tests.cases import Capture, Case
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -134,9 +134,7 @@ def test_c_in_three_files_is_written_twice_alike(tmp_path: Path) -> None:
     assert one == two
 
 
-def test_octave_reads_the_mat_file(
-    table: Table, written: Any, repository: Path, surrogate: Surrogate, case: dict[str, Any]
-) -> None:
+def test_octave_reads_it(table: Table, written: Any, repository: Path, surrogate: Surrogate, case: Case) -> None:
     if shutil.which("octave-cli") is None:
         pytest.skip("octave-cli is not installed")
     command = ["octave-cli", "--norc", "examples/octave_mat.m", str(written / "grid.mat")]

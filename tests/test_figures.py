@@ -20,6 +20,7 @@ from mumacro import Surrogate
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
+Shown = dict[str, list[Panel]]  # by figure
 AMPLITUDES: dict[
     str, tuple[Any, Callable[..., Any]]
 ] = {  # of the figures whose lines are mu~ at these y~, over v~ times the scale
@@ -29,7 +30,7 @@ AMPLITUDES: dict[
 
 
 @pytest.fixture(scope="module")
-def shown(surrogate: Surrogate) -> dict[str, list[Panel]]:
+def shown(surrogate: Surrogate) -> Shown:
     """What every figure shows."""
     return {name: panels(surrogate) for name, panels in FIGURES.items()}
 
@@ -58,15 +59,13 @@ SHOWN: list[tuple[str, str, Callable[[Any], Any], float, float]] = [
 
 
 @pytest.mark.parametrize(("name", "label", "law", "rel", "within"), SHOWN)
-def test_a_curve_is_what_its_label_says(
-    shown: dict[str, list[Panel]], name: str, label: str, law: Callable[[Any], Any], rel: float, within: float
-) -> None:
+def test_a_curve_is_as_its_label_says(shown: Shown, name: str, label: str, law: Any, rel: float, within: float) -> None:
     curve = next(curve for curve in shown[name][0].curves if label in curve.label)
     at = np.flatnonzero(curve.x > 0.0)[:: max(1, curve.x.size // 40)]
     assert curve.y[at] == close(np.asarray(law(curve.x[at])), rel=rel, abs=within)
 
 
-def test_the_surface_is_the_models(shown: dict[str, list[Panel]]) -> None:
+def test_the_surface_is_the_models(shown: Shown) -> None:
     surface = shown["fig07_surface"][0].curves[0]
     assert surface.z is not None
     for i, j in ((1, 1), (20, 120), (90, 60), (180, 240), (60, 200)):
@@ -74,7 +73,7 @@ def test_the_surface_is_the_models(shown: dict[str, list[Panel]]) -> None:
 
 
 @pytest.mark.parametrize("name", AMPLITUDES)
-def test_lines_of_constant_amplitude_are_the_models(shown: dict[str, list[Panel]], name: str) -> None:
+def test_lines_of_constant_amplitude_are_the_models(shown: Shown, name: str) -> None:
     amplitudes, scale = AMPLITUDES[name]
     (panel,) = shown[name]
     for y, curve in zip(amplitudes, panel.curves, strict=False):
@@ -87,7 +86,7 @@ def test_lines_of_constant_amplitude_are_the_models(shown: dict[str, list[Panel]
         assert (x, mu) == close(min(scaled, key=lambda end: abs(end[0] - x) + abs(end[1] - mu)), rel=1e-14)
 
 
-def test_the_master_curve_rises_from_zero_to_one_at_the_border(shown: dict[str, list[Panel]]) -> None:
+def test_the_master_curve_rises_from_zero_to_one_at_the_border(shown: Shown) -> None:
     (panel,) = shown["fig09_master_curve"]
     for y, curve in zip(np.arange(1, 10) * 0.1, panel.curves, strict=False):
         (crit, top), low = border(y), np.sqrt(1.0 - y * y)
@@ -98,7 +97,7 @@ def test_the_master_curve_rises_from_zero_to_one_at_the_border(shown: dict[str, 
     assert np.abs(np.interp(limit.x, first.x, first.y) - limit.y).max() < 0.01
 
 
-def test_marks_are_at_the_border_and_at_rest(shown: dict[str, list[Panel]]) -> None:
+def test_marks_are_at_the_border_and_at_rest(shown: Shown) -> None:
     (panel,) = shown["fig11_friction_law"]
     crit, top = border(0.6)
     mark = labelled(panel, "border")
@@ -110,9 +109,7 @@ def test_marks_are_at_the_border_and_at_rest(shown: dict[str, list[Panel]]) -> N
 
 
 @pytest.mark.parametrize(("v", "y"), CASES)
-def test_the_cycle_that_is_drawn_is_the_steady_one(
-    surrogate: Surrogate, shown: dict[str, list[Panel]], v: float, y: float
-) -> None:
+def test_the_drawn_cycle_is_the_steady_one(surrogate: Surrogate, shown: Shown, v: float, y: float) -> None:
     tau, u, sticks = steady_cycle(v, y)
     assert tau[-1] == close(2.0 * np.pi, rel=1e-14)
     assert np.hypot(*u.T).max() <= 1.0 + 1e-12

@@ -39,9 +39,7 @@ def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> An
 @pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
 @pytest.mark.parametrize("contact", CONTACTS)
-def test_inputs_are_recovered_within_their_covariance(
-    surrogate: Surrogate, contact: Any, unknowns: Any, given: Any
-) -> None:
+def test_inputs_lie_within_their_covariance(surrogate: Surrogate, contact: Any, unknowns: Any, given: Any) -> None:
     """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for itself."""
     from scipy.stats import binom, chi2
     from scipy.stats import f as fisher

@@ -16,7 +16,7 @@ from mumacro import Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.inputs import FIELDS
 from tests import compilers
-from tests.cases import CASE
+from tests.cases import CASE, tables
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -24,9 +24,7 @@ pytestmark = pytest.mark.slow
 FORMATS = {"fmu": 2, "fmu3": 3}
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Any:
-    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+table = tables(1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -155,9 +153,7 @@ def test_directional_derivatives_are_the_gradient(unit: Path, fmpy: Any, table: 
 @pytest.mark.parametrize(
     ("contact", "direction"), [("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
 )
-def test_contacts_and_directions(
-    unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, contact: Any, direction: Any
-) -> None:
+def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, contact: Any, direction: Any) -> None:
     kind = {"contact": CONTACTS.index(contact), "direction": DIRECTIONS.index(direction)}
     case = {name: value for name, value in CASE.items() if direction != "normal" or name != "y0"}
     case |= {"Fz_amplitude": 4.0} if direction == "normal" else {}
@@ -206,9 +202,7 @@ def test_the_force_passes_through_zero_with_its_derivatives(unit: Path, fmpy: An
     assert made.get("v_rest") == [1e-3]
 
 
-def test_states_are_kept_and_illegal_inputs_are_discarded(
-    unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path
-) -> None:
+def test_states_are_kept_and_illegal_inputs_discarded(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     expected = table.evaluate(CASE).mu_macro
     assert made.get("mu_macro") == [close(expected, rel=1e-13)]

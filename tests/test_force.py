@@ -12,7 +12,7 @@ from builder.c.source import write_c
 from mumacro import Element, Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from tests import compilers
-from tests.cases import Case, every_pair
+from tests.cases import Case, every_pair, tables
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -25,10 +25,7 @@ CASES = [CASE, {**CASE, "y0": 3e-6}, {**CASE, "y0": 9e-6}, {**CASE, "y0": 0.0}, 
 NUMBER, WHOLE, ARRAY = ctypes.c_double, ctypes.c_int, ctypes.POINTER(ctypes.c_double)
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Surrogate:
-    """A table that is quick to compile."""
-    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+table = tables(1e-4)
 
 
 @pytest.fixture(scope="module")

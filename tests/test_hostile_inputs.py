@@ -13,7 +13,7 @@ import pytest
 
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES
-from tests.cases import CASE, opened
+from tests.cases import CASE, tables
 
 #: methods of (v~, y~)
 PLANE: dict[str, Callable[..., Any]] = {
@@ -38,9 +38,7 @@ NO_NUMBERS: dict[str, Any] = {
 OUT_OF_BOUNDS = [-1.0, -1e6, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-4)
+table = tables(1e-4)
 
 
 def parts(found: Any) -> tuple[Any, ...]:

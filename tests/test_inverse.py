@@ -51,13 +51,6 @@ def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: C
     assert any(root.low <= value <= root.high for root in solution.roots[0])
 
 
-def test_a_root_is_enclosed_to_the_tables_error(surrogate: Surrogate) -> None:
-    answer = surrogate.evaluate(**CASE, gradient=True)
-    root = only_root(solve_for(surrogate, "v0", answer.mu_macro, without(CASE, "v0")))
-    width = answer.error_bound / answer.gradient["v0"]
-    assert [root.high - 0.01, 0.01 - root.low] == close([width, width], rel=0.05)
-
-
 def test_an_enclosure_on_a_plateau_spans_it(surrogate: Surrogate) -> None:
     # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of this one on
     case: Case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
@@ -230,9 +223,7 @@ REFUSED: list[tuple[str, Any, Case, str]] = [  # direction, the first arguments,
 
 
 @pytest.mark.parametrize(("direction", "asked", "changed", "said"), REFUSED)
-def test_what_cannot_be_asked_is_refused_with_the_reason(
-    surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str
-) -> None:
+def test_a_bad_question_is_refused(surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str) -> None:
     keywords, _, case = as_kind(CASE, ("spring", direction))
     given = {**without(case, asked[0]), **changed}
     gone = [name for name, value in changed.items() if value is None and name != "k"]
@@ -264,9 +255,7 @@ def test_the_crossings_are_all_changes_of_the_regime(surrogate: Surrogate, pair:
 
 
 @pytest.mark.parametrize(("share", "expected"), [(1.0 + 1e-9, 2), (1.0 - 1e-9, 0)])
-def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(
-    surrogate: Surrogate, share: Any, expected: Any
-) -> None:
+def test_a_ray_at_the_border_crosses_it_twice_or_never(surrogate: Surrogate, share: Any, expected: Any) -> None:
     closest = 1.290791
     ratio = share * closest / surrogate.v_tilde_crit(closest)  # y~ / v~
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}

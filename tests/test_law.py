@@ -129,9 +129,7 @@ def test_the_articles_formulas_are_refused_for_another_contact(surrogate: Surrog
      ("k", {**without(LINE, "k"), "v0": 0.01, **INTERVAL}, "across", "k_range .* left out where k is the swept"),
      ("Fz_amplitude", without(CASE, "y0"), "normal", "Fz_amplitude at index 1 must be >= 0 and below Fz")],
 )  # fmt: skip
-def test_a_bad_interval_or_amplitude_is_named(
-    surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
-) -> None:
+def test_a_bad_interval_is_named(surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         friction_law(surrogate, along, np.array([1.0, 10.0]), case, direction=direction)
 
@@ -177,9 +175,7 @@ def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
      ("continuous", 0.01, (1e-3, 1e3), 1e-8), ("continuous", 1.0, (1e3, 1e6), 1e-6), ("rigid", 1.0, (1e3, 1e6), 1e-6),
      ("corner", 1.0, (1e-12, 1e-9), 1e-8)],
 )  # fmt: skip
-def test_the_approximations_hold_where_they_should(
-    surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any
-) -> None:
+def test_approximations_hold_where_they_should(surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any) -> None:
     law, found, _ = columns(surrogate, y, np.geomspace(ends[0], ends[1], 31))
     assert np.max(np.abs(found[name] - law.answer.mu_ratio)) < off
 

@@ -83,9 +83,7 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
         ({"k": None, "v0": 0.0, "y0": 0.0}, math.inf), ({"k": None}, 0.0), ({"k": math.inf}, 0.0),
     ],
 )  # fmt: skip
-def test_without_slip_nothing_settles_and_rigid_contact_at_once(
-    surrogate: Surrogate, changed: Any, periods: Any
-) -> None:
+def test_without_slip_nothing_settles_and_rigid_at_once(surrogate: Surrogate, changed: Any, periods: Any) -> None:
     found = settling(surrogate, **{**CASE, **changed})
     assert (found.periods, found.time, found.slip_path) == (periods, periods, 0.0 if periods else math.inf)
 

@@ -94,15 +94,9 @@ def workers() -> Iterator[Any]:
 
         return call
 
-    def joblib(backend: str) -> Callable[..., Any]:
-        def call(function: Any, argument: Any) -> Any:
-            parallel = pytest.importorskip("joblib")
-            return parallel.Parallel(2, backend=backend)([parallel.delayed(function)(argument)] * 2)[0]
-
-        return call
-
-    def dask(function: Any, argument: Any) -> Any:
-        return pytest.importorskip("dask").delayed(function)(argument).compute(scheduler="threads")
+    def joblib(function: Any, argument: Any) -> Any:
+        parallel = pytest.importorskip("joblib")
+        return parallel.Parallel(2, backend="loky")([parallel.delayed(function)(argument)] * 2)[0]
 
     def distributed(function: Any, argument: Any) -> Any:
         library = pytest.importorskip("distributed")
@@ -113,9 +107,7 @@ def workers() -> Iterator[Any]:
     for method in ("fork", "spawn") if hasattr(os, "fork") else ("spawn",):
         context = multiprocessing.get_context(method)
         yield pytest.param(executor(lambda c=context: ProcessPoolExecutor(1, mp_context=c)), id=method)
-    for backend in ("loky", "threading"):
-        yield pytest.param(joblib(backend), id=f"joblib {backend}")
-    yield pytest.param(dask, id="dask threads")
+    yield pytest.param(joblib, id="joblib")
     yield pytest.param(distributed, id="dask distributed")
 
 

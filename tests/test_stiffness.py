@@ -61,9 +61,7 @@ def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_l
 
 
 @pytest.mark.parametrize(("across", "along"), [(1.3, 1.0), (1.0, 1.3)])
-def test_of_two_stiffnesses_the_one_of_the_oscillation_belongs_in_the_model(
-    surrogate: Surrogate, across: Any, along: Any
-) -> None:
+def test_of_two_stiffnesses_the_oscillations_is_the_models(surrogate: Surrogate, across: Any, along: Any) -> None:
     """Eqs. (9) to (12) with two springs, marched: ``across`` along the sliding, ``along`` along the oscillation."""
     v, y = (x.ravel() for x in np.meshgrid([0.2, 0.6, 2.0], [0.3, 0.8, 1.2, 3.0, 10.0], indexing="ij"))
     steps, springs = 1000, np.array([[across], [along]])

@@ -112,7 +112,7 @@ def test_a_damaged_checkpoint_is_solved_again(tmp_path: Path, damage: bytes | No
 
 
 @pytest.mark.parametrize(("place", "pattern"), compiled.SOURCES)
-def test_the_digest_of_a_result_covers_its_sources_and_its_compiler(
+def test_the_digest_covers_sources_and_compiler(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: Path, pattern: str
 ) -> None:
     digests = {compiled.source_digest()}

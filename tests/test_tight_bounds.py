@@ -20,17 +20,14 @@ from mumacro.charts import CONTINUOUS, NAMES, QUANTITIES, QUANTITY_NAMES, REGIME
 from mumacro.contact import rules
 from mumacro.inverse import solve_for
 from mumacro.settling import settling
-from tests.cases import UNIT, Array, Case, opened
+from tests.cases import UNIT, Array, Case, opened, tables
 from tests.comparing import close
 
 KINDS = [kind for kind, _, _ in CASES]
 Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    """A table whose errors are far above the solver's."""
-    return opened(1e-7)
+table = tables(1e-7)
 
 
 # --- every operation of a coarse table against the finest, at the points of every kind ---------------------
@@ -99,9 +96,7 @@ def test_a_bound_may_not_be_halved_and_is_never_missed(operation: str, coarse: f
 
 @pytest.mark.parametrize("direction", ["across", "along"])
 @pytest.mark.parametrize("tolerance", [1e-4, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-7, 1e-10))])
-def test_a_ball_is_never_beyond_its_bounds_and_its_rules_err_as_much_as_they_state(
-    tolerance: float, direction: str
-) -> None:
+def test_a_ball_is_never_beyond_its_bounds_and_its_rules_err_as_stated(tolerance: float, direction: str) -> None:
     """Over all of the legal range, on a coarse table, and with its rules on the cells of the finest table."""
     v, y = hard_points(3000, direction == "along", seed=11)
     truths, found = asked(opened(1e-12), v, y, direction, rules(1e-12)), {}
@@ -175,9 +170,7 @@ def test_bounds_of_slopes_hold_where_the_regime_is_uncertain_and_next_to_it(coar
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.1, 1.88), (1.88, 1e4)])
-def test_what_the_border_does_to_the_stick_fraction_is_bounded_tightly(
-    table: Surrogate, sweep: Sweep, low: float, high: float
-) -> None:
+def test_what_the_border_does_to_stick_is_well_bounded(table: Surrogate, sweep: Sweep, low: float, high: float) -> None:
     """Between the border and the table's, where one says stick-slip and the other continuous sliding."""
     y = np.geomspace(low, high, 2000)
     v = np.minimum(sweep.solve("border", np.ones_like(y), y)["deficit"], table.v_tilde_crit(y))
@@ -187,9 +180,7 @@ def test_what_the_border_does_to_the_stick_fraction_is_bounded_tightly(
 
 
 @pytest.mark.parametrize(("share", "certain"), [(0.9, False), (1.1, True)])
-def test_a_regime_is_uncertain_where_the_border_may_lie_within_its_bound(
-    table: Surrogate, share: float, certain: bool
-) -> None:
+def test_a_regime_is_uncertain_within_the_bound_of_the_border(table: Surrogate, share: float, certain: bool) -> None:
     y = np.geomspace(1e-4, 1e6, 200)
     for side in (-share, share):
         v = table.v_tilde_crit(y) * (1.0 + side * table.border.max_rel_error)
@@ -327,14 +318,6 @@ def test_an_enclosure_that_ends_at_the_border_has_the_bound_of_the_other_side() 
     ((root,),) = solve_for(opened(1e-4), "v0", float(opened(1e-12).evaluate(**case, v0=true).mu_macro), case).roots
     assert root.regime == "stick_slip"
     assert root.low <= true <= root.high
-
-
-@pytest.mark.parametrize(("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)])
-def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(v: float, y: float) -> None:
-    coarse = opened(1e-4)
-    found = settling(coarse, **UNIT, y0=y, v0=v)
-    less = 2.0 * math.pi * (v * coarse.ratio_with_bound(v, y)[1] + coarse.power_with_bound(v, y)[1])
-    assert found.error_bound == close(math.log(100.0) / (found.slip_path - less) - found.periods, rel=1e-9)
 
 
 def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Case) -> None:

@@ -15,7 +15,7 @@ from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, 
 from mumacro import Surrogate
 from mumacro.charts import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
 from mumacro.table import read_table
-from tests.cases import Array, Case
+from tests.cases import Array, Case, tables
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -23,9 +23,7 @@ pytestmark = pytest.mark.slow
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-7.nc"
 
 
-@pytest.fixture(scope="module")
-def sound() -> Surrogate:
-    return Surrogate.open(TABLE)
+sound = tables(1e-7)
 
 
 @pytest.fixture(scope="module")
