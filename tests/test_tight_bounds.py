@@ -320,6 +320,14 @@ def test_an_enclosure_that_ends_at_the_border_has_the_bound_of_the_other_side() 
     assert root.low <= true <= root.high
 
 
+@pytest.mark.parametrize(("v", "y"), [(0.3, 0.3), (0.02, 0.3), (0.05, 1.2), (2.0, 30.0), (1e-5, 3.0)])
+def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(v: float, y: float) -> None:
+    coarse = opened(1e-4)
+    found = settling(coarse, **UNIT, y0=y, v0=v)
+    less = 2.0 * math.pi * (v * coarse.ratio_with_bound(v, y)[1] + coarse.power_with_bound(v, y)[1])
+    assert found.error_bound == close(math.log(100.0) / (found.slip_path - less) - found.periods, rel=1e-9)
+
+
 def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Case) -> None:
     """The part of every input alone, its bound too, then all together."""
     each = {"mu0": 0.01, "Fz": 0.5, "k": 2e5, "y0": 3e-7, "omega": 2e3, "v0": 1e-3}
