@@ -14,8 +14,8 @@ from mumacro.contact import kind_of
 Array = NDArray[np.float64]
 Case = dict[str, Any]  # inputs by name
 Capture = pytest.CaptureFixture[str]
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
-UNIT = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "omega": 1.0}  # v~ = v0 and y~ = y0, to the last digit
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+UNIT: Case = {"mu0": 0.5, "Fz": 2.0, "k": 1.0, "omega": 1.0}  # v~ = v0 and y~ = y0, to the last digit
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 #: every contact with every direction that it has
 PAIRS = [("spring", "across"), ("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
@@ -33,12 +33,12 @@ def tables(*tolerances: float) -> Any:
     return table
 
 
-def without(case: Mapping[str, Any], *names: str) -> dict[str, Any]:
+def without(case: Mapping[str, Any], *names: str) -> Case:
     """A case without some of its inputs."""
     return {name: value for name, value in case.items() if name not in names}
 
 
-def as_kind(case: Mapping[str, Any], pair: tuple[str, str], share: float = 0.4) -> tuple[Any, Any, dict[str, Any]]:
+def as_kind(case: Mapping[str, Any], pair: tuple[str, str], share: float = 0.4) -> tuple[Case, Any, Case]:
     """The keywords of a pair, its fields, and ``case`` with Fz_amplitude = ``share`` Fz where the pair has it."""
     kind = kind_of(*pair)
     return kind.names, kind.fields, kind.as_given({**case, "y0": share * case["Fz"]} if kind.normal else case)

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from builder.sweep import Sweep
 from mumacro import Surrogate
 from tests import browser as browsing
 from tests import serving as servers
+from tests.cases import CASE, Array, Case
 from tests.serving import Server
 
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
@@ -63,9 +63,9 @@ def surrogate() -> Surrogate:
 
 
 @pytest.fixture
-def case() -> dict[str, Any]:
+def case() -> Case:
     """One ordinary case, SI."""
-    return {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
+    return {**CASE}
 
 
 @pytest.fixture(scope="session")
@@ -133,7 +133,7 @@ def reference(repository: Path) -> Any:
 
 
 @pytest.fixture(scope="session")
-def reference_border(repository: Path) -> NDArray[np.float64]:
+def reference_border(repository: Path) -> Array:
     """The border of the same solver, tests/data/border.csv: rows of y~, v~crit, mu~ there, shape (17, 3)."""
     return np.loadtxt(repository / "tests" / "data" / "border.csv", delimiter=",", skiprows=1)
 
@@ -174,7 +174,7 @@ def unexpected_skips(config: pytest.Config) -> list[str]:
         return []
     missing = os.environ.get("CI_MISSING", "").split()
     expected = re.compile("|".join([*EXPECTED_SKIPS, *map(re.escape, missing)]))
-    reports = config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    reports = getattr(config.pluginmanager.get_plugin("terminalreporter"), "stats", {}).get("skipped", [])
     reasons = {str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr) for report in reports}
     return sorted(reason for reason in reasons if not expected.search(reason))
 

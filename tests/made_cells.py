@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import charts
 from mumacro.border import Border
@@ -12,8 +11,8 @@ from mumacro.cells import block_rows, outer_cells
 from mumacro.charts import CHARTS
 from mumacro.library import Data, Kernel, kernels
 from mumacro.table import Block, read_table
+from tests.cases import Array
 
-Array = NDArray[np.float64]
 POWER = charts.QUANTITY_NAMES.index("power")  # its range has no upper end, and every block tabulates it
 
 

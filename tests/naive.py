@@ -8,13 +8,22 @@ Its error is proportional to the step, so extrapolation gives an independent che
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TypeVar, cast
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+Function = TypeVar("Function", bound=Callable[..., object])
 
-@njit
+
+def compiled(function: Function) -> Function:
+    """``njit``, whose stubs lose the types of a function."""
+    return cast("Function", njit(function))
+
+
+@compiled
 def march(v: float, y: float, steps: int, periods: int, ux: float = 0.0, uy: float = 0.0) -> NDArray[np.float64]:
     """Orbit (steps, 2) of u over the last of ``periods`` periods from (ux, uy); v = v~ [-], y = y~ [-]."""
     orbit = np.empty((steps, 2))
@@ -42,7 +51,7 @@ def mu_ratio(v: float, y: float, steps: int) -> float:
     return float(march(v, y, steps, periods_until_steady(v, y))[:, 0].mean())
 
 
-@njit
+@compiled
 def march_ball(v: float, y: float, springs: int, steps: int) -> float:
     """mu~ of a ball as ``springs`` independent springs, each marched by itself over one steady period."""
     total = 0.0

@@ -2,6 +2,7 @@
 
 import ctypes
 import functools
+import math
 import re
 import runpy
 import shutil
@@ -17,11 +18,13 @@ from builder.c import wasm
 from builder.c.source import OutputError, files, header_text, write_c
 from builder.export import export_table
 from builder.verify import CASES, draw
-from mumacro import Surrogate, charts
+from mumacro import REGIMES, Surrogate, charts
+from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.inputs import BOUNDS, FIELDS
 from mumacro.library import kernels
 from mumacro.table import read_table
 from tests import compilers
+from tests.cases import Case, tables
 
 pytestmark = pytest.mark.slow
 
@@ -58,6 +61,25 @@ WebAssembly.instantiate(fs.readFileSync("mumacro.wasm")).then(({ instance: { exp
   console.log(table.tolerance());
 });
 """
+KINDS = """\
+#include <stdio.h>
+#include "mumacro.h"
+int main(void) {
+    int contact, direction;
+    double x[6];
+    while (scanf("%d %d %la %la %la %la %la %la", &contact, &direction, x, x + 1, x + 2, x + 3, x + 4, x + 5) == 8) {
+        mumacro_answer a;
+        int error = mumacro_evaluate_as(contact, direction, x[0], x[1], x[2], x[3], x[4], x[5], &a);
+        printf("%d %d %d %a %a %a %a", error, a.source, a.regime, a.mu_macro, a.error_bound, a.v_tilde, a.y_tilde);
+        for (int i = 0; i < 6; ++i) printf(" %a %a", a.gradient[i], a.gradient_bound[i]);
+        puts("");
+    }
+    puts(mumacro_error_text(MUMACRO_LIFT_OFF));
+    puts(mumacro_error_text(MUMACRO_NO_NORMAL_BALL));
+    puts(mumacro_error_text(MUMACRO_NO_CONTACT));
+    return 0;
+}
+"""
 OTHER = '#include "mumacro.h"\ndouble elsewhere(double v, double y);\n'
 OTHER += "double elsewhere(double v, double y) { return mumacro_mu_ratio(v, y); }\n"
 #: instruction levels of the library by the number of doubles that go together, and one double at a time
@@ -81,9 +103,7 @@ def folder(tables_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return root
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Any:
-    return Surrogate.open(tables_dir / "mumacro-1e-7.nc", threads=1)
+table = tables(1e-7)
 
 
 @pytest.fixture(scope="module")
@@ -165,9 +185,7 @@ def points(table: Surrogate, n: int, seed: int) -> Any:
     ("form", "name", "lanes"),
     [*(("three", name, lanes) for name in LANGUAGES for lanes in LANES), *(("one", name, 2) for name in LANGUAGES)],
 )
-def test_compilers_give_no_warning(
-    folder: Path, tables_dir: Path, form: Any, name: str, lanes: Any, tmp_path: Path
-) -> None:
+def test_no_compiler_warns(folder: Path, tables_dir: Path, form: Any, name: str, lanes: Any, tmp_path: Path) -> None:
     language = ("-x", "c++") if name.endswith("++") else ()
     sources = ["main.c", "other.c", *(["mumacro.c", "mumacro_table.c"] if form == "three" else [])]
     words = [*compilers.compiler(name), *language, LANGUAGES[name], "-O1", *STRICT, *LANES[lanes]]
@@ -194,7 +212,8 @@ def test_arithmetic_without_infinities_is_refused(folder: Path, name: str, optio
 def test_numbers_are_exact_through_text(table: Surrogate) -> None:
     text = files(table.table)["mumacro_table.c"]
     arrays = dict(re.findall(r"static const double mumacro_table_(\w+)\[\d+\] = \{([^}]*)\}", text))
-    data = table._with("power") and table._with("stick_fraction")
+    table._with("power")
+    data = table._with("stick_fraction")
     read = {name: np.array(row.split(","), dtype=np.float64) for name, row in arrays.items()}
     for name in ("border", "pieces", "blocks", "outer"):
         assert same(read[name], getattr(data, name).ravel())
@@ -381,3 +400,50 @@ def test_webassembly_has_the_bits_of_the_lowest_level(table: Surrogate, tmp_path
     assert same(found[1:6], rows[:5])
     assert same(found[6], source)
     assert same(found[11:], rows[5:11])
+
+
+def cases_of_every_kind() -> list[tuple[int, int, tuple[float, ...]]]:
+    rng, found = np.random.default_rng(4), []
+    for contact, direction in ((0, 0), (1, 0), (0, 1), (1, 1), (0, 2)):
+        for i in range(40):
+            six = np.array([0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01]) * 10.0 ** rng.uniform(-1, 1, 6)
+            if direction == 2:
+                six[3] = six[1] * rng.uniform(0.0, 0.99)
+            if i < 6:
+                six[i] = math.inf if i == 2 else -1.0 if i in (0, 1) else 0.0
+            found.append((contact, direction, tuple(six.tolist())))
+    return found
+
+
+@pytest.mark.parametrize("form", ["one", "three"])
+@pytest.mark.parametrize("language", ["gcc", "g++"])
+def test_every_contact_and_direction_has_the_bits_of_the_library(
+    folder: Path, tables_dir: Path, tmp_path: Path, form: str, language: str
+) -> None:
+    (tmp_path / "kinds.c").write_text(KINDS, "ascii")
+    sources = [tmp_path / "kinds.c", *sorted((folder / form).glob("mumacro*.c"))]
+    standard = ["-std=c99"] if language == "gcc" else ["-x", "c++", "-std=c++17"]
+    words = [*compilers.compiler(language), *standard, "-O1", *STRICT, *LANES[4], "-ffp-contract=off"]
+    compilers.run(*words, f"-I{folder / form}", *sources, "-o", tmp_path / "kinds", "-lm")
+    refused = [(1, 2, (0.3, 10.0, 1e6, 1.0, 1e5, 0.01)), (0, 2, (0.3, 10.0, 1e6, 10.0, 1e5, 0.01)),
+               (2, 0, (1.0,) * 6), (0, -1, (1.0,) * 6)]  # fmt: skip
+    given = cases_of_every_kind()
+    text = "".join(f"{c} {d} {' '.join(float(x).hex() for x in six)}\n" for c, d, six in given + refused)
+    lines = compilers.run(tmp_path / "kinds", given=text).splitlines()
+    s = Surrogate.open(tables_dir / "mumacro-1e-4.nc")
+    for (contact, direction, six), line in zip(given, lines, strict=False):
+        words = line.split()
+        names = ("mu0", "Fz", "k", "Fz_amplitude" if direction == 2 else "y0", "omega", "v0")
+        kind: Case = {"contact": CONTACTS[contact], "direction": DIRECTIONS[direction]}
+        a = s.evaluate({n: [x] for n, x in zip(names, six, strict=True)}, gradient=True, **kind)
+        source = a.source_code[0]
+        assert int(words[1]) == source
+        assert (int(words[0]) == 0) == (source >= 0)
+        assert source == -1 or REGIMES[int(words[2])] == a.regime[0]
+        expected = [a.mu_macro, a.error_bound, a.v_tilde, a.y_tilde]
+        expected += [x for n in names for x in (a.gradient[n], a.gradient_bound[n])]
+        got = [float("nan") if "nan" in w else float.fromhex(w) for w in words[3:]]
+        assert np.array_equal(got, np.ravel(expected), equal_nan=True)
+    assert [int(line.split()[0]) for line in lines[len(given) : len(given) + 4]] == [-4, 7, -3, -3]
+    assert "lifts off" in lines[-3]
+    assert "radius" in lines[-2]

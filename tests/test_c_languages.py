@@ -12,6 +12,7 @@ from builder.export import export_table
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from tests import compilers
+from tests.cases import Case, tables
 from tests.comparing import close
 from tests.serving import CASE
 
@@ -21,9 +22,7 @@ OBJECTS = ("mumacro.o", "mumacro_table.o")
 V0 = [1e-6, 1e-3, 0.01, 0.0711, 0.5, 20.0]
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Any:
-    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+table = tables(1e-4)
 
 
 #: the Fortran compiler for code of Abaqus, whose dummy arguments are not all used
@@ -107,7 +106,7 @@ def test_abaqus_gets_the_coefficient_and_its_derivatives(fortran: Any, table: Su
     cases = [(v0, p, a, w) for v0 in (1e-3, 0.02, 0.4) for p in (3e4, 1e5) for a, w in ((1.0, 1.0), (0.5, 2.0))]
     found = call(*cases)
     for row, (v0, p, a, w) in zip(found, cases, strict=True):
-        case = {"mu0": 0.3, "Fz": p, "k": stiffness, "y0": 2e-6 * a, "omega": 1.3e5 * w, "v0": v0}
+        case: Case = {"mu0": 0.3, "Fz": p, "k": stiffness, "y0": 2e-6 * a, "omega": 1.3e5 * w, "v0": v0}
         answer = table.evaluate(case, gradient=True)
         assert row[0] == close(answer.mu_macro, rel=1e-14)
         assert row[1:] == close([answer.gradient["v0"], answer.gradient["Fz"]], rel=1e-9)
@@ -125,7 +124,7 @@ def test_abaqus_gets_the_coefficient_and_its_derivatives(fortran: Any, table: Su
 
 def test_abaqus_gets_the_shear_stress_its_derivatives_and_the_force_of_nodes(fortran: Any, table: Surrogate) -> None:
     call = fortran("fric", "fric.f", "vfric.f", "fric_driver.f90")
-    case = {"mu0": 0.3, "Fz": 1e5, "k": 1e10, "y0": 2e-6, "omega": 1.3e5}
+    case: Case = {"mu0": 0.3, "Fz": 1e5, "k": 1e10, "y0": 2e-6, "omega": 1.3e5}
 
     def stress(*line: Any) -> Any:
         return call(line)[0][:2]

@@ -24,21 +24,6 @@ def test_outer_is_the_complete_elliptic_integral(r: float) -> None:
     assert float(closed_forms.outer(r)) == close(expected, rel=5e-16)
 
 
-@pytest.mark.parametrize("b", [1.0, 1.5, 1e3, 1e10, 1e300])
-def test_agm(b: float) -> None:
-    assert float(closed_forms.agm(b)) == close(float(mpmath.agm(1, b)), rel=5e-16)
-
-
-def test_arrays_broadcast() -> None:
-    r = np.array([[0.1, 1.0], [10.0, 1e4]])
-    assert closed_forms.outer(r).tolist() == [[float(closed_forms.outer(x)) for x in row] for row in r]
-    assert closed_forms.agm([1.0, 2.0]).shape == (2,)
-    root = closed_forms.corner_root(np.array([[1e-3], [1e-5]]), np.array([-0.1, 0.0, 0.1]))
-    assert root.shape == (2, 3)
-    assert np.all(np.diff(root, axis=1) < 0.0)
-    assert np.all(root[0] > root[1])
-
-
 @pytest.mark.parametrize("r", [1e-3, 0.01, 0.3, 1.0, 7.0, 100.0, 1e4])
 def test_second_order_is_its_defining_average(r: float) -> None:
     with mpmath.workdps(30):
@@ -99,15 +84,13 @@ def critical_of(y: float) -> float:
 # largest deviations from the full model in the ranges of the paper; docs/validation.md has all of them
 @pytest.mark.parametrize(
     ("formula", "deviations"),
-    [
-        (closed_forms.border_23, {0.3: -6.278e-3, 0.5: -1.2025e-2, 1.0: 6.687e-3, 2.0: 0.12319}),
-        (closed_forms.border_24, {0.3: -3.663e-3, 0.5: 3.932e-3, 1.0: 0.12561, 2.0: 0.60572}),
-        (closed_forms.border_26, {2.0: 0.07048, 10.0: -3.556e-3, 1e3: -1.0776e-2, 1e6: -1.0846e-2}),
-        (closed_forms.border_27, {0.1: -0.019097, 0.413: -0.0522, 2.0: 7.723e-4, 1e6: -1.3793e-2}),
-        (closed_forms.border_small_amplitude, {0.1: 6.147e-6, 0.3: 3.433e-4, 1.0: -0.10306}),
-        (closed_forms.border_blend, {0.3: -1.932e-4, 1.0: -2.319e-3, 2.0: -5.263e-3, 10.0: 4.836e-3}),
-    ],
-)
+    [(closed_forms.border_23, {0.3: -6.278e-3, 0.5: -1.2025e-2, 1.0: 6.687e-3, 2.0: 0.12319}),
+     (closed_forms.border_24, {0.3: -3.663e-3, 0.5: 3.932e-3, 1.0: 0.12561, 2.0: 0.60572}),
+     (closed_forms.border_26, {2.0: 0.07048, 10.0: -3.556e-3, 1e3: -1.0776e-2, 1e6: -1.0846e-2}),
+     (closed_forms.border_27, {0.1: -0.019097, 0.413: -0.0522, 2.0: 7.723e-4, 1e6: -1.3793e-2}),
+     (closed_forms.border_small_amplitude, {0.1: 6.147e-6, 0.3: 3.433e-4, 1.0: -0.10306}),
+     (closed_forms.border_blend, {0.3: -1.932e-4, 1.0: -2.319e-3, 2.0: -5.263e-3, 10.0: 4.836e-3})],
+)  # fmt: skip
 def test_a_formula_of_the_border_is_off_by_what_was_measured(formula: Any, deviations: dict[float, float]) -> None:
     for y, deviation in deviations.items():
         assert float(formula(y)) / border(y)[0] - 1.0 == close(deviation, rel=2e-3)
@@ -136,16 +119,6 @@ def test_equation_23_is_solved(y: float) -> None:
     assert 2.0 * v * root * root * (root + v) == close(y * y, rel=4e-15)
 
 
-@pytest.mark.parametrize("y", [1e-8, 0.3, 1.0, 50.0])
-def test_equations_24_and_27_are_what_the_paper_prints(y: float) -> None:
-    with mpmath.workdps(40):
-        printed_24 = mpmath.sqrt(mpmath.mpf(1) / 4 + mpmath.mpf(y) ** 2 / 2) - mpmath.mpf(1) / 2
-        ratio = mpmath.mpf("0.94") * mpmath.sqrt(y) / (1 + mpmath.mpf(y) ** 2)
-        printed_27 = mpmath.mpf("0.47") * mpmath.mpf(y) ** 2.5 / (mpmath.mpf(y) ** 2 + ratio)
-    assert float(closed_forms.border_24(y)) == close(float(printed_24), rel=1e-15)
-    assert float(closed_forms.border_27(y)) == close(float(printed_27), rel=2e-15)
-
-
 def test_the_small_angle_average_is_the_bessel_function() -> None:
     v = np.array([0.0, 0.3, 5.0])[:, None]
     y = np.array([0.0, 1e-3, 1.0, 6.0])
@@ -167,13 +140,6 @@ def test_a_formula_for_continuous_sliding_is_off_by_what_was_measured(formula: A
         assert abs(float(formula(y)) / critical_of(y) - 1.0) == close(deviation, rel=0.1)
 
 
-def test_the_value_at_the_border_has_the_coefficient_five_sixty_fourths() -> None:
-    y = np.array([0.05, 0.1])
-    left = [(1.0 - critical_of(float(a)) - 0.25 * a * a) / a**4 for a in y]
-    # the remaining O(y~^2) term vanishes with the next order
-    assert (4.0 * left[0] - left[1]) / 3.0 == close(-5.0 / 64.0, rel=1e-4)
-
-
 def normalised(y: float, x: np.ndarray) -> np.ndarray:
     """(mu~ - static) / (critical - static) of the full model at v~ = x v~crit."""
     crit, top = border(y)
@@ -191,15 +157,6 @@ def test_the_master_curve_tends_to_its_limit() -> None:
         assert np.abs(normalised(y, x) - exact).max() == close(deviation, rel=0.05)
 
 
-@pytest.mark.parametrize(("y", "deviation"), [(0.1, 0.01424), (0.3, 0.01372), (0.5, 0.01656), (0.9, 0.1254)])
-def test_equation_28_is_too_low_except_near_the_border(y: float, deviation: float) -> None:
-    x = np.linspace(0.005, 1.0, 200)
-    off = closed_forms.master_curve(x) - normalised(y, x)
-    assert off.min() == close(-deviation, rel=5e-3)
-    assert off.max() < 2e-3  # near the border at y~ = 0.9
-    assert x[off > 1e-5].min(initial=1.0) > 0.8
-
-
 def test_equation_28_is_a_fit_to_the_limit() -> None:
     x = np.linspace(0.0, 1.0, 20_001)
     off = closed_forms.master_curve(x) - closed_forms.master_curve_limit(x)
@@ -208,7 +165,7 @@ def test_equation_28_is_a_fit_to_the_limit() -> None:
     assert off.max() <= 1e-15
 
 
-@pytest.mark.parametrize("x", [1e-200, 1e-12, 1e-4, 0.1, 0.5, 0.9, 1.0 - 1e-9])
+@pytest.mark.parametrize("x", [pytest.param(1e-200, marks=pytest.mark.slow), 1e-12, 1e-4, 0.1, 0.5, 0.9, 1.0 - 1e-9])
 def test_the_limit_of_the_master_curve_solves_its_equation(x: float) -> None:
     with mpmath.workdps(460 if x < 1e-100 else 60):
         a = mpmath.acos(x)

@@ -11,16 +11,14 @@ from scipy.special import ellipe, ellipk
 
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
-from tests.cases import CASE, UNIT, opened
+from tests.cases import CASE, UNIT, Case, opened, tables
 from tests.comparing import close
 from tests.naive import march_ball
 
-BALL = {"contact": "ball"}
+BALL: Case = {"contact": "ball"}
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-12)
+table = tables(1e-12)
 
 
 def points(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -38,11 +36,11 @@ def by_quad(table: Surrogate, name: str, v: float, y: float) -> float:
     def share(xi: float) -> float:
         s = 1.0 - xi * xi
         weight = 1.5 * s * (1.5 * s if name == "power" else 1.0)
-        return weight * table.quantity(name, v / (1.5 * s), y / (1.5 * s))[0]
+        return float(weight * table.quantity(name, v / (1.5 * s), y / (1.5 * s))[0])
 
     def beyond(xi: float) -> float:
         s = 1.0 - xi * xi
-        return v / (1.5 * s) - table.v_tilde_crit(y / (1.5 * s))
+        return float(v / (1.5 * s) - table.v_tilde_crit(y / (1.5 * s)))
 
     xi = 1.0 - np.geomspace(1.0, 1e-9, 4000)
     slides = np.array([beyond(x) >= 0.0 for x in xi])
@@ -56,6 +54,7 @@ def by_quad(table: Surrogate, name: str, v: float, y: float) -> float:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "y"), [(0.05, 0.4), (0.3, 2.5), (1.2, 1.0)])
 def test_marched_springs(table: Surrogate, v: Any, y: Any) -> None:
     coarse, fine = (march_ball(v, y, 300, steps) for steps in (1500, 3000))

@@ -12,16 +12,15 @@ from scipy.optimize import brentq
 from mumacro import Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.closed_forms import master_curve_limit
-from tests.cases import CASE, UNIT, opened, without
+from tests.cases import CASE, UNIT, Case, opened, tables, without
 from tests.comparing import close
 from tests.test_tight_bounds import play
 
-ALONG, NORMAL = {"direction": "along"}, {"direction": "normal"}
+ALONG: Case = {"direction": "along"}
+NORMAL: Case = {"direction": "normal"}
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-4)  # closed forms need no table
+table = tables(1e-4)
 
 
 def test_the_play_operator_marched_by_events(table: Surrogate) -> None:

@@ -11,16 +11,15 @@ import pytest
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.contact import kind_of
-from tests.cases import CASE, PAIRS, as_kind, every_pair, opened, without
+from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, opened, tables, without
 from tests.comparing import close
 
-BALL, NORMAL = {"contact": "ball"}, {"direction": "normal"}
+BALL: Case = {"contact": "ball"}
+NORMAL: Case = {"direction": "normal"}
 every_other_pair = pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-10)
+table = tables(1e-10)
 
 
 @every_other_pair
@@ -132,7 +131,7 @@ def test_labels_are_kept(table: Surrogate) -> None:
 
 # --- an interval of k: the extremes of mu_macro over it, which may lie inside -------------------------------
 
-RAY = {"mu0": 1.0, "Fz": 1.0, "y0": 20.0, "omega": 1.0, "v0": 1.0}
+RAY: Case = {"mu0": 1.0, "Fz": 1.0, "y0": 20.0, "omega": 1.0, "v0": 1.0}
 
 
 @every_pair
@@ -181,9 +180,9 @@ def test_turns_closer_than_samples(table: Surrogate, ratio: Any) -> None:
         assert found.mu_macro_high >= some.max() - found.error_bound
 
 
-def test_intervals_in_arrays_columns_and_of_one_point(table: Surrogate) -> None:
+def test_intervals_in_arrays_columns_and_of_one_point(table: Any) -> None:
     case, low, high, v0 = without(CASE, "k"), [2e5, 8e5, 1e6, np.nan, -1.0], 1.2e6, np.array([[0.01], [0.1]])
-    found = table.evaluate(k_range=(np.array(low), high), **{**case, "v0": v0}, gradient=True)
+    found: Any = table.evaluate(k_range=(np.array(low), high), **{**case, "v0": v0}, gradient=True)
     assert found.mu_macro_low.shape == (2, 5)
     for i, j in np.ndindex(2, 3):
         one = table.evaluate(k_range=(low[j], high), **{**case, "v0": v0[i, 0]}, gradient=True)

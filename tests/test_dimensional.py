@@ -12,16 +12,14 @@ from mpmath import ellipk, mpf, pi, workdps
 
 from mumacro import InputError, Surrogate
 from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, as_columns, check_inputs
-from tests.cases import CASE, Case, log_uniform, opened, without
+from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
 
 positive = st.floats(min_value=5e-324, max_value=1.7976931348623157e308, allow_nan=False, allow_infinity=False)
 any_inputs = st.fixed_dictionaries(dict.fromkeys(FIELDS, positive))
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-10)
+table = tables(1e-10)
 
 
 def exactly(numerator: list[float], denominator: list[float]) -> float:
@@ -33,8 +31,9 @@ def exactly(numerator: list[float], denominator: list[float]) -> float:
         return math.inf
 
 
-def same_digits(found: float, expected: float) -> bool:
+def same_digits(given: Any, expected: float) -> bool:
     """Equal to a few rounding errors, or to the last digit of denormal numbers, or both infinite."""
+    found = float(given)
     if math.isinf(expected) or math.isinf(found):
         return min(found, expected) > 1.797e308
     return abs(found - expected) <= 8e-16 * expected + 5e-324
@@ -43,7 +42,7 @@ def same_digits(found: float, expected: float) -> bool:
 # --- the groups ---------------------------------------------------------------------------------------
 
 
-def has_exact_groups(table: Surrogate, case: dict[str, float]) -> None:
+def has_exact_groups(table: Surrogate, case: Case) -> None:
     mu0, Fz, k, y0, omega, v0 = (case[name] for name in FIELDS)
     found = table.evaluate(case)
     assert same_digits(found.v_tilde, exactly([v0, k], [mu0, Fz, omega]))
@@ -58,22 +57,17 @@ def has_exact_groups(table: Surrogate, case: dict[str, float]) -> None:
 
 @settings(max_examples=600, deadline=None)
 @given(case=any_inputs)
-def test_groups_are_right_whatever_overflows_on_the_way(table: Surrogate, case: dict[str, float]) -> None:
+def test_groups_are_right_whatever_overflows_on_the_way(table: Surrogate, case: Case) -> None:
     has_exact_groups(table, case)
 
 
 @pytest.mark.parametrize(
     "inputs",
-    [
-        (1.0, 1e300, 1e300, 1e300, 1.0, 1e300),
-        (1e-300, 1e-300, 1e-300, 1e-300, 1.0, 1e-300),
-        (1e200, 1e200, 1e200, 1e200, 1.0, 1e200),
-        (1e-5, 1e-310, 1e-300, 1e-15, 1e-20, 1e-300),
-        (0.5, 1.0, 1e-320, 1.0, 1.0, 1.0),
-        (0.5, 5e-324, 5e-324, 0.25, 1.0, 0.5),
-        (1e-200, 1e-200, 1e-200, 1e-200, 1e-200, 1e-200),
-    ],
-)
+    [(1.0, 1e300, 1e300, 1e300, 1.0, 1e300), (1e-300, 1e-300, 1e-300, 1e-300, 1.0, 1e-300),
+     (1e200, 1e200, 1e200, 1e200, 1.0, 1e200), (1e-5, 1e-310, 1e-300, 1e-15, 1e-20, 1e-300),
+     (0.5, 1.0, 1e-320, 1.0, 1.0, 1.0), (0.5, 5e-324, 5e-324, 0.25, 1.0, 0.5),
+     (1e-200, 1e-200, 1e-200, 1e-200, 1e-200, 1e-200)],
+)  # fmt: skip
 def test_groups_at_the_ends_of_double_precision(table: Surrogate, inputs: tuple[float, ...]) -> None:
     has_exact_groups(table, dict(zip(FIELDS, inputs, strict=True)))
 
@@ -83,7 +77,7 @@ def test_groups_at_the_ends_of_double_precision(table: Surrogate, inputs: tuple[
 
 @pytest.mark.parametrize("stillness", [{"y0": 0.0}, {"omega": 0.0}, {"y0": 0.0, "omega": 0.0}, {"y0": 0.0, "v0": 0.0}])
 @pytest.mark.parametrize("k", [1e6, None, 5e-324, 1e308])
-def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: dict[str, float], k: float | None) -> None:
+def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: Case, k: float | None) -> None:
     found = table.evaluate(**{**CASE, **stillness, "k": k})
     answer = found.mu_macro, found.mu_ratio, found.error_bound, found.source
     assert answer == (CASE["mu0"], 1.0, 0.0, "no_oscillation")
@@ -109,13 +103,6 @@ def test_rigid_contact_is_the_elliptic_integral(table: Surrogate, y0: float, ome
     assert (found.source, found.length_scale, found.v_tilde, found.y_tilde) == ("rigid", 0.0, math.inf, math.inf)
 
 
-def test_rigid_contact_is_what_ever_stiffer_springs_tend_to(table: Surrogate) -> None:
-    rigid = table.evaluate(**{**CASE, "k": None}).mu_macro
-    gaps = [abs(table.evaluate(**{**CASE, "k": k}).mu_macro - rigid) for k in (1e9, 1e10, 1e11, 1e200)]
-    assert gaps[0] > gaps[1] > gaps[2]
-    assert gaps[3] < 1e-15
-
-
 @pytest.mark.parametrize(
     ("inputs", "expected"),
     [
@@ -130,9 +117,7 @@ def test_rigid_contact_is_what_ever_stiffer_springs_tend_to(table: Surrogate) ->
         ({"v0": 0.0, "k": None}, 0.0),
     ],
 )
-def test_groups_that_leave_double_precision_still_have_their_limit(
-    table: Surrogate, inputs: Case, expected: float
-) -> None:
+def test_groups_that_leave_double_precision_have_their_limit(table: Surrogate, inputs: Case, expected: float) -> None:
     found = table.evaluate(**{**CASE, **inputs})
     assert abs(found.mu_ratio - expected) <= found.error_bound / CASE["mu0"] + 1e-15
     assert found.mu_ratio == close(expected, rel=1e-12, abs=1e-280)
@@ -141,7 +126,7 @@ def test_groups_that_leave_double_precision_still_have_their_limit(
 
 @settings(max_examples=400, deadline=None)
 @given(inputs=any_inputs)
-def test_any_legal_input_has_a_finite_answer_with_a_bound(table: Surrogate, inputs: dict[str, float]) -> None:
+def test_any_legal_input_has_a_finite_answer_with_a_bound(table: Surrogate, inputs: Case) -> None:
     found, mu0 = table.evaluate(inputs), inputs["mu0"]
     assert 0.0 <= found.mu_ratio <= 1.0
     assert 0.0 <= found.mu_macro <= mu0
@@ -198,9 +183,7 @@ def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: st
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
 @pytest.mark.parametrize("asked", [{}, {"groups": True}, {"gradient": True}], ids=str)
-def test_an_illegal_value_of_an_array_affects_only_its_case(
-    table: Surrogate, field: str, bad: float, asked: dict[str, bool]
-) -> None:
+def test_an_illegal_value_of_an_array_spoils_its_case(table: Surrogate, field: str, bad: float, asked: Case) -> None:
     column = [CASE[field], bad, CASE[field]]
     found = table.evaluate(**{**CASE, field: column}, **asked)
     sound = table.evaluate(**CASE, gradient=True)
@@ -241,9 +224,9 @@ def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> No
 def test_every_input_must_be_given(table: Surrogate, field: str) -> None:
     rest = without(CASE, field)
     said = {"omega": r" or f \[Hz\]", "k": ".*None for rigid contact"}.get(field, "")
-    for ask in (lambda: table.evaluate(**rest), lambda: table.evaluate(rest)):
+    for cases, keywords in (((), rest), ((rest,), {})):
         with pytest.raises(InputError, match=f"^{field} must be given{said}"):
-            ask()
+            table.evaluate(*cases, **keywords)
 
 
 def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
@@ -257,16 +240,10 @@ def test_the_frequency_is_given_once_as_omega_or_f(table: Surrogate) -> None:
         table.evaluate(**CASE, f=frequency)
     with pytest.raises(InputError, match=r"omega must be given or f \[Hz\]"):
         table.evaluate(**rest, f=None, omega=None)
-
-
-@pytest.mark.parametrize("bad", [-2e4, math.nan, math.inf])
-def test_a_bad_frequency_is_named_as_it_was_given(table: Surrogate, bad: float) -> None:
-    rest = without(CASE, "omega")
-    for given_f, index in ((bad, None), ([2e4, bad], 1)):
+    for bad, index in ((x, i) for x in (-2e4, math.nan, math.inf) for i in (None, 1)):
         with pytest.raises(InputError) as caught:
-            table.evaluate(**rest, f=given_f, illegal="raise")
-        assert (caught.value.field, caught.value.index) == ("f", index)
-        assert repr(caught.value.value) == repr(bad)
+            table.evaluate(**rest, f=[2e4, bad] if index else bad, illegal="raise")
+        assert (caught.value.field, caught.value.index, repr(caught.value.value)) == ("f", index, repr(bad))
 
 
 def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> None:
@@ -323,8 +300,9 @@ def test_columns_on_one_thread_equal_the_array(table: Surrogate, n: int) -> None
     for column in columns[3:]:
         column[:: max(2, n // 7)] = 0.0
     for fixed in (None, 0, 2, 5):
-        given = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
-        macro, mu, bound, source = found = table.evaluate_columns(*given)
+        given: list[Any] = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
+        found: Any = table.evaluate_columns(*given)
+        macro, mu, bound, source = found
         expected = table.evaluate(dict(zip(FIELDS, given, strict=True)))
         for column, name in zip(found, ("mu_macro", "mu_ratio", "error_bound", "source_code"), strict=True):
             np.testing.assert_array_equal(column, getattr(expected, name))

@@ -8,9 +8,10 @@ import pytest
 
 from mumacro import Element, InputError, Surrogate
 from mumacro.closed_forms import master_curve_limit
+from tests.cases import Case
 from tests.comparing import close
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6}
 
 
 def means(
@@ -146,24 +147,22 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
 
 @pytest.mark.parametrize(
     ("call", "said"),
-    [
-        (lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact must be one of spring, ball"),
-        (lambda: Element(0.3, 10.0, 1e6, springs=2), "springs must be a whole number from 1 to 1 for contact='spring'"),
-        (lambda: Element(0.3, 10.0, 1e6, "ball", springs=0), "springs must be a whole number from 1 to 100000"),
-        (lambda: Element(0.0, 10.0, 1e6), "mu0 must be finite and > 0, got 0.0"),
-        (lambda: Element(0.3, [10.0, math.nan], 1e6), "Fz at index 1 must be finite and > 0, got nan"),
-        (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
-        (lambda: Element(1e200, 1e200, 1.0), "Fz at index 0 must be finite and >= 0, with mu0 Fz below"),
-        (lambda: Element([0.3, 0.2], [1.0, 2.0, 3.0], 1.0), "inputs must be arrays whose shapes broadcast"),
-        (lambda: Element(0.3, 10.0, 1e6).step(math.nan, 0.0), "dx must be finite, got nan"),
-        (lambda: Element(0.3, 10.0, 1e6).step(0.0, "1um"), "dy must be a real number"),
-        (lambda: Element(0.3, 10.0, 1e6).step([1.0, 2.0], 0.0), "dx must be of a shape that broadcasts"),
-        (lambda: Element(0.3, 10.0, 1e6, "ball").step(0.0, 0.0, Fz=1.0), "Fz must be left out for a ball"),
-        (lambda: Element(0.3, 10.0, 1e6).step(0.0, 0.0, Fz=-1.0), "Fz at index 0 must be finite and >= 0"),
-        (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [1.0, 2.0]), "state must be of the shape"),
-        (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]), "state must be finite"),
-    ],
-)
+    [(lambda: Element(0.3, 10.0, 1e6, contact="cube"), "contact must be one of spring, ball"),
+     (lambda: Element(0.3, 10.0, 1e6, springs=2), "springs must be a whole number from 1 to 1 for contact='spring'"),
+     (lambda: Element(0.3, 10.0, 1e6, "ball", springs=0), "springs must be a whole number from 1 to 100000"),
+     (lambda: Element(0.0, 10.0, 1e6), "mu0 must be finite and > 0, got 0.0"),
+     (lambda: Element(0.3, [10.0, math.nan], 1e6), "Fz at index 1 must be finite and > 0, got nan"),
+     (lambda: Element(0.3, 10.0, math.inf), "k must be finite: a rigid contact"),
+     (lambda: Element(1e200, 1e200, 1.0), "Fz at index 0 must be finite and >= 0, with mu0 Fz below"),
+     (lambda: Element([0.3, 0.2], [1.0, 2.0, 3.0], 1.0), "inputs must be arrays whose shapes broadcast"),
+     (lambda: Element(0.3, 10.0, 1e6).step(math.nan, 0.0), "dx must be finite, got nan"),
+     (lambda: Element(0.3, 10.0, 1e6).step(0.0, "1um"), "dy must be a real number"),
+     (lambda: Element(0.3, 10.0, 1e6).step([1.0, 2.0], 0.0), "dx must be of a shape that broadcasts"),
+     (lambda: Element(0.3, 10.0, 1e6, "ball").step(0.0, 0.0, Fz=1.0), "Fz must be left out for a ball"),
+     (lambda: Element(0.3, 10.0, 1e6).step(0.0, 0.0, Fz=-1.0), "Fz at index 0 must be finite and >= 0"),
+     (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [1.0, 2.0]), "state must be of the shape"),
+     (lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]), "state must be finite")],
+)  # fmt: skip
 def test_bad_input_is_named_and_moves_nothing(call: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         call()

@@ -9,9 +9,10 @@ import pytest
 
 from mumacro import InputError, Surrogate, fit
 from mumacro.contact import CONTACTS
+from tests.cases import Case
 from tests.comparing import close
 
-RIG = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
+RIG: Case = {"Fz": 10.0, "y0": 2e-6, "f": 20e3}
 V0 = np.geomspace(1e-3, 1.0, 20)
 
 
@@ -23,7 +24,7 @@ def quiet() -> Any:
         yield
 
 
-def friction(surrogate: Surrogate, contact: str = "spring", **inputs: Any) -> Any:
+def friction(surrogate: Surrogate, contact: Any = "spring", **inputs: Any) -> Any:
     """mu_macro of a contact that is known."""
     return np.asarray(surrogate.evaluate(**{"mu0": 0.3, "k": 1e6, **RIG, **inputs}, contact=contact).mu_macro)
 
@@ -38,17 +39,17 @@ def noisy(surrogate: Surrogate, spread: Any, seed: int = 0, **inputs: Any) -> An
 @pytest.mark.parametrize("given", [True, False], ids=["std", "scatter"])
 @pytest.mark.parametrize("unknowns", [("k", "mu0"), ("k",), ("mu0",)], ids=" ".join)
 @pytest.mark.parametrize("contact", CONTACTS)
-def test_inputs_are_recovered_within_their_covariance(
-    surrogate: Surrogate, contact: str, unknowns: Any, given: Any
-) -> None:
+def test_inputs_lie_within_their_covariance(surrogate: Surrogate, contact: Any, unknowns: Any, given: Any) -> None:
     """In 95 % of 200 draws, by the binomial distribution (99.9 %); so are the intervals, each for itself."""
     from scipy.stats import binom, chi2
     from scipy.stats import f as fisher
 
-    truth = {"k": 1e6, "mu0": 0.3}
+    truth: Case = {"k": 1e6, "mu0": 0.3}
     v0, y0, spread = np.tile(V0, 2), np.repeat([1e-6, 2.5e-6], 20), 2e-3
     known = {name: value for name, value in truth.items() if name not in unknowns}
-    n, inside, intervals = len(unknowns), 0, np.zeros(len(unknowns), dtype=int)
+    n = len(unknowns)
+    inside: Any = 0
+    intervals: Any = np.zeros(n, dtype=int)
     clean = friction(surrogate, contact, v0=v0, y0=y0)
     for seed in range(200):
         mu = clean + np.random.default_rng(seed).normal(scale=spread, size=40)
@@ -60,14 +61,14 @@ def test_inputs_are_recovered_within_their_covariance(
         intervals += [found.interval[name][0] <= truth[name] <= found.interval[name][1] for name in unknowns]
         assert len(found.solutions) == 1
         assert found.reduced_chi2 * (1.0 if given else spread**-2) == close(1.0, abs=1.0)
-    low, high = binom.ppf([0.0005, 0.9995], 200, 0.95)
+    low, high = (float(binom.ppf(level, 200, 0.95)) for level in (0.0005, 0.9995))
     assert low <= inside <= high
     assert np.all((low <= intervals) & (intervals <= high))
 
 
 @pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize("k", [2e5, 1e6, 1e7])
-def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: str, k: Any) -> None:
+def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: Any, k: Any) -> None:
     mu = friction(surrogate, contact, v0=V0, k=k)
     found = fit({"v0": V0, "mu_macro": mu}, contact=contact, **RIG)
     assert found.values == {"k": close(k, rel=1e-8), "mu0": close(0.3, rel=1e-9)}
@@ -78,7 +79,7 @@ def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: str
 
 def test_every_input_may_vary(surrogate: Surrogate) -> None:
     rng = np.random.default_rng(1)
-    columns = {
+    columns: Case = {
         "v0": rng.uniform(1e-3, 1.0, 30), "Fz": rng.uniform(5.0, 20.0, 30), "y0": rng.uniform(0.0, 5e-6, 30),
         "omega": rng.uniform(1e4, 2e5, 30),
     }  # fmt: skip
@@ -193,7 +194,7 @@ def test_the_picture_has_points_fit_and_band(surrogate: Surrogate, along: Any) -
 
 # --- bad input ----------------------------------------------------------------------------------------------
 
-POINTS = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
+POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
 
 
 @pytest.mark.parametrize(

@@ -16,17 +16,15 @@ from mumacro import Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.inputs import FIELDS
 from tests import compilers
+from tests.cases import CASE, tables
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 FORMATS = {"fmu": 2, "fmu3": 3}
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Any:
-    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+table = tables(1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +51,7 @@ def fmpy() -> Any:
     return fmpy
 
 
-def test_the_sources_compile_without_a_warning(unit: str, tmp_path: Path) -> None:
+def test_the_sources_compile_without_a_warning(unit: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(unit) as archive:
         archive.extractall(tmp_path)
         names = archive.namelist()
@@ -66,14 +64,14 @@ def test_the_sources_compile_without_a_warning(unit: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("fmpy")
-def test_fmpy_finds_no_fault(unit: str) -> None:
+def test_fmpy_finds_no_fault(unit: Path) -> None:
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(unit)) == []
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_a_simulation_follows_its_inputs(unit: str, fmpy: Any, table: Surrogate, kind: Any) -> None:
+def test_a_simulation_follows_its_inputs(unit: Path, fmpy: Any, table: Surrogate, kind: Any) -> None:
     time = np.linspace(0.0, 1.0, 41)
     v0 = 10.0 ** (-4.0 + 5.0 * time)
     given = np.array(list(zip(time, v0, strict=True)), dtype=[("time", float), ("v0", float)])
@@ -94,10 +92,11 @@ def test_a_simulation_follows_its_inputs(unit: str, fmpy: Any, table: Surrogate,
 class Loaded:
     """A unit of either standard, loaded and initialised with parameters; variables by name."""
 
-    def __init__(self, fmpy: Any, unit: str, folder: Path, **parameters: Any) -> None:
-        description = fmpy.read_model_description(str(unit))
-        folder = fmpy.extract(str(unit), str(folder))
-        self.unit = unit = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
+    def __init__(self, fmpy: Any, path: Path, folder: Path, **parameters: Any) -> None:
+        description = fmpy.read_model_description(str(path))
+        self.unit = unit = fmpy.instantiate_fmu(
+            fmpy.extract(str(path), str(folder)), description, fmi_type="CoSimulation"
+        )
         self.at = {variable.name: variable.valueReference for variable in description.modelVariables}
         self.outputs = [self.at[output.variable.name] for output in description.outputs]
         if description.fmiVersion == "2.0":
@@ -127,7 +126,7 @@ class Loaded:
         return self.unit.getDirectionalDerivative([self.at[output]], known, list(seeds.values()))[0]
 
 
-def test_directional_derivatives_are_the_gradient(unit: str, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
+def test_directional_derivatives_are_the_gradient(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     assert made.outputs == [made.at[name] for name in ("mu_macro", "mu_ratio", "force")]
     for case in (CASE, {**CASE, "v0": 1.0}, {**CASE, "y0": 2e-5}, {**CASE, "v0": -0.01}):
@@ -154,9 +153,7 @@ def test_directional_derivatives_are_the_gradient(unit: str, fmpy: Any, table: S
 @pytest.mark.parametrize(
     ("contact", "direction"), [("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
 )
-def test_contacts_and_directions(
-    unit: str, fmpy: Any, table: Surrogate, tmp_path: Path, contact: str, direction: Any
-) -> None:
+def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, contact: Any, direction: Any) -> None:
     kind = {"contact": CONTACTS.index(contact), "direction": DIRECTIONS.index(direction)}
     case = {name: value for name, value in CASE.items() if direction != "normal" or name != "y0"}
     case |= {"Fz_amplitude": 4.0} if direction == "normal" else {}
@@ -181,7 +178,7 @@ def test_contacts_and_directions(
 
 
 @pytest.mark.parametrize("kind", [{}, {"contact": 1}, {"direction": 1}, {"direction": 2}])
-def test_the_force_passes_through_zero_with_its_derivatives(unit: str, fmpy: Any, tmp_path: Path, kind: Any) -> None:
+def test_the_force_passes_through_zero_with_its_derivatives(unit: Path, fmpy: Any, tmp_path: Path, kind: Any) -> None:
     made = Loaded(fmpy, unit, tmp_path, **kind, v_rest=1e-3)
     made.put(Fz_amplitude=4.0)
 
@@ -205,9 +202,7 @@ def test_the_force_passes_through_zero_with_its_derivatives(unit: str, fmpy: Any
     assert made.get("v_rest") == [1e-3]
 
 
-def test_states_are_kept_and_illegal_inputs_are_discarded(
-    unit: str, fmpy: Any, table: Surrogate, tmp_path: Path
-) -> None:
+def test_states_are_kept_and_illegal_inputs_discarded(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path) -> None:
     made = Loaded(fmpy, unit, tmp_path)
     expected = table.evaluate(CASE).mu_macro
     assert made.get("mu_macro") == [close(expected, rel=1e-13)]
@@ -228,7 +223,7 @@ def test_states_are_kept_and_illegal_inputs_are_discarded(
     assert made.get("k", "v_rest") == [1e6, 1e-4]
 
 
-def test_another_units_token_is_refused(unit: str, fmpy: Any, tmp_path: Path) -> None:
+def test_another_units_token_is_refused(unit: Path, fmpy: Any, tmp_path: Path) -> None:
     description = fmpy.read_model_description(str(unit))
     folder = fmpy.extract(str(unit), str(tmp_path))
     description.guid = description.instantiationToken = "another"

@@ -12,21 +12,20 @@ from builder.c.source import write_c
 from mumacro import Element, Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from tests import compilers
-from tests.cases import Case
+from tests.cases import Case, every_pair, tables
 from tests.comparing import close
 
+pytestmark = pytest.mark.slow
+
 REST = 1e-4
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
 #: below and above y~ = 1 and on it; without oscillation; rigid; creeping and fast at v_rest
 CASES = [CASE, {**CASE, "y0": 3e-6}, {**CASE, "y0": 9e-6}, {**CASE, "y0": 0.0}, {**CASE, "omega": 0.0},
          {**CASE, "k": math.inf}, {**CASE, "omega": 1e9}, {**CASE, "omega": 1.0}]  # fmt: skip
 NUMBER, WHOLE, ARRAY = ctypes.c_double, ctypes.c_int, ctypes.POINTER(ctypes.c_double)
 
 
-@pytest.fixture(scope="module")
-def table(tables_dir: Path) -> Surrogate:
-    """A table that is quick to compile."""
-    return Surrogate.open(tables_dir / "mumacro-1e-4.nc", threads=1)
+table = tables(1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +83,7 @@ def test_the_force_is_odd_smooth_and_rises(library: Any, table: Surrogate, case:
     assert (at - before) / step == close(slope, rel=1e-3, abs=1e-3 * at / REST)
 
 
-@pytest.mark.parametrize(
-    "pair",
-    [("spring", "across"), ("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")],
-    ids="-".join,
-)
+@every_pair
 @pytest.mark.parametrize("share", [0.0, 0.3, -0.7, 20.0, -500.0])
 def test_the_force_of_every_contact_has_its_derivatives(library: Any, table: Surrogate, pair: Any, share: Any) -> None:
     amplitude = {"Fz_amplitude": 4.0} if pair[1] == "normal" else {"y0": CASE["y0"]}  # [N], [m]

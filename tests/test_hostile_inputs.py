@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,10 @@ import pytest
 
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES
-from tests.cases import CASE, opened
+from tests.cases import CASE, tables
 
 #: methods of (v~, y~)
-PLANE = {
+PLANE: dict[str, Callable[..., Any]] = {
     "mu_ratio": lambda s, v, y: s.mu_ratio(v, y),
     "ratio_with_bound": lambda s, v, y: s.ratio_with_bound(v, y),
     "power": lambda s, v, y: s.power(v, y),
@@ -24,7 +25,7 @@ PLANE = {
     "stick_fraction_with_bound": lambda s, v, y: s.stick_fraction_with_bound(v, y),
     **{f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITY_NAMES},
 }
-NO_NUMBERS = {
+NO_NUMBERS: dict[str, Any] = {
     "text": "0.1", "bytes": b"0.1", "complex": 1j, "None": None, "object": object(), "a set": {1.0},
     "a mapping": {"a": 1.0}, "a type": float, "ragged": [[1.0], [1.0, 2.0]], "texts": ["0.1", "0.2"],
     "bytes in a list": [b"1"], "complex array": np.array([1j, 2.0]), "too large": 10**400,
@@ -34,12 +35,10 @@ NO_NUMBERS = {
     "records": np.zeros(3, dtype=[("a", "f8")]), "objects": np.array([object()]), "void": np.void(b"12345678"),
     "long": ["x" * 100_000] * 100,
 }  # fmt: skip
-OUT_OF_BOUNDS = [-1.0, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
+OUT_OF_BOUNDS = [-1.0, -1e6, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]
 
 
-@pytest.fixture(scope="module")
-def table() -> Surrogate:
-    return opened(1e-4)
+table = tables(1e-4)
 
 
 def parts(found: Any) -> tuple[Any, ...]:
@@ -59,12 +58,6 @@ def test_a_value_that_is_not_a_number_is_refused_by_name(table: Surrogate, metho
         table.v_tilde_crit(NO_NUMBERS[bad])
 
 
-def test_an_infinite_amplitude_is_refused_by_name(table: Surrogate) -> None:
-    with pytest.raises(InputError) as caught:
-        table.mu_ratio(1.0, math.inf)
-    assert caught.value.field == "y_tilde"
-
-
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", OUT_OF_BOUNDS, ids=repr)
 def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate, method: str, bad: Any) -> None:
@@ -77,15 +70,6 @@ def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(table: Surrogate,
         for one, column in zip(parts(ask(table, 0.1, 0.5)), parts(many), strict=True):
             assert column[0] == column[2] == one
             assert column[1] == -1 if column.dtype == np.int8 else math.isnan(column[1])
-
-
-@pytest.mark.parametrize(("v", "y"), [(0.1, -1e6), (0.1, -2.0), (-1e6, 0.1), (math.nan, -1e6), (-0.1, -math.inf)])
-def test_quantities_beyond_the_quadrant_are_refused_not_read(table: Surrogate, v: float, y: float) -> None:
-    for method, ask in PLANE.items():
-        with pytest.raises(InputError):
-            ask(table, v, y)
-        assert np.isnan(parts(ask(table, [v], y))[0]).all(), method
-        assert np.isnan(parts(ask(table, np.full(5000, v), np.full(5000, y)))[0]).all(), method
 
 
 @pytest.mark.parametrize("method", PLANE)
@@ -106,7 +90,7 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
         "big endian": v.astype(">f8"), "half": v.astype(np.float16), "single": v.astype(np.float32),
         "long": v.astype(np.longdouble), "objects": v.astype(object), "reversed": v[::-1][::-1],
         "unaligned": unaligned, "tuple": tuple(map(tuple, v)), "masked": np.ma.masked_array(v, mask=False),
-        "memory": memoryview(np.ascontiguousarray(v)),
+        "memory": memoryview(v.data),
     }  # fmt: skip
     for name, layout in layouts.items():
         for one, two in zip(parts(ask(table, layout, y)), parts(expected), strict=True):
@@ -114,6 +98,7 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
     assert np.array_equal(spread[::2, ::3], v)
     for one in (True, np.True_, np.float16(1), np.longdouble(1), np.uint64(1), np.array(1), 1):
         assert parts(ask(table, one, 0.5))[0] == parts(ask(table, 1.0, 0.5))[0]
+    empty: Any
     for empty in (np.empty(0), [], np.empty((0, 3))):
         assert np.shape(parts(ask(table, empty, 0.5))[0]) == np.shape(empty)
     assert isinstance(parts(ask(table, np.array(0.1), np.array(0.5)))[0], float)
@@ -123,13 +108,14 @@ def test_numbers_of_every_kind_and_layout_agree(table: Surrogate, method: str) -
 @pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
 def test_masked_cases_have_no_answer(table: Surrogate, kind: type) -> None:
     """A masked value is unknown: the value under the mask is not evaluated."""
-    masked = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
+    masked: Any = np.ma.masked_array([1, 2, 3], mask=[False, True, False], dtype=kind)
     found = table.mu_ratio(masked, 0.5)
     assert np.isnan(found).tolist() == [False, True, False]
     assert table.evaluate({**CASE, "v0": masked}).source_code.tolist()[1] == -1
     assert masked.data.tolist() == [1, 2, 3]
-    with pytest.raises(InputError, match="v_tilde"):
-        table.mu_ratio(np.ma.masked, 0.5)
+    for v, y, field in ((np.ma.masked, 0.5, "v_tilde"), (1.0, math.inf, "y_tilde")):
+        with pytest.raises(InputError, match=f"^{field}"):
+            table.mu_ratio(v, y)
 
 
 def test_the_callers_floating_point_settings_are_unchanged(table: Surrogate) -> None:
@@ -147,6 +133,7 @@ def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate, method: str)
 
 
 def test_of_must_be_a_quantity(table: Surrogate) -> None:
+    bad: Any
     for bad in ("mu", "", None, 3, ["power"]):
         with pytest.raises(InputError, match=r"^of must be one of mu_ratio, power, stick_fraction"):
             table.slopes(0.1, 0.5, of=bad)

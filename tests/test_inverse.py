@@ -19,7 +19,7 @@ def only_root(solution: Any) -> Any:
     return root
 
 
-def decade(low: Any, high: Any) -> Any:
+def decade(low: float, high: float) -> Any:
     return st.floats(low, high).map(lambda x: 10.0**x)
 
 
@@ -35,7 +35,7 @@ cases = st.fixed_dictionaries(
 def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any) -> None:
     said, fields, case = as_kind(case, pair, share)
     unknown = fields[place]
-    forward = surrogate.evaluate(**case, **said)
+    forward: Any = surrogate.evaluate(**case, **said)
     solution = solve_for(surrogate, unknown, forward.mu_macro, without(case, unknown), **said)
     if solution.constant or not solution.roots[0]:
         # within the surrogate's error the input has no influence here, or its end equals the limit
@@ -51,16 +51,9 @@ def test_the_forward_answer_is_inverted(surrogate: Surrogate, pair: Any, case: C
     assert any(root.low <= value <= root.high for root in solution.roots[0])
 
 
-def test_a_root_is_enclosed_to_the_tables_error(surrogate: Surrogate) -> None:
-    answer = surrogate.evaluate(**CASE, gradient=True)
-    root = only_root(solve_for(surrogate, "v0", answer.mu_macro, without(CASE, "v0")))
-    width = answer.error_bound / answer.gradient["v0"]
-    assert [root.high - 0.01, 0.01 - root.low] == close([width, width], rel=0.05)
-
-
 def test_an_enclosure_on_a_plateau_spans_it(surrogate: Surrogate) -> None:
     # y~ = 1, v~ = 1e5: mu~ = 1 - r^2/4 to the last digit, for any stiffness from a hundredth of this one on
-    case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
+    case: Case = {"mu0": 1.0, "Fz": 0.01, "k": 1000.0, "y0": 1e-5, "omega": 1.0, "v0": 1.0}
     root = only_root(solve_for(surrogate, "k", surrogate.evaluate(**case).mu_macro, without(case, "k")))
     assert root.low < 10.0 < 1e9 < root.high
 
@@ -169,28 +162,11 @@ def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(s
         assert root.mu_macro == close(target, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("field", "arguments"),
-    [("unknown", ("w0", 0.1, CASE)), ("v0", ("v0", 0.1, CASE)), ("Fz", ("v0", 0.1, {"mu0": 0.3})),
-     ("target", ("v0", -0.1, without(CASE, "v0"))), ("target", ("v0", [0.1, math.nan], without(CASE, "v0"))),
-     ("mu0", ("v0", 0.1, {**without(CASE, "v0"), "mu0": 0.0})),
-     ("range", ("v0", 0.1, without(CASE, "v0"), (1.0, 1.0))), ("range", ("k", 0.1, without(CASE, "k"), (0.0, 1.0))),
-     ("range", ("v0", 0.1, without(CASE, "v0"), (0.0, math.inf))),
-     ("f", ("v0", 0.1, {**without(without(CASE, "v0"), "omega"), "f": 1e308})),
-     ("f", ("omega", 0.1, {**without(CASE, "omega"), "f": 1e3})),
-     ("k", ("v0", 0.1, {**without(CASE, "v0"), "k": [1e6, 2e6]}))],
-)  # fmt: skip
-def test_a_bad_question_names_its_field(surrogate: Surrogate, field: str, arguments: Any) -> None:
-    with pytest.raises(InputError) as caught:
-        solve_for(surrogate, *arguments)
-    assert caught.value.field == field
-
-
-@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize("contact", ["spring", pytest.param("ball", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
 @settings(max_examples=15, deadline=None)
 @given(v0=decade(-5, 0), share=st.floats(0.001, 0.999))
-def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: str, unknown: Any, v0: Any, share: Any) -> None:
+def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: Any, unknown: Any, v0: Any, share: Any) -> None:
     case, ray = {**CASE, "v0": v0}, CASE[unknown] * np.geomspace(1e-9, 1e9, 20_001)
     mu = surrogate.evaluate(**{**case, unknown: ray}, contact=contact).mu_macro
     target = float(mu[int(share * 20_000)])
@@ -201,19 +177,6 @@ def test_no_root_is_missed_on_a_ray(surrogate: Surrogate, contact: str, unknown:
     assert all(root.mu_macro == close(target, rel=1e-11) for root in found)
     values = [root.value for root in found]
     assert values == sorted(values)
-
-
-@pytest.mark.parametrize("unknown", ["k", "Fz"])
-def test_a_ball_folds_as_a_spring_does(surrogate: Surrogate, unknown: Any) -> None:
-    case = {**CASE, "v0": 1e-4}
-    ray = CASE[unknown] * np.geomspace(*((1e-6, 1e8) if unknown == "k" else (1e-8, 1e6)), 141)
-    mu = surrogate.evaluate(**{**case, unknown: ray}, contact="ball").mu_macro
-    falling = np.diff(mu) < 0.0
-    (turns,) = np.nonzero(falling[1:] != falling[:-1])
-    assert turns.size == 2
-    rigid = mu[-1] if unknown == "k" else mu[0]
-    target = 0.5 * float(rigid + mu[turns + 1].max())
-    assert len(solve_for(surrogate, unknown, target, without(case, unknown), contact="ball").roots[0]) == 3
 
 
 @pytest.mark.parametrize("pair", [pair for pair in PAIRS if pair[1] != "across"], ids=" ".join)
@@ -240,23 +203,32 @@ def test_the_amplitude_of_the_force_stays_below_the_force(surrogate: Surrogate) 
         assert reach.high < 10.0 if unknown == "Fz_amplitude" else reach.low > 4.0
 
 
-@pytest.mark.parametrize(
-    ("pair", "unknown", "changed", "said"),
-    [
-        ("normal", "v0", {"Fz_amplitude": 10.0}, "Fz_amplitude must be >= 0 and below Fz"),
-        ("normal", "v0", {"y0": 1e-6}, "y0 must be left out for direction normal"),
-        ("across", "v0", {"Fz_amplitude": 1.0}, "Fz_amplitude must be left out for direction across"),
-        ("normal", "y0", {}, "unknown must be one of mu0, Fz, k, Fz_amplitude"),
-        ("across", "v0", {"k": None, "k_range": (1e6, 2e6)}, "a target has an interval of roots; solve for both ends"),
-        ("across", "v0", {"k": None, "k_low": 1e6, "k_high": 2e6}, "a target has an interval of roots"),
-    ],
-)
-def test_what_does_not_belong_to_the_question_is_refused_with_the_reason(
-    surrogate: Surrogate, pair: Any, unknown: Any, changed: Any, said: Any
-) -> None:
-    keywords, _, case = as_kind(CASE, ("spring", pair))
-    with pytest.raises(InputError, match=said):
-        solve_for(surrogate, unknown, 0.2, {**without(case, unknown), **changed}, **keywords)
+ANY = 0.2  # a target
+REFUSED: list[tuple[str, Any, Case, str]] = [  # direction, the first arguments, what is changed in the case, why
+    ("across", ("w0", ANY), {}, "unknown must be"), ("across", ("v0", ANY), {"v0": 1.0}, "v0 must be"),
+    ("across", ("v0", ANY), {"Fz": None}, "Fz must be"), ("across", ("v0", -0.1), {}, "target must be"),
+    ("across", ("v0", [0.1, math.nan]), {}, "target at index 1 must be"),
+    ("across", ("v0", ANY), {"mu0": 0.0}, "mu0 must"),
+    ("across", ("v0", ANY, (1.0, 1.0)), {}, "range must"), ("across", ("k", ANY, (0.0, 1.0)), {}, "range must"),
+    ("across", ("v0", ANY, (0.0, math.inf)), {}, "range must"), ("across", ("omega", ANY), {"f": 1e3}, "f must"),
+    ("across", ("v0", ANY), {"omega": None, "f": 1e308}, "f must"),
+    ("across", ("v0", ANY), {"k": [1e6, 2e6]}, "k must"),
+    ("normal", ("v0", ANY), {"Fz_amplitude": 10.0}, "Fz_amplitude must be >= 0 and below Fz"),
+    ("normal", ("v0", ANY), {"y0": 1e-6}, "y0 must be left out for direction normal"),
+    ("across", ("v0", ANY), {"Fz_amplitude": 1.0}, "Fz_amplitude must be left out for direction across"),
+    ("normal", ("y0", ANY), {}, "unknown must be one of mu0, Fz, k, Fz_amplitude"),
+    *(("across", ("v0", ANY), {"k": None, **ends}, "k.* a target has an interval of roots; solve for both ends")
+      for ends in ({"k_range": (1e6, 2e6)}, {"k_low": 1e6, "k_high": 2e6})),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("direction", "asked", "changed", "said"), REFUSED)
+def test_a_bad_question_is_refused(surrogate: Surrogate, direction: str, asked: Any, changed: Case, said: str) -> None:
+    keywords, _, case = as_kind(CASE, ("spring", direction))
+    given = {**without(case, asked[0]), **changed}
+    gone = [name for name, value in changed.items() if value is None and name != "k"]
+    with pytest.raises(InputError, match=f"^{said}"):
+        solve_for(surrogate, asked[0], asked[1], without(given, *gone), *asked[2:], **keywords)
 
 
 # --- border -------------------------------------------------------------------------------------------
@@ -282,19 +254,8 @@ def test_the_crossings_are_all_changes_of_the_regime(surrogate: Surrogate, pair:
         assert mark.mu_macro == there.mu_macro[1]
 
 
-@pytest.mark.parametrize(("along", "expected"), [("v0", 1), ("omega", 1), ("y0", 1), ("k", 2), ("Fz", 2), ("mu0", 2)])
-def test_over_all_values_the_border_is_crossed_once_or_twice(surrogate: Surrogate, along: Any, expected: Any) -> None:
-    crossings = border_crossings(surrogate, along, without(CASE, along), 1e-12, 1e12)
-    assert len(crossings) == expected
-    for crossing in crossings:
-        answer = surrogate.evaluate(**{**CASE, along: crossing.value})
-        assert answer.v_tilde == close(surrogate.v_tilde_crit(answer.y_tilde), rel=1e-9)
-
-
 @pytest.mark.parametrize(("share", "expected"), [(1.0 + 1e-9, 2), (1.0 - 1e-9, 0)])
-def test_a_ray_that_barely_touches_the_border_crosses_it_twice_or_never(
-    surrogate: Surrogate, share: Any, expected: Any
-) -> None:
+def test_a_ray_at_the_border_crosses_it_twice_or_never(surrogate: Surrogate, share: Any, expected: Any) -> None:
     closest = 1.290791
     ratio = share * closest / surrogate.v_tilde_crit(closest)  # y~ / v~
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}

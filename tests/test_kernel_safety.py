@@ -11,6 +11,8 @@ from mumacro import library
 from mumacro.table import read_table
 from tests import compilers
 
+pytestmark = pytest.mark.slow
+
 KERNEL = Path(library.__file__).parent / "kernel"
 DRIVER = Path(__file__).parent / "c" / "sanitized.c"
 CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
@@ -21,8 +23,7 @@ RANDOM, NASTY, TABLES = 100_000, 172_800, 300
 
 @pytest.mark.parametrize(
     ("option", "lanes"),
-    [("-march=native", NATIVE), pytest.param("-DMUMACRO_ONE_LANE", 1, marks=pytest.mark.slow),
-     pytest.param("-O1", 2, marks=pytest.mark.slow)],
+    [("-march=native", NATIVE), ("-DMUMACRO_ONE_LANE", 1), ("-O1", 2)],
 )  # fmt: skip
 def test_sanitizers_are_silent(tables_dir: Path, tmp_path: Path, option: Any, lanes: Any) -> None:
     """Random and nasty cases, and tables of nonsense, through every entry."""

@@ -9,11 +9,11 @@ import pytest
 from mumacro import InputError, Surrogate, closed_forms
 from mumacro.contact import kind_of
 from mumacro.inputs import FIELDS
-from mumacro.law import APPROXIMATIONS, BORDERS, EQUATIONS, approximations, border_speeds, friction_law, sweep_values
+from mumacro.law import APPROXIMATIONS, BORDERS, approximations, border_speeds, friction_law, sweep_values
 from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.comparing import close
 
-INTERVAL = {"k_range": (0.8e6, 1.2e6)}
+INTERVAL: Case = {"k_range": (0.8e6, 1.2e6)}
 LINE = without({**CASE, "y0": 4e-6}, "v0")
 SPEEDS = sweep_values("v0", 1e-4, 2.0, 25, "log")
 
@@ -68,7 +68,7 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
     assert law.answer.mu_macro == close(moving.mu_macro, rel=1e-15)
     assert law.mu_static == close(still.mu_macro, rel=1e-9, abs=1e-15)
     assert np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1]) == len(law.border)
-    columns = (values if name == along else np.array([case[name]]) for name in fields)
+    columns: Any = (values if name == along else np.array([case[name]]) for name in fields)
     found = surrogate.evaluate_columns(*columns, **said)
     for column, name in zip(found, ("mu_macro", "mu_ratio", "error_bound", "source_code"), strict=True):
         np.testing.assert_array_equal(column, getattr(law.answer, name))
@@ -96,7 +96,7 @@ def test_the_band_holds_every_stiffness_of_its_interval(surrogate: Surrogate, pa
     assert middle.border == law.border
     assert middle.answer.mu_macro == close(law.answer.mu_macro, rel=1e-14)
     again = friction_law(surrogate, "v0", SPEEDS, single, **said, **INTERVAL)  # as a keyword, too
-    assert np.array_equal(again.band, law.band)
+    np.testing.assert_array_equal(again.band, law.band)
 
 
 @every_pair
@@ -122,18 +122,14 @@ def test_the_articles_formulas_are_refused_for_another_contact(surrogate: Surrog
 
 @pytest.mark.parametrize(
     ("along", "case", "direction", "said"),
-    [
-        ("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
-        ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
-        ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
-        ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
-        ("k", {**without(LINE, "k"), "v0": 0.01, **INTERVAL}, "across", "k_range .* left out where k is the swept"),
-        ("Fz_amplitude", without(CASE, "y0"), "normal", "Fz_amplitude at index 1 must be >= 0 and below Fz"),
-    ],
-)
-def test_a_bad_interval_or_amplitude_is_named(
-    surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any
-) -> None:
+    [("v0", {**LINE, **INTERVAL}, "across", "k must be left out beside"),
+     ("v0", {**without(LINE, "k"), "k_range": (2e6, 1e6)}, "across", "k_range must be"),
+     ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high must be given"),
+     ("v0", {**LINE, "Fz_amplitude": 1.0}, "across", "Fz_amplitude must be left out"),
+     ("k", {**without(LINE, "k"), "v0": 0.01, **INTERVAL}, "across", "k_range .* left out where k is the swept"),
+     ("Fz_amplitude", without(CASE, "y0"), "normal", "Fz_amplitude at index 1 must be >= 0 and below Fz")],
+)  # fmt: skip
+def test_a_bad_interval_is_named(surrogate: Surrogate, along: Any, case: Case, direction: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         friction_law(surrogate, along, np.array([1.0, 10.0]), case, direction=direction)
 
@@ -158,7 +154,7 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
 
 # --- the approximations of one spring -----------------------------------------------------------------
 
-CONTACT = {"mu0": 0.25, "Fz": 1.0, "k": 4.0, "omega": 3.0}  # l0 = 1/16 m
+CONTACT: Case = {"mu0": 0.25, "Fz": 1.0, "k": 4.0, "omega": 3.0}  # l0 = 1/16 m
 LENGTH = 0.0625
 
 
@@ -167,32 +163,20 @@ def columns(surrogate: Surrogate, y: Any, v: Any) -> Any:
     law = friction_law(surrogate, "v0", np.asarray(v) * LENGTH * 3.0, {**CONTACT, "y0": y * LENGTH})
     borders = border_speeds(surrogate, law)
     found = {name: x / 0.25 for name, x in approximations(surrogate, law).items()}
-    assert (found.keys(), borders.keys()) == (APPROXIMATIONS.keys(), BORDERS.keys())
+    assert (list(found), list(borders)) == (list(APPROXIMATIONS), list(BORDERS))
     return law, found, {name: x / (LENGTH * 3.0) for name, x in borders.items()}
-
-
-def test_every_equation_number_names_a_column() -> None:
-    for number, name in EQUATIONS.items():
-        assert f"({number})" in {**BORDERS, **APPROXIMATIONS}[name] or name == f"eq_{number}"
 
 
 @pytest.mark.parametrize(
     ("name", "y", "ends", "off"),
-    [
-        ("static", 0.5, (1e-12, 1e-9), 1e-8),
-        ("small_amplitude", 0.01, (1e-3, 1e3), 1e-8),  # O(y~^4)
-        ("creep", 0.5, (1e-12, 1e-6), 1e-8),  # O(v~^(3/2))
-        ("creep", 2.0, (1e-12, 1e-6), 1e-8),
-        ("continuous", 0.01, (1e-3, 1e3), 1e-8),  # O(y~^4)
-        ("continuous", 1.0, (1e3, 1e6), 1e-6),  # O(1/v~^2)
-        ("rigid", 1.0, (1e3, 1e6), 1e-6),  # O(1/v~^2)
-        ("corner", 1.0, (1e-12, 1e-9), 1e-8),  # O(mu~^3)
-    ],
-)
-def test_the_approximations_hold_where_they_should(
-    surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any
-) -> None:
-    law, found, _ = columns(surrogate, y, np.geomspace(*ends, 31))
+    # what they leave out is of the order y~^4, v~^(3/2) beside creep, 1/v~^2 at large speed, mu~^3 in the corner
+    [("static", 0.5, (1e-12, 1e-9), 1e-8), ("small_amplitude", 0.01, (1e-3, 1e3), 1e-8),
+     ("creep", 0.5, (1e-12, 1e-6), 1e-8), ("creep", 2.0, (1e-12, 1e-6), 1e-8),
+     ("continuous", 0.01, (1e-3, 1e3), 1e-8), ("continuous", 1.0, (1e3, 1e6), 1e-6), ("rigid", 1.0, (1e3, 1e6), 1e-6),
+     ("corner", 1.0, (1e-12, 1e-9), 1e-8)],
+)  # fmt: skip
+def test_approximations_hold_where_they_should(surrogate: Surrogate, name: str, y: Any, ends: Any, off: Any) -> None:
+    law, found, _ = columns(surrogate, y, np.geomspace(ends[0], ends[1], 31))
     assert np.max(np.abs(found[name] - law.answer.mu_ratio)) < off
 
 

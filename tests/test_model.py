@@ -6,18 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.polynomial import polynomial
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from builder import radau
 from builder.model import ANGLE, CHART, FALL, MIN_SPEED, NO_STICK, OK, PATH, SIGMA, STEPS, SUM_UX, TURNED, WORK, slip
 from builder.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
 from builder.series import COS_TAU, ORDER, SPEED, X, series
 from builder.steady import border, continuous, workspace
 from builder.stick import stick_excess
+from tests.cases import Array
 from tests.comparing import close
 
-Array = NDArray[np.float64]
 HALF = 0.5 * math.pi
 
 
@@ -42,8 +40,8 @@ def witness(v: float, y: float, start: float, angle: float, end: float, **how: A
         out[:, 0] = [-v * cos - y * c * sin, -sin, sin, y * c * cos - v * sin, y * c * cos]
         return out
 
-    implicit = {"jac": jacobian} if how["method"] == "Radau" else {}
-    return solve_ivp(rate, (start, end), [angle, 0, 0, 0, 0], **implicit, **how).y[:, -1]
+    implicit: Any = {"jac": jacobian} if how["method"] == "Radau" else {}
+    return np.asarray(solve_ivp(rate, (start, end), [angle, 0, 0, 0, 0], **implicit, **how).y[:, -1])
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (2.0, 1.0), (0.01, 0.7), (3.0, 30.0), (40.0, 5.0)])
@@ -65,15 +63,6 @@ def test_stiff_steps_agree_with_a_general_integrator(v: float, y: float) -> None
     assert out[STEPS] < 0.5 * (out[PATH] / 7.9)  # a Taylor step is at most 0.33 ORDER = 7.9 lengths long
     assert th == close(expected[0], abs=1e-7)
     assert out[SUM_UX : WORK + 1] == close(expected[1:], rel=1e-7, abs=1e-7)
-
-
-@pytest.mark.parametrize(("v", "y", "angle"), [(0.5, 0.3, 0.2), (2.0, 1.0, -0.7), (0.05, 3.0, 1.1), (1.2, 20.0, 0.5)])
-def test_sensitivity_to_the_start_is_the_exponential_of_the_slip_path(v: float, y: float, angle: float) -> None:
-    h = 1e-5
-    ends = [follow(v, y, -1.0, angle + k * h, 0.8)[0] for k in (-2, -1, 1, 2)]
-    slope = (8.0 * (ends[2] - ends[1]) - (ends[3] - ends[0])) / (12.0 * h)
-    path = follow(v, y, -1.0, angle, 0.8)[1][PATH]
-    assert slope == close(math.exp(-path), rel=1e-9, abs=1e-11)
 
 
 @pytest.mark.parametrize(("v", "y"), [(0.5, 0.3), (0.05, 3.0), (1.2, 8.0), (0.0, 1.7), (3.0, 0.0)])
@@ -195,10 +184,3 @@ def test_the_radau_rule_is_exact_for_polynomials() -> None:
     for degree in range(n + 1):
         slope = degree * RADAU_NODES ** max(degree - 1, 0) if degree else np.zeros(n)
         assert RADAU_DIFF @ full**degree == close(slope, abs=2e-11 * n)
-
-
-def test_three_radau_stages_are_the_known_ones() -> None:
-    nodes, weights, _ = radau._radau(3)
-    root = math.sqrt(6.0)
-    assert nodes == close([(4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0], rel=1e-14)
-    assert weights == close([(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0], rel=1e-14)

@@ -1,6 +1,5 @@
 """What an answer says about the model: rows of docs/validity.md, effects, digits."""
 
-import doctest
 import math
 import re
 from pathlib import Path
@@ -9,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mumacro import InputError, Surrogate, validity
+from mumacro import InputError, Surrogate
 from mumacro.validity import ROWS, digits, k_effect, model_rows
 from tests.cases import Case
 from tests.comparing import close
 
-CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 
 
 def rows(surrogate: Surrogate, contact: str = "spring", **changed: Any) -> Any:
@@ -22,10 +21,6 @@ def rows(surrogate: Surrogate, contact: str = "spring", **changed: Any) -> Any:
     found = model_rows(surrogate, {**CASE, **changed}, contact)
     assert [one["row"] for one in found] == sorted({one["row"] for one in found}, key=ROWS.index)
     return {one["row"]: (one["text"], one["effect"]) for one in found}
-
-
-def test_the_examples_run() -> None:
-    assert doctest.testmod(validity).failed == 0
 
 
 def test_rows_are_those_of_the_document(repository: Path) -> None:
@@ -59,12 +54,6 @@ def test_amplitudes_beyond_those_of_contacts_ask_for_metres(surrogate: Surrogate
     assert "units" not in rows(surrogate, y0=2e-2)  # y~ = 6667
 
 
-def test_large_amplitudes_hardly_depend_on_k(surrogate: Surrogate) -> None:
-    text, effect = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.5)["k is known"]
-    assert effect < 1e-3
-    assert "hardly" in text
-
-
 def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
     text, _ = rows(surrogate, v0=1e-6)["steady cycle"]
     periods, seconds = (float(x) for x in re.findall(r"([\d.e+]+) (?:periods|s$)", text))
@@ -77,11 +66,11 @@ def test_creeping_and_rest_are_told(surrogate: Surrogate) -> None:
 
 def test_slip_path_tilt_and_heat_have_their_sizes(surrogate: Surrogate) -> None:
     found = rows(surrogate, k=1.3e7, y0=5e-6, v0=0.01)
-    way = float(re.search(r"slip path ([\d.e-]+) m a period", found["Coulomb friction"][0])[1])
+    way = float(re.findall(r"slip path ([\d.e-]+) m a period", found["Coulomb friction"][0])[0])
     assert way == close(4.0 * 5e-6, rel=0.1)  # the foot follows the motion but for l0 = 0.23 um at each turn
     assert found["Coulomb friction"][1] == close(0.01 * math.log(100.0) / 0.3, rel=1e-12)
     assert found["constant normal force"][1] == close(1.21 * 0.3 * 0.01 * 5e-6 / (3.0 / 1.3e7), rel=1e-12)
-    watts = float(re.search(r"turns ([\d.]+) W", found["no wear, no heating"][0])[1])
+    watts = float(re.findall(r"turns ([\d.]+) W", found["no wear, no heating"][0])[0])
     assert watts == close(3.0 * way * 20e3, rel=0.1)
     assert "constant normal force" not in rows(surrogate)
 
@@ -92,7 +81,7 @@ def test_nothing_is_said_where_nothing_oscillates_or_gives_way(surrogate: Surrog
 
 
 def test_the_other_contact_is_told_with_the_difference(surrogate: Surrogate) -> None:
-    case = {"k": 1.307e7, "y0": 0.2e-6, "v0": 0.005}
+    case: Case = {"k": 1.307e7, "y0": 0.2e-6, "v0": 0.005}
     text, effect = rows(surrogate, **case)["one spring"]
     assert effect == close(0.2551 / 0.2477 - 1.0, abs=5e-4)
     assert "ball" in text

@@ -1,6 +1,7 @@
 """Many points at once against one by one: the same bits, for all positions and numbers of points."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -149,8 +150,8 @@ def test_every_level_with_fused_multiply_add_gives_the_same_bits(table: Surrogat
     v, y = log_uniform(rng, 1e-9, 1e6, n), log_uniform(rng, 1e-6, 1e8, n)
     code, data = charts.QUANTITY_NAMES.index(name), table._with(name)
 
-    def asked(kernel: Kernel) -> list[Array]:
-        found: list[Array] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]
+    def asked(kernel: Kernel) -> list[Any]:
+        found: list[Any] = [np.empty(n), np.empty(n), np.empty(n, np.int8), np.empty((5, n))]
         kernel.values(data, code, v, y, *found[:3])
         kernel.slopes(data, code, v, y, found[3])
         return found
@@ -180,7 +181,7 @@ def test_contacts_and_directions_have_the_same_bits(table: Surrogate, kind: tupl
     six[5][:20], six[3][20:40], six[2][40:60] = 0.0, 0.0, np.inf
     put_rules(table._data, table.tolerance)
 
-    def asked(kernel: Kernel, part: slice) -> list[Array]:
+    def asked(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]
         rows, source = np.empty((17, columns[0].size)), np.empty(columns[0].size, np.int8)
         kernel.cases(table._data, source.size, columns, rows, source, kind=kind)

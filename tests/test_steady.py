@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import fixed_quad
 
 from builder import model, sections, steady
@@ -20,17 +19,12 @@ from builder.sweep import Sweep
 from mumacro import InputError
 from mumacro.closed_forms import outer, second_order
 from tests import naive
+from tests.cases import log_uniform
 from tests.comparing import close
-
-Array = NDArray[np.float64]
 
 ORDINARY = [(0.1, 0.5), (2.0, 1.0), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (0.02, 1.05), (1.5, 20.0)]
 STICKING = [(0.1, 0.5), (0.05, 3.0), (0.3, 1.0), (0.6, 1.9), (1e-6, 0.7), (1e-6, 1.0), (1e-5, 5.0), (1.5, 20.0)]
 SLIDING = [(2.0, 1.0), (0.5, 0.3), (1.0, 3.0), (20.0, 0.01), (30.0, 400.0), (0.05, 0.3)]
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
-    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
 
 
 # --- against the reference ----------------------------------------------------------------------------
@@ -92,6 +86,9 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     def uy(s: Any) -> Any:
         return uy0 - 2.0 * y * np.sin(0.5 * (s + start)) * np.sin(0.5 * (s - start))
 
+    def effort(s: Any) -> Any:
+        return -y * np.sin(s) * uy(s)
+
     # slip stops where lam = 0; stick ends where |u| = 1 again, and never passes it in between
     assert v * ux(start) - y * math.sin(start) * uy(start) == close(0.0, abs=1e-15 * (1.0 + y))
     stop = start + duration
@@ -100,7 +97,7 @@ def test_sticking_orbit_closes_and_its_stick_phase_works_as_computed_by_quadratu
     assert np.hypot(ux(inside), uy(inside)).max() <= 1.0 + 4e-15
 
     stick_mean = fixed_quad(ux, start, stop, n=200)[0]
-    shaker = fixed_quad(lambda s: -y * np.sin(s) * uy(s), start, stop, n=200)[0]
+    shaker = fixed_quad(effort, start, stop, n=200)[0]
     assert v * stick_mean + shaker == close(0.0, abs=1e-13 * (1.0 + y))  # the spring stores no net energy
 
     assert (stick_mean + out[SUM_UX]) / math.pi == close(res[steady.MU_RATIO], abs=1e-15)
@@ -131,7 +128,7 @@ def fast(v: float, r: float) -> float:
 
 
 #: error of a limit, the parameter at three places, each a share of the last; the order of the error, and within what
-LIMITS: list[tuple[Callable[[float], float], tuple[float, float, float], float, float]] = [
+LIMITS: list[tuple[Callable[..., float], tuple[float, float, float], float, float]] = [
     *((lambda v, y=y: static(v, y), (1e-5, 1e-6, 1e-7), 1.5, 0.05) for y in (0.1, 0.5, 0.9)),  # eq. (16)
     *((lambda y, v=v: solve(v, y).deficit / (y * y / (4.0 * (1.0 + v * v))) - 1.0, (0.08, 0.04, 0.02), 2.0, 0.05)
       for v in (0.5, 3.0, 100.0)),  # eq. (31)
@@ -144,8 +141,8 @@ LIMITS: list[tuple[Callable[[float], float], tuple[float, float, float], float, 
 
 
 @pytest.mark.parametrize(("error", "places", "order", "within"), LIMITS)
-def test_a_limit_is_approached_with_the_order_of_its_error(
-    error: Callable[[float], float], places: tuple[float, float, float], order: float, within: float
+def test_a_limit_has_the_order_of_its_error(
+    error: Callable[[float], float], places: tuple[float, ...], order: float, within: float
 ) -> None:
     first, one, two = (error(place) for place in places)
     assert abs(first) > abs(one)
@@ -223,24 +220,12 @@ def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> Non
     assert found.mu_ratio == close(steady.border(y)[1], rel=1e-14)
 
 
-def test_mu_minus_its_smooth_continuation_starts_quadratically_below_the_border(sweep: Sweep) -> None:
-    y = np.array([0.3, 1.0, 5.0])
-    crit = sweep.solve("border", np.ones(3), y)["deficit"]
-    gaps = []
-    for distance in (2e-4, 1e-4):
-        v = crit * (1.0 - distance)
-        gaps.append(sweep.solve("full", v, y)["mu_ratio"] - sweep.solve("continuous", v, y)["mu_ratio"])
-    assert np.log2(np.abs(gaps[0] / gaps[1])) == close(2.0, abs=0.02)
-
-
 # --- inputs and failures ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, -0.0, math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize(("field", "bounds"), [("v_tilde", V_RANGE), ("y_tilde", Y_RANGE)])
-def test_inputs_out_of_range_are_refused_with_the_range_and_a_remedy(
-    field: str, bounds: tuple[float, float], bad: float, sweep: Sweep
-) -> None:
+def test_inputs_out_of_range_are_refused(field: str, bounds: tuple[float, float], bad: float, sweep: Sweep) -> None:
     low, high = bounds
     for value in (bad, np.nextafter(low, 0.0), np.nextafter(high, math.inf)):
         point = (value, 0.5) if field == "v_tilde" else (0.5, value)
@@ -248,7 +233,7 @@ def test_inputs_out_of_range_are_refused_with_the_range_and_a_remedy(
             with pytest.raises(InputError) as caught:
                 ask()
             assert caught.value.field == field
-            assert np.array_equal(caught.value.value, value, equal_nan=True)
+            assert repr(caught.value.value) == repr(float(value))
             assert f"from {low:g} to {high:g}" in caught.value.bound
             assert "a table answers" in caught.value.bound
         if field == "y_tilde":
@@ -265,13 +250,16 @@ def test_the_ends_of_the_range_belong_to_it(v: float, y: float) -> None:
 
 @pytest.mark.parametrize("eta", [math.nan, 0.1, -0.5 + 1e-15])
 def test_an_excess_that_is_not_that_of_the_amplitude_is_refused(eta: float, sweep: Sweep) -> None:
-    for ask in (lambda: solve(0.1, 0.5, eta), lambda: sweep.solve("full", [0.1], [0.5], np.array([eta]))):
+    for ask in (
+        lambda: solve(0.1, 0.5, eta),
+        lambda: sweep.solve("full", np.array([0.1]), np.array([0.5]), np.array([eta])),
+    ):
         with pytest.raises(InputError, match=r"eta.* must be y_tilde - 1 to rounding"):
             ask()
 
 
 def test_every_status_has_advice() -> None:
-    codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED, steady.NOT_CONVERGED}
+    codes = {model.OK, model.NO_SLIP, model.NO_STICK, model.TOO_MANY_STEPS, model.DIVERGED, sections.NOT_CONVERGED}
     assert codes == set(ADVICE)
     assert all(ADVICE.values())
 

@@ -10,6 +10,7 @@ import pytest
 from mumacro import InputError, Surrogate, stiffness
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch, in_series
+from tests.cases import Case
 from tests.comparing import close
 
 STEEL, RUBBER, RIGID = Material(210e9, 0.3), Material(5e6, 0.5), Material(math.inf, 0.3)
@@ -60,9 +61,7 @@ def test_a_lying_cylinder_is_stiffer_across_its_axis_and_hardly_depends_on_the_l
 
 
 @pytest.mark.parametrize(("across", "along"), [(1.3, 1.0), (1.0, 1.3)])
-def test_of_two_stiffnesses_the_one_of_the_oscillation_belongs_in_the_model(
-    surrogate: Surrogate, across: Any, along: Any
-) -> None:
+def test_of_two_stiffnesses_the_oscillations_is_the_models(surrogate: Surrogate, across: Any, along: Any) -> None:
     """Eqs. (9) to (12) with two springs, marched: ``across`` along the sliding, ``along`` along the oscillation."""
     v, y = (x.ravel() for x in np.meshgrid([0.2, 0.6, 2.0], [0.3, 0.8, 1.2, 3.0, 10.0], indexing="ij"))
     steps, springs = 1000, np.array([[across], [along]])
@@ -136,16 +135,14 @@ def test_a_named_geometry_is_its_function() -> None:
 
 @pytest.mark.parametrize(
     ("geometry", "given", "said"),
-    [
-        ("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
-        ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
-        ("cylinder", {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3}, "oscillation must be given: how"),
-        ("ball", {"length": 1.0}, "length must be left out: unknown field"),
-        ("ball", {"radius": "5mm"}, "radius must be a real number"),
-        ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
-        ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0"),
-    ],
-)
+    [("cone", {}, "geometry must be one of ball, flat, cylinder, got 'cone'"),
+     ("ball", {"radius": 1.0, "E": 1e9, "nu": 0.3}, r"Fz must be given \[N\]: normal force"),
+     ("cylinder", {"radius": 1.0, "length": 1.0, "Fz": 1.0, "E": 1e9, "nu": 0.3}, "oscillation must be given: how"),
+     ("ball", {"length": 1.0}, "length must be left out: unknown field"),
+     ("ball", {"radius": "5mm"}, "radius must be a real number"),
+     ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
+     ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0")],
+)  # fmt: skip
 def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         contact_of(geometry, **given)
@@ -162,7 +159,7 @@ def test_arguments_are_read_with_units() -> None:
 
 
 def test_a_result_can_be_passed_on(surrogate: Surrogate) -> None:
-    case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
+    case: Case = {"mu0": 0.3, "Fz": 10.0, "y0": 2e-6, "f": 20e3, "v0": 0.01}
     punch, ball = flat_punch(1e-3, 10.0, STEEL, STEEL), ball_on_flat(5e-3, 10.0, STEEL, STEEL)
     assert surrogate.evaluate(**punch, **case).mu_macro == surrogate.evaluate(k=punch.k, **case).mu_macro
     assert dict(ball) == {"k": ball.k, "contact": "ball"}

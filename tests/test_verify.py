@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from builder.measure import SEAMS, block_errors, fast_from
 from builder.quantities import SOLVED, solver_noise
@@ -16,18 +15,15 @@ from builder.verify import CASES, draw, monotony, seam_jumps, seam_slope_jumps, 
 from mumacro import Surrogate
 from mumacro.charts import CHARTS, NAMES, QUANTITY_NAMES, SIGMA_CUT, SOURCES
 from mumacro.table import read_table
-from tests.cases import Case
+from tests.cases import Array, Case, tables
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
-Array = NDArray[np.float64]
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-7.nc"
 
 
-@pytest.fixture(scope="module")
-def sound() -> Surrogate:
-    return Surrogate.open(TABLE)
+sound = tables(1e-7)
 
 
 @pytest.fixture(scope="module")
