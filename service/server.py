@@ -17,6 +17,7 @@ __all__ = ["Connection"]
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
+_PIECE = 2048  # bytes of a head that are read before its fields are counted
 _MARGIN_S = 2.0  # after the deadline of an answer, which the application keeps itself where it can
 _LOOK_EVERY_S = 0.25  # whether the time of a connection is over
 _TOO_LARGE = RequestError(Kind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes")
@@ -132,14 +133,16 @@ class Connection(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Read some bytes, unless they follow a request that is not answered yet."""
-        if self._second or self.transport.is_closing():
-            return
-        self._bytes += len(data)
-        super().data_received(data)
+        start = 0
+        while start < len(data) and not self._second and not self.transport.is_closing():
+            stop = len(data) if self._busy and not self._in_head else start + _PIECE
+            piece = data[start:stop]
+            start, self._bytes = stop, self._bytes + len(piece)
+            super().data_received(piece)
+            if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):  # also behind a body
+                self._refuse(_TOO_LARGE)
         if self._in_head or not self._busy or (self.cycle.more_body and not self._in_batch()):
             self._watch()
-        if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):  # also behind a body
-            self._refuse(_TOO_LARGE)
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what the parser, or a limit here, has refused."""
