@@ -24,6 +24,8 @@ import orjson
 import pyarrow as pa
 
 from benchmarks.measuring import ROOT, main, markdown, progress, sections
+from mumacro.geometries import GEOMETRIES
+from mumacro.stiffness import AXES
 from tests.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"
@@ -49,6 +51,7 @@ def case(chance: random.Random) -> dict[str, float]:
     return {name: 10.0 ** chance.uniform(*span) for name, span in spans.items()}
 
 
+CONTACTS, DIRECTIONS = ("spring", "ball"), ("across", "along", "normal")
 INCLUDED = ("groups", "gradient", "power", "stick_fraction", "std", "settling", "border")
 
 
@@ -63,13 +66,34 @@ def document(chance: random.Random) -> tuple[str, Any]:
         one["f"] = one.pop("omega")
     one |= {} if chance.random() < 0.9 else {"k": chance.choice([None, "rigid"])}
     one |= {} if chance.random() < 0.9 else {"tolerance": 1e-3}
+    one |= {} if chance.random() < 0.7 else {"contact": chance.choice(CONTACTS), "direction": chance.choice(DIRECTIONS)}
+    if one.get("direction") == "normal":
+        del one["y0"]
+        one["Fz_amplitude"] = one["Fz"] * chance.random()
+    if chance.random() < 0.05 and isinstance(one["k"], float):
+        one["k_range"] = [one["k"], one.pop("k") * 10.0 ** chance.uniform(0, 2)]
     rest = {name: value for name, value in one.items() if name != "v0"}
+    speeds = sorted(10.0 ** chance.uniform(-5, 1) for _ in range(chance.choice([1, 3, 6])))
+    measured = {"Fz": 10.0, "omega": 6e5, "v0": speeds, "mu_macro": [0.3 * v / (v + 0.1) for v in speeds]}
+    measured["y0"] = chance.choice([2e-6, [2e-6] * len(speeds)])
+    half = {"unknowns": ["k"], "mu0": 0.3}
+    geometry = chance.choice([*GEOMETRIES])
+    bodies: dict[str, Any] = {
+        "geometry": chance.choice([*GEOMETRIES]),
+        "radius": 5e-3,
+        "Fz": 10.0,
+        "E": 210e9,
+        "nu": 0.3,
+    }
+    bodies |= {"length": 0.01, "oscillation": chance.choice(AXES)} if geometry == "cylinder" else {}
     return chance.choice((
         ("/v1/mu-macro", one),
         (BATCH, {**one, "v0": [10.0 ** chance.uniform(-5, 1) for _ in range(chance.choice([0, 1, 2, 5, 300]))]}),
         (BATCH, [case(chance) for _ in range(chance.choice([0, 1, 2, 5, 60]))]),
         ("/v1/solve-for", {**rest, "unknown": "v0", "target": chance.choice([0.1, 0.5, [0.01, 0.2]])}),
         ("/v1/law", {**rest, "start": 1e-4, "stop": 1.0, "points": chance.choice([2, 5, 50])}),
+        ("/v1/fit", {**measured, **({} if chance.random() < 0.5 else half), "contact": chance.choice(CONTACTS)}),
+        ("/v1/stiffness", bodies),
     ))  # fmt: skip
 
 
@@ -97,7 +121,8 @@ VALUES = (
     '"' + "x" * 3000 + '"', "[" + "1," * 2000 + "1]", "/*1*/", "'1'", "undefined", "", ",", "\ufeff1", "\u2028",
 )  # fmt: skip
 NAMES = (
-    *CASE, "f", "include", "std", "tolerance", "target", "unknown", "points", "name", "input", "", "\u00e9",
+    *CASE, "f", "include", "std", "tolerance", "target", "unknown", "points", "name", "input", "contact", "k_range",
+    "k_low", "k_high", "geometry", "radius", "unknowns", "mu_macro", "mu_macro_std", "", "\u00e9",
     "__proto__", "mu0 ", "MU0", "constructor", "x" * 2000,
 )  # fmt: skip
 

@@ -77,7 +77,8 @@ def fit(
     """
     names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
     problem = _Problem(data, names, contact, direction, surrogate or _bundled(), fixed)
-    found = problem.solve()
+    with np.errstate(all="ignore"):  # numbers of any size: what they cannot tell is infinite
+        found = problem.solve()
     for text in found.warnings:
         warnings.warn(text, stacklevel=2)
     return found
@@ -150,9 +151,10 @@ class _Problem(Measured):
         values = solutions[0][1]
         logs = self._covariance(values, variance)
         scale = np.array([x if math.isfinite(x) else 1.0 for x in values.values()])
-        covariance = logs * np.outer(scale, scale)
-        std = {name: float(math.sqrt(x)) for name, x in zip(values, np.diag(covariance), strict=True)}
-        interval = self._interval(scan, chi2, width, variance, values, np.sqrt(np.diag(logs)))
+        covariance = np.where(np.isinf(logs), logs, logs * np.outer(scale, scale))
+        off = np.sqrt(np.diag(logs))
+        std = dict(zip(values, (scale * off).tolist(), strict=True))
+        interval = self._interval(scan, chi2, width, variance, values, off)
         listed = tuple({**found, "chi2": value} for value, found, _ in solutions)
         points = {**self.columns, "mu_macro": self.mu, **({} if self.std is None else {STD: self.std})}
         return Fit(
@@ -180,6 +182,8 @@ class _Problem(Measured):
         start = np.log(list(values.values()))
         bounds = start - 2.5, start + 2.5
         found = least_squares(residuals, start, slopes, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+        if not np.isfinite(found.x).all():  # scipy divides 0 by 0 where no point tells k
+            return float(scan.chi2[node]), values, node
         return 2.0 * float(found.cost), self._values(found.x), node
 
     def _values(self, logs: Array) -> dict[str, float]:
@@ -217,7 +221,8 @@ class _Problem(Measured):
             mu0, k = scan.mu0[inside], scan.k[inside]
             side = np.sqrt(room[inside] / scan.rise[inside])
             apart = side / mu0
-            found = {"k": (k * np.maximum(1.0 - apart, 0.0), k * (1.0 + apart)), "mu0": (mu0 - side, mu0 + side)}
+            low = k * np.where(apart < 1.0, 1.0 - apart, 0.0)
+            found = {"k": (low, k * (1.0 + apart)), "mu0": (np.maximum(mu0 - side, 0.0), mu0 + side)}
         ends = {name: (float(found[name][0].min()), float(found[name][1].max())) for name in values}
         if "k" in ends and inside[0]:
             ends["k"] = 0.0, ends["k"][1]

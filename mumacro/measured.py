@@ -21,6 +21,7 @@ HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.m
 STD = "std"  # the column of standard deviations
 #: how far a point may lie outside of what is possible: standard deviations; where they are not given, of mu0
 _SCATTER, _SHARE = 5.0, 0.05
+_LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
 
 
 class Measured:
@@ -90,14 +91,18 @@ class Measured:
         self.n = n
 
     def _check(self) -> None:
+        if "mu0" in self.columns:
+            _refuse("mu0", self.columns["mu0"], self.columns["mu0"] <= _MOST, f"<= {_MOST:g}")
         if self.std is not None:
-            _refuse("std", self.std, (self.std > 0.0) & np.isfinite(self.std), "finite and > 0")
+            bound = f"finite and > 0, from {_LEAST:g} to {_MOST:g}"
+            _refuse("std", self.std, (self.std >= _LEAST) & (self.std <= _MOST), bound)
         self.weight = np.ones(self.n) if self.std is None else 1.0 / self.std
         top = self.columns.get("mu0", np.full(self.n, np.fmax.reduce(np.abs(self.mu), initial=0.0)))
         scatter, told = _SHARE * top, f"within {100.0 * _SHARE:g} %; give std where the points scatter more"
         if self.std is not None:
             scatter, told = _SCATTER * self.std, f"within {_SCATTER:g} standard deviations"
-        _refuse("mu_macro", self.mu, np.isfinite(self.mu) & (self.mu >= -scatter), f"finite and >= 0, {told}")
+        legal = (self.mu <= _MOST) & (self.mu >= -scatter)
+        _refuse("mu_macro", self.mu, legal, f"finite and >= 0, <= {_MOST:g}, {told}")
         settings = len(np.unique(np.column_stack([*self.columns.values()]), axis=0))
         if settings < len(self.unknowns):
             raise InputError(
@@ -105,8 +110,9 @@ class Measured:
                 f"points with at least {len(self.unknowns)} different inputs, one for each unknown "
                 f"({', '.join(self.unknowns)}); measure more, or fix one of the two",
             )  # fmt: skip
-        if not self.mu.any():
-            raise InputError("mu_macro", 0.0, "> 0 in at least one point: friction of zero tells nothing")
+        if self.mu.max() < _LEAST:
+            bound = f"> 0 in at least one point, >= {_LEAST:g}: friction of zero tells nothing"
+            raise InputError("mu_macro", float(self.mu.max()), bound)
         oscillates = (self.columns[self.amplitude] > 0.0) & (self.columns["omega"] > 0.0)
         if "k" in self.unknowns and not oscillates.any():
             raise InputError("data", f"{self.n} points without oscillation",

@@ -1,5 +1,6 @@
 """mumacro.fit: inputs recovered within their covariance, what points do not tell, bad input."""
 
+import itertools
 import math
 import warnings
 from typing import Any
@@ -241,3 +242,26 @@ def test_points_that_do_not_depend_on_k_are_refused() -> None:
     within = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.301], "std": 1e-3}
     assert fit(within, "k", mu0=0.3, **RIG).values["k"] > 0.0
     assert fit({"v0": [1e-3, 0.1, 1.0], "mu_macro": [-1e-4, 0.1, 0.3], "std": 1e-3}, **RIG).values["k"] > 0.0
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
+    """One number of an ordinary measurement is replaced by one of any size."""
+    chance = np.random.default_rng(seed)
+    sizes = [0.0, 5e-324, 1.7e308, 1e20, *10.0 ** chance.uniform(-307, 308, 3)]
+    columns = {
+        "v0": V0[::5],
+        "y0": np.full(4, 2e-6),
+        "mu_macro": np.array([0.02, 0.1, 0.2, 0.3]),
+        "std": np.full(4, 0.01),
+    }
+    for name, size, scattered in itertools.product(columns, sizes, (True, False)):
+        data = {key: x.copy() for key, x in columns.items() if key != "std" or not scattered}
+        data.setdefault(name, columns[name].copy())[chance.integers(4)] = size
+        try:
+            found = fit(data, Fz=10.0, f=20e3)
+        except InputError:
+            continue
+        told = [*found.values.values(), *found.std.values(), *sum(found.interval.values(), ()), *found.covariance.flat]
+        assert not np.isnan([*told, found.chi2, *found.residuals]).any(), (name, size)
+        assert min(low for low, _ in found.interval.values()) >= 0.0
