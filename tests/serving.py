@@ -81,9 +81,8 @@ class Server:
         return next(int(line.split()[1]) for line in lines if line.startswith(what)) / 1024.0
 
     def busy(self) -> float:
-        """Processor time of all threads [s]."""
-        tasks = Path(f"/proc/{self.process.pid}/task")
-        return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks.iterdir()) / 1e9
+        """Processor time of all threads [s]; the clock's number is that of clock_getcpuclockid(3) on Linux."""
+        return time.clock_gettime(~self.process.pid << 3 | 2)
 
     def errors(self) -> list[str]:
         return [line for line in self.lines if '"logger": "mumacro.error"' in line]
