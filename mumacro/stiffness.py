@@ -37,13 +37,14 @@ from mumacro.errors import InputError
 
 __all__ = ["AXES", "Contact", "Material", "ball_on_flat", "cylinder_on_flat", "flat_punch", "in_series"]
 
+SMALLEST, LARGEST = 1e-60, 1e60  # of numbers in SI: every product of them below is a double
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
 
 
 def _positive(**values: float) -> None:
     for name, value in values.items():
-        if not 0.0 < value < math.inf:
-            raise InputError(name, value, "finite and > 0")
+        if not SMALLEST <= value <= LARGEST:
+            raise InputError(name, value, f"finite and > 0, from {SMALLEST:g} to {LARGEST:g}")
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,8 @@ class Material:
     nu: float
 
     def __post_init__(self) -> None:
-        if not self.E > 0.0:
-            raise InputError("E", self.E, "> 0")
+        if self.E != math.inf:
+            _positive(E=self.E)
         if not -1.0 < self.nu <= 0.5:
             raise InputError("nu", self.nu, "> -1 and <= 0.5")
 
@@ -161,7 +162,6 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
-    _positive(half_width=a)
     return Contact(8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball")
 
 
@@ -248,7 +248,6 @@ def cylinder_on_flat(
     _positive(radius=radius, length=length, Fz=Fz)
     modulus, _ = _moduli(first, second)
     b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
-    _positive(half_width=b)
     if 2.0 * b > length:
         raise InputError("length", length, f">= {2.0 * b:.3g}, the width of the contact; a shorter one is a punch")
     scale = 2.0 / math.sqrt(math.pi)  # of the ellipse whose area is that of the rectangle

@@ -85,7 +85,7 @@ class Server:
         return time.clock_gettime(~self.process.pid << 3 | 2)
 
     def errors(self) -> list[str]:
-        return [line for line in self.lines if '"logger": "mumacro.error"' in line]
+        return [line for line in self.lines if re.search(r'"logger": ?"mumacro.error"', line)]
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         self.process.send_signal(number)

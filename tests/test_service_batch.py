@@ -215,5 +215,6 @@ def test_a_damaged_arrow_stream_is_answered_or_refused(client: Any, case: Case) 
     bodies = [whole[:i] + bytes([whole[i] ^ 1 << i % 8]) + whole[i + 1 :] for i in range(0, len(whole), 3)]
     bodies += [whole[:i] + lie + whole[i + 4 :] for i in range(0, len(whole) - 4, 16) for lie in lies]
     bodies += [whole[:i] for i in range(0, len(whole), 40)]
+    bodies += [whole[:i] + b"\2" + whole[i + 1 :] for i in range(len(whole))]  # a record batch becomes a dictionary
     statuses = {posted(client, "arrow", body).status_code for body in bodies}
     assert {200, 400} <= statuses <= {200, 400, 413, 422}

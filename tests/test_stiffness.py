@@ -1,6 +1,7 @@
 """Contact stiffness: the textbook's relations, the ellipse by brute force, bounds, the list of geometries."""
 
 import inspect
+import itertools
 import math
 from typing import Any
 
@@ -99,8 +100,8 @@ def test_stiffness_has_its_scaling_laws_and_adds_in_series() -> None:
         ("E", Material, (0.0, 0.3)), ("E", Material, (math.nan, 0.3)),
         ("nu", Material, (1e9, 0.6)), ("nu", Material, (1e9, math.nan)),
         ("radius", ball_on_flat, (-1.0, 1.0, STEEL, STEEL)), ("Fz", ball_on_flat, (1.0, math.inf, STEEL, STEEL)),
-        ("E", ball_on_flat, (1.0, 1.0, RIGID, RIGID)), ("half_width", ball_on_flat, (1e-300, 1e-300, STEEL, STEEL)),
-        ("half_width", cylinder_on_flat, (1e-300, 1.0, 1e-300, STEEL, STEEL, "across")),
+        ("E", ball_on_flat, (1.0, 1.0, RIGID, RIGID)), ("radius", ball_on_flat, (1e-300, 1.0, STEEL, STEEL)),
+        ("Fz", cylinder_on_flat, (1.0, 1.0, 1e-300, STEEL, STEEL, "across")),
         ("oscillation", cylinder_on_flat, (1.0, 1.0, 1.0, STEEL, STEEL, "axial")),
         ("length", cylinder_on_flat, (1.0, 1e-6, 1e3, STEEL, STEEL, "across")),
         ("radius", flat_punch, (0.0, 1.0, STEEL, STEEL)), ("stiffness", in_series, (1.0, -1.0)),
@@ -141,11 +142,26 @@ def test_a_named_geometry_is_its_function() -> None:
      ("ball", {"length": 1.0}, "length must be left out: unknown field"),
      ("ball", {"radius": "5mm"}, "radius must be a real number"),
      ("ball", {"radius": [1.0, 2.0]}, "radius must be one number"),
-     ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be > 0")],
+     ("ball", {"radius": 1.0, "Fz": 1.0, "E": math.nan, "nu": 0.3}, "E must be finite and > 0")],
 )  # fmt: skip
 def test_a_bad_argument_is_named_with_the_remedy(geometry: Any, given: Any, said: Any) -> None:
     with pytest.raises(InputError, match=said):
         contact_of(geometry, **given)
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_numbers_of_any_size_are_refused_or_give_a_contact(geometry: str) -> None:
+    sizes = [5e-324, stiffness.SMALLEST, 1.0, stiffness.LARGEST, 1.7e308]
+    names = [name for name in GEOMETRIES[geometry].arguments if name != "oscillation"]
+    rest: Case = {"nu": 0.3, "E2": math.inf, "nu2": 0.5} | ({"oscillation": "along"} if geometry == "cylinder" else {})
+    for numbers in itertools.product(sizes, repeat=len(names) + 1):
+        given = dict(zip([*names, "E"], numbers, strict=True))
+        try:
+            found = contact_of(geometry, **given, **rest)
+        except InputError:
+            continue
+        told = (found.k, found.k_normal, found.half_width, found.pressure)
+        assert all(0.0 < value < math.inf for value in told), (given, found)
 
 
 def test_arguments_are_read_with_units() -> None:

@@ -42,7 +42,9 @@ def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Co
         if table.num_rows > max_batch:
             raise too_large(max_batch)
         found = {name: _column(table[name], name) for name in table.column_names}
-    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OSError, ValueError) as fault:
+    except (pa.ArrowException, OSError, ValueError) as fault:
+        if isinstance(fault, MemoryError):
+            raise
         reason = (str(fault).splitlines() or [type(fault).__name__])[0][:200]
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not an Arrow stream: {reason}") from None
     return columns_of(found, max_batch, kind=kind), {}
