@@ -69,8 +69,8 @@ class Material:
     nu: float
 
     def __post_init__(self) -> None:
-        if self.E != math.inf:
-            _positive(E=self.E)
+        rigid = math.isinf(self.E) and self.E > 0.0
+        _positive(E=LARGEST if rigid else self.E)
         if not -1.0 < self.nu <= 0.5:
             raise InputError("nu", self.nu, "> -1 and <= 0.5")
 
