@@ -11,7 +11,7 @@ export class Trouble extends Error {
 }
 
 const SLOW_MS = 1_500; // after which the old answer is marked as old
-const AGAIN_S = [1, 2, 4, 8]; // between attempts, as long as there is no answer
+const AGAIN_S = 8; // at most, between attempts; the first ones follow sooner
 const channels = [];
 const wakeAll = () => channels.forEach((one) => one.wake());
 addEventListener("online", wakeAll);
@@ -65,7 +65,7 @@ export class Channel {
     if (kind === "key") keyRefused();
     return new Promise((wake) => {
       this.wake = wake;
-      if (kind === "later") setTimeout(wake, 1000 * (seconds ?? AGAIN_S[Math.min(tries, AGAIN_S.length - 1)]));
+      if (kind === "later") setTimeout(wake, 1000 * (seconds ?? Math.min(2 ** tries, AGAIN_S)));
     });
   }
 
@@ -104,17 +104,19 @@ export class Status {
 // --- the API key: kept for this tab, sent as a header, never part of an address ------------------------------
 
 const NAME = "mumacro-api-key";
-let apiKey = null;
-try {
-  apiKey = sessionStorage.getItem(NAME);
-} catch { /* storage is switched off: the key lives as long as the page */ }
+/** What `use(storage)` is; null where storage is switched off: there the key lives as long as the page. */
+function stored(use) {
+  try {
+    return use(sessionStorage);
+  } catch {
+    return null;
+  }
+}
+let apiKey = stored((all) => all.getItem(NAME));
 
 function setKey(key) {
   apiKey = key;
-  try {
-    if (key === null) sessionStorage.removeItem(NAME);
-    else sessionStorage.setItem(NAME, key);
-  } catch { /* as above */ }
+  stored((all) => (key === null ? all.removeItem(NAME) : all.setItem(NAME, key)));
 }
 
 /** The options of a request, with the key where there is one; its answer is then kept by nobody. */

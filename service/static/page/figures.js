@@ -1,11 +1,11 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
-import { Field } from "./forms.js";
+import { fill, offer } from "./forms.js";
 import {
-  INPUTS, caseOf, fromSI, inUnit, inWords, namesOf, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  INPUTS, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
-import { post } from "./service.js";
+import { get, post } from "./service.js";
 
 const EMPTY = "\u00a0"; // keeps its line
 const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
@@ -41,9 +41,9 @@ function coloured(ratio, width, height) {
   return canvas.toDataURL();
 }
 
-/** The map: `set({ name: value [SI] })`, `nudge(name, steps)`; its parts are called when what they take is there. */
-export function mapPanel(set, nudge) {
-  let state, caption, data, ratio, image, frame, answer, point;
+/** The map: `set({ name: value [SI] })`, `nudge(name, steps)`; that it cannot be had is told to `status`. */
+export function mapPanel(set, nudge, status) {
+  let state, answer, data, ratio, image, frame, point;
   const plot = new Plot($("map"), paint);
 
   function read(x, y) {
@@ -60,9 +60,9 @@ export function mapPanel(set, nudge) {
     if (length && omega && isMapped(state)) set({ v0: v * length * omega, y0: y * length });
   }
 
-  /** Marks the point of an answer: { asked, groups, mu_ratio, regime }; says where there is none. */
-  function mark(found = answer) {
-    [answer, point] = [found, null];
+  /** Marks the point of the answer; says where there is none. */
+  function mark() {
+    point = null;
     plot.redraw();
     if (!answer) return;
     const { groups: { v_tilde, y_tilde, l0 }, asked, mu_ratio, regime } = answer;
@@ -111,15 +111,15 @@ export function mapPanel(set, nudge) {
     pick: (x, y) => frame && pick(frame.x.value(x), frame.y.value(y)),
     step: (right, up) => isMapped(state) && nudge(right ? "v0" : "y0", right || up),
   });
-  $("map-image").addEventListener("click", () => plot.save(caption, "friction-map.svg"));
-  return {
-    mark, sync: (...now) => { [state, caption] = now; },
-    /** Takes map.json. */
-    show(found) {
-      [data, ratio] = [found, interpolated(found)];
-      image = coloured(ratio, FINE * (data.v_tilde.n - 1), FINE * (data.y_tilde.n - 1));
-      mark();
-    },
+  $("map-image").addEventListener("click", () => plot.save(caption(state), "friction-map.svg"));
+  status.channel("map", () => get("static/page/map.json"), (found) => {
+    [data, ratio] = [found, interpolated(found)];
+    image = coloured(ratio, FINE * (data.v_tilde.n - 1), FINE * (data.y_tilde.n - 1));
+    mark();
+  }).push(null);
+  return (...now) => {
+    [state, answer] = now;
+    mark();
   };
 }
 
@@ -129,8 +129,8 @@ const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 
 /** The interval of the swept input: what was chosen, else whole decades around the point and its border. */
-function lawRange({ along, scale, given, range }, border) {
-  if (range) return range;
+function lawRange({ along, scale, given }, border) {
+  if (given.range.text) return given.range;
   const { unit, low, high } = given[along];
   const sizes = [low, high, along === "v0" ? border : null].filter((value) => value > 0 && Number.isFinite(value));
   if (!sizes.length) sizes.push(readValue(along, INPUTS[along].start).low);
@@ -141,10 +141,9 @@ function lawRange({ along, scale, given, range }, border) {
   return readInterval(along, (scale === "linear" ? linear : decades).join(".."), unit);
 }
 
-/** The law: `change(part of the state)`, `set({ name: value [SI] })`, `nudge(name, steps)`; -> what follows the state
- *  with its caption and the last answer. */
-export function lawPanel(change, set, nudge) {
-  let state, caption, answer, asked, law, frame, along, unit;
+/** The law: `set({ name: value [SI] })`, `nudge(name, steps)`. */
+export function lawPanel(set, nudge) {
+  let state, answer, asked, law, frame, along, unit;
   let cursor = null;
   const status = new Status("law-status", "law-section");
   const channel = status.channel("law", (request) => post("v1/law", request), (found, { scale }) => {
@@ -224,26 +223,19 @@ export function lawPanel(change, set, nudge) {
     pick: (x) => frame && set({ [along]: toSI(along, frame.x.value(x), unit) }),
     step: (right) => right && nudge(along, right),
   });
-  const range = new Field($("range"), (typed) => (typed.trim() === "" ? null : readInterval(along, typed, unit)),
-    (found) => change({ range: found }), (fault) => status.set("typed", fault && `range: ${fault}.`));
-  $("along").addEventListener("change", () => change({ along: $("along").value, range: null }));
-  $("scale").addEventListener("change", () => change({ scale: $("scale").value }));
   $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${along}.csv`));
-  $("law-image").addEventListener("click", () => law && plot.save(caption, `friction-law-${along}.svg`));
+  $("law-image").addEventListener("click", () => law && plot.save(caption(state, along), `friction-law-${along}.svg`));
 
   return (...now) => {
-    if (state?.direction !== now[0].direction) {
-      $("along").replaceChildren(...namesOf(now[0]).map((name) => new Option(INPUTS[name].symbol, name)));
-    }
-    [state, caption, answer] = now;
-    if (along !== state.along) range.blame(null);
+    const { range } = now[0].given;
+    if (now[0] !== state) fill($("range"), range); // what is being typed stays
+    [state, answer] = now;
+    offer($("along"), state, "symbol");
     along = state.along;
     unit = state.given[along].unit;
-    $("along").value = along;
-    $("scale").value = state.scale;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
-    range.input.placeholder = chosen;
-    range.show(state.range ? chosen : "");
+    $("range").placeholder = chosen;
+    status.set("typed", range.fault && `range: ${range.fault}.`);
     tell();
     const request = { ...caseOf(state, [along], true), along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;

@@ -21,10 +21,7 @@ export const CHOICES = {
 };
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
-const POWER = {
-  offered: ["kW", "mW", "µW", "nW", "W"],
-  units: { kW: [1e3, 1], W: [1, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9] },
-};
+const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9], W: [1, 1] } };
 export const RIGID = { text: "rigid", unit: "N/µm", low: Infinity, high: Infinity };
 
 /** What names.json says: `knows` (what the host of the page can do), the geometries of a contact, their arguments. */
@@ -64,15 +61,15 @@ export function show(value, digits = 6) {
   if (!Number.isFinite(value)) return "∞";
   const size = Math.abs(value);
   const short = size === 0 || (size >= 1e-4 && size < 10 ** Math.max(digits, 5));
-  if (short) return String(Number(value.toPrecision(digits)));
-  const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-  return `${Number(mantissa)}e${Number(exponent)}`;
+  const close = Number(value.toPrecision(digits));
+  return short ? String(close) : close.toExponential().replace("e+", "e");
 }
 
 /** A value [SI] as text in a unit, or in the offered one that suits it. */
 export function inUnit(name, value, unit = null, digits = 4) {
   if (value === null) return "–";
-  const sizes = kindOf(name).offered.map((one) => [one, Math.abs(fromSI(name, value, one))]);
+  const { units, offered = Object.keys(units) } = kindOf(name);
+  const sizes = offered.map((one) => [one, Math.abs(fromSI(name, value, one))]);
   sizes.sort((a, b) => a[1] - b[1]);
   const [suits] = sizes.find(([, size]) => size >= 1) ?? sizes.at(-1);
   return withUnit(show(fromSI(name, value, unit ?? suits), digits), unit ?? suits);
@@ -170,6 +167,9 @@ export function readInterval(name, text, unit) {
   return { text: `${first}..${high.text}`, unit: high.unit, low: low.low, high: high.low };
 }
 
+/** A typed range of the law: an interval, or nothing. */
+const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval(name, text, unit));
+
 /** A value of an input [SI] as a quantity with so many digits. */
 export const rounded = (name, value, unit, digits) =>
   readValue(name, String(Number(fromSI(name, value, unit).toPrecision(digits))), unit);
@@ -182,19 +182,15 @@ export function readPoints(text) {
   const lines = text.split("\n").map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
   const rows = lines.map((line) => line.split(between).map((cell) => cell.trim()));
   if (!rows.length) refuse("paste points: v₀ and µ, one point a line");
-  let [names, unit] = [COLUMNS.map(([name]) => name).slice(0, rows[0].length), "m/s"];
   const headed = /^[^\d.+−-]/.test(rows[0][0]);
-  if (headed) {
-    const head = rows.shift();
-    names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
-    const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
-    if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, each once`);
-    const named = /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1];
-    if (named !== undefined) unit = readUnit("v0", named);
-  }
+  const head = headed ? rows.shift() : COLUMNS.map(([name]) => name).slice(0, rows[0].length);
+  const names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
+  const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
+  if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, each once`);
   const complete = names.includes("v0") && names.includes("mu_macro") && (headed || rows[0].length <= 3);
   if (!complete) refuse("needs two or three columns: v0, mu_macro, std");
   if (!rows.length) refuse("paste points below the names of the columns");
+  const unit = readUnit("v0", /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1] ?? "m/s");
   return Object.fromEntries(names.map((name, j) => [name, rows.map((row, i) => {
     const line = `line ${i + 1 + headed}`;
     if (row.length !== names.length) refuse(`${line} has ${row.length} values, not ${names.length}`);
@@ -205,11 +201,26 @@ export function readPoints(text) {
 
 // --- the state of the page, the case that it asks for, and its address, in the words of the command line: "y0=2um" ---
 
-/** `given` has a quantity for each input; `range` is null or an interval of the input that the law goes along. */
-export const startState = () => ({
-  given: Object.fromEntries(Object.entries(INPUTS).map(([name, { start }]) => [name, readValue(name, start)])),
-  contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: null,
-});
+/** The range of a law over which nobody chose one. */
+export const ANY = { text: "" };
+
+/** `given` has a quantity for each input, and the `range` of the input that the law goes along. */
+export function startState() {
+  const given = Object.fromEntries(Object.entries(INPUTS).map(([name, { start }]) => [name, readValue(name, start)]));
+  const chosen = { contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log" };
+  return { ...chosen, given: { ...given, range: ANY } };
+}
+
+/** What is typed for an input or the range; if it cannot be used, what was there, with `typed` and its `fault`. */
+export function readTyped({ given, along }, name, text) {
+  const input = name === "range" ? along : name;
+  const read = name === "range" ? readRange : readValue;
+  const { found, fault } = attempt(() => read(input, text, given[input].unit));
+  return fault ? { ...given[name], typed: text, fault } : found;
+}
+
+/** A quantity without what is typed and cannot be used. */
+export const untyped = ({ typed, fault, ...good }) => good;
 
 /** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
 export function valueOf({ given }, name) {
@@ -232,6 +243,12 @@ export function caseOf(state, without = [], whole = false) {
     ...namesOf(state).filter((name) => !without.includes(name)).map(entry),
     ...chosen.map(([name]) => [name, state[name]]),
   ]);
+}
+
+/** The inputs in one line, without one of them. */
+export function caption(state, without) {
+  const names = namesOf(state).filter((name) => name !== without);
+  return names.map((name) => `${symbolOf(name, state.given[name].unit)} = ${state.given[name].text}`).join(", ");
 }
 
 /** The power, where it is known: not for a normal force that oscillates. */
@@ -259,7 +276,8 @@ export function toAddress(state) {
   const keyOf = (name) => (symbolOf(name, state.given[name].unit) === "f" ? "f" : name);
   const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state.given[name])}`);
   parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
-  return `#${[...parts, ...(state.range ? [`range=${inAddress(state.range)}`] : [])].join("&")}`;
+  if (state.given.range.text) parts.push(`range=${inAddress(state.given.range)}`);
+  return `#${parts.join("&")}`;
 }
 
 /** { state, faults }: what an address says, start values in place of what cannot be used, and why, in words. */
@@ -280,7 +298,7 @@ export function fromAddress(hash) {
   if (given.has("omega")) take("f", () => refuse("omega is given, too"));
   for (const name of namesOf(state)) take(name, (text) => readValue(name, text, INPUTS[name].unit), state.given);
   take("f", (text) => readValue("omega", text, "Hz"), state.given, "omega");
-  take("range", (text) => readInterval(state.along, text, INPUTS[state.along].unit));
+  take("range", (text) => readInterval(state.along, text, INPUTS[state.along].unit), state.given);
   for (const key of [...given.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };
 }

@@ -1,62 +1,58 @@
 // The page: one state, the questions that follow from it, and what the answers change.
 import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
-import { Form, fit, solver, stiffness } from "./forms.js";
+import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
-  CHOICES, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, isWide, namesOf, question, rounded,
-  setNames, show, startState, symbolOf, toAddress, valueOf,
+  ANY, CHOICES, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, isWide, namesOf, question, readTyped,
+  rounded, setNames, show, startState, toAddress, untyped, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
 import { get, post } from "./service.js";
 
-let state, form, map, law;
-let panels = []; // functions that follow the state
-let answer = null; // the last one, with the state that asked for it
+let state;
+let parts = []; // functions that follow the state and the last answer
+let answer = null; // with the state that asked for it
 
 const status = new Status("status", "main");
 const askPoint = status.channel("point", (asked) => post("v1/mu-macro", question(asked)), (found, asked) => {
   status.answered = true;
   answer = { ...found, asked };
   showAnswer(answer);
-  map.mark(answer);
-  followLaw();
+  follow();
 });
-const askMap = status.channel("map", () => get("static/page/map.json"), (data) => map.show(data));
 
 // --- the state --------------------------------------------------------------------------------------------
 
-const followLaw = () => law(state, caption(state.along), answer);
+const follow = () => parts.forEach((part) => part(state, answer));
 
 let addressTimer = null;
 function change(changed) {
-  Object.assign(state, changed);
-  if (!namesOf(state).includes(state.along)) Object.assign(state, { along: "v0", range: null });
-  form.sync(state);
-  map.sync(state, caption());
-  for (const follow of panels) follow(state);
-  followLaw();
+  state = { ...state, ...changed };
+  if (!namesOf(state).includes(state.along)) state = { ...state, along: "v0", given: { ...state.given, range: ANY } };
+  follow();
+  for (const name of ["contact", "direction", "along", "scale"]) $("form").elements[name].value = state[name];
   $("digits").checked = state.digits === "all";
   $("main").dataset.direction = state.direction;
   // browsers refuse an address that changes with every step of a slider
   clearTimeout(addressTimer);
   addressTimer = setTimeout(() => history.replaceState(null, "", toAddress(state)), 150);
-  ask();
-}
-
-function ask() {
-  if (!form.bad) askPoint.push({ ...state });
-}
-
-/** Says what is wrong with a typed input, or (null) that nothing is. */
-function blame(name, fault, empty) {
-  status.set(`typed ${name}`, fault, empty);
-  if (!fault) ask();
+  if (!namesOf(state).some((name) => state.given[name].fault)) askPoint.push(state);
 }
 
 /** Sets inputs, and with `more` other parts of the state. */
-function setInputs(given, more = {}) {
-  form.settle(Object.keys(given));
-  change({ given: { ...state.given, ...given }, ...more });
+const setInputs = (given, more = {}) => change({ given: { ...state.given, ...given }, ...more });
+
+/** Takes what is typed in a field, on Enter and on leaving it, and what is chosen. */
+function take({ target: { name, value, checked } }) {
+  if (name in state.given) setInputs({ [name]: readTyped(state, name, value) });
+  else if (name === "along") setInputs({ range: ANY }, { along: value });
+  else if (name === "digits") change({ digits: checked ? "all" : "few" });
+  else if (name in state) change({ [name]: value });
+}
+
+/** Brings back what was good in a field. */
+function takeBack({ key, target: { name } }) {
+  if (key === "Escape" && name in state.given) setInputs({ [name]: untyped(state.given[name]) });
 }
 
 /** Sets inputs to values in SI, in the units that their fields have; what cannot be is left as it is. */
@@ -75,19 +71,10 @@ function nudge(name, steps) {
 
 function readAddress({ newURL }) {
   const read = fromAddress(new URL(newURL).hash); // the address line itself may hold an earlier state by now
-  state = read.state;
-  form.sync(state);
-  form.settle();
   $("notice").hidden = !read.faults.length;
   const why = `This link has values that cannot be used; start values replace them: ${read.faults.join("; ")}.`;
   $("notice-text").textContent = why;
-  change({});
-}
-
-/** The inputs in one line, without one of them. */
-function caption(without) {
-  const names = namesOf(state).filter((name) => name !== without);
-  return names.map((name) => `${symbolOf(name, state.given[name].unit)} = ${state.given[name].text}`).join(", ");
+  change(read.state);
 }
 
 // --- the answer -------------------------------------------------------------------------------------------
@@ -147,20 +134,15 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 function start(names) {
   setNames(names);
   for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.has(part.dataset.needs);
-  form = new Form(setInputs, change, blame);
-  map = mapPanel(setSI, nudge);
-  law = lawPanel(change, setSI, nudge);
-  const offered = Object.entries({ service: solver, stiffness, fit });
-  panels = offered.filter(([name]) => about.knows.has(name)).map(([, panel]) => panel(setInputs));
+  parts = [inputForm(setInputs, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
+  const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.has(name));
+  parts.push(...panels.map(([, panel]) => panel(setInputs)));
   readAddress({ newURL: location.href });
-  askMap.push(null);
   addEventListener("hashchange", readAddress);
+  addEventListener("change", take);
+  addEventListener("keydown", takeBack);
 }
 
-$("reset").addEventListener("click", () => {
-  form.settle();
-  change(startState());
-});
+$("reset").addEventListener("click", () => change(startState()));
 $("notice-close").addEventListener("click", () => { $("notice").hidden = true; });
-$("digits").addEventListener("change", () => change({ digits: $("digits").checked ? "all" : "few" }));
 status.channel("names", () => get("static/page/names.json"), start).push(null);
