@@ -7,7 +7,6 @@ import {
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
 
-const EMPTY = "\u00a0"; // keeps its line
 const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
 // viridis: one colour between two levels
 const COLOURS = [0x440154, 0x481b6d, 0x46327e, 0x3f4788, 0x365c8d, 0x2e6e8e, 0x277f8e, 0x21918c, 0x1fa187, 0x2db27d,
@@ -47,7 +46,7 @@ export function mapPanel(set, nudge, status) {
   const plot = new Plot($("map"), paint);
 
   function read(x, y) {
-    if (x === undefined || !frame?.holds(x, y)) return EMPTY;
+    if (x === undefined || !frame?.holds(x, y)) return "";
     const [v, a] = [frame.x.value(x), frame.y.value(y)];
     const here = ratio(frame.x.share(v), frame.y.share(a)).toFixed(2);
     return `ṽ = ${show(v, 3)}, ỹ = ${show(a, 3)}: µ/µ₀ ≈ ${here}`;
@@ -170,7 +169,7 @@ export function lawPanel(set, nudge) {
     cursor = i;
     plot.redraw();
     const told = () => `${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${inWords(law.regime[i])}`;
-    $("law-read").textContent = i === null ? EMPTY : told();
+    $("law-read").textContent = i === null ? "" : told();
   }
 
   /** The index of the value that is nearest to a place; null outside. */

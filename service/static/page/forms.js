@@ -2,7 +2,7 @@
 import { Status } from "./ask.js";
 import {
   CHOICES, INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
-  readValue, rounded, show, symbolOf, untyped, valueOf, within,
+  readValue, show, symbolOf, untyped, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -23,8 +23,8 @@ export function offer(choice, state, word) {
   return other;
 }
 
-/** The form: `set({ name: quantity })` is called by sliders and the switch; faults are told to `status`. */
-export function inputForm(set, status) {
+/** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are told to `status`. */
+export function inputForm(set, setSI, status) {
   let state;
   let elastic = readValue("k", INPUTS.k.start); // which the switch of a rigid contact brings back
   const rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
@@ -38,8 +38,7 @@ export function inputForm(set, status) {
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...steps });
-    slider.addEventListener("input", () =>
-      set({ [name]: rounded(name, 10 ** (slider.value / STEPS), state.given[name].unit, 4) }));
+    slider.addEventListener("input", () => setSI({ [name]: 10 ** (slider.value / STEPS) }));
     const elastic = name === "k" && make("label", { class: "switch" }, rigid, "rigid (no spring)");
     const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider, elastic, fault);
     return { name, symbol, row, input, slider, fault };
@@ -97,9 +96,14 @@ function panel(name, path, read, show) {
   };
 }
 
-const items = (texts) => texts.map((text) => make("li", {}, text));
+/** Shows lines: [text], or [text, ...given] with a button for `use(...given)`. */
+const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...given]) => {
+  const button = make("button", { "aria-label": `use ${text}` }, "Use");
+  button.addEventListener("click", () => use(...given));
+  return make("li", {}, text, given.length > 0 && button);
+}));
 
-/** Which value of an input gives a wanted friction.  `use({ name: quantity }, more)` takes it, here and below. */
+/** Which value of an input gives a wanted friction.  `use({ name: value [SI] }, digits, more)` takes it. */
 export function solver(use) {
   const follow = panel("solve", "v1/solve-for", (state) => {
     const { unknown, quantity, target: text } = Object.fromEntries(new FormData($("solve-form")));
@@ -108,13 +112,12 @@ export function solver(use) {
   }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
     const { unit } = state.given[unknown];
     const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
-    $("solve-result").replaceChildren(...items(roots.length ? [] : [none]), ...roots.map((root) => {
-      const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, root.value, unit, 6)}`;
-      const button = make("button", { "aria-label": `use ${told}` }, "Use");
-      button.addEventListener("click", () => use({ [unknown]: rounded(unknown, root.value, unit, 15) }));
-      const shaker = root.power ? `, shaker ${inUnit("power", root.power.oscillation)}` : "";
-      return make("li", {}, `${told}: µ = ${show(root.mu_macro, 5)}, ${inWords(root.regime)}${shaker}`, button);
-    }));
+    const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
+      const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
+      const shaker = power ? `, shaker ${inUnit("power", power.oscillation)}` : "";
+      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`, { [unknown]: value }, 15];
+    });
+    list("solve-result", lines.length ? lines : [[none]], use);
   });
   return (state) => {
     if (offer($("unknown"), state, "label")) $("unknown").value = namesOf(state)[3]; // the amplitude
@@ -140,8 +143,6 @@ export function stiffness(use) {
   }
   $("geometry").addEventListener("change", choose);
   choose();
-  let last;
-  $("stiffness-use").addEventListener("click", () => use(...last));
   return panel("stiffness", "v1/stiffness", (state) => {
     const { geometry, ...typed } = Object.fromEntries(new FormData($("stiffness-form"))); // of what is not disabled
     const entries = Object.entries(typed).filter(([, text]) => text.trim()).map(([name, text]) => {
@@ -150,21 +151,19 @@ export function stiffness(use) {
       return [name, word ? text.trim().toLowerCase() : within(name, () => readQuantity(name, text, unit)).low];
     });
     return { geometry, Fz: valueOf(state, "Fz"), ...Object.fromEntries(entries) };
-  }, ({ k, contact }, { Fz }, state) => {
+  }, ({ k, contact }, { Fz }) => {
     const model = contact === "ball" ? "ball (Hertz)" : "one spring";
-    $("stiffness-found").textContent = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}`;
-    last = [{ k: rounded("k", k, state.given.k.unit, 6) }, about.knows.has("contact") ? { contact } : {}];
+    const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}`;
+    list("stiffness-result", [[told, { k }, 6, about.knows.has("contact") ? { contact } : {}]], use);
   });
 }
 
 /** k and µ₀ from measured points. */
 export function fit(use) {
   let paint = () => [];
-  let last;
+  let told;
   const plot = new Plot($("fit-plot"), (...size) => paint(...size));
-  const found = () => [...$("fit-found").children].map((one) => one.textContent).join("; ");
-  $("fit-image").addEventListener("click", () => plot.save(found(), "friction-fit.svg"));
-  $("fit-use").addEventListener("click", () => use(last));
+  $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));
   return panel("fit", "v1/fit", (state) => {
     const unknowns = $("unknowns").value.split(" ");
     return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...readPoints($("points").value) };
@@ -172,18 +171,21 @@ export function fit(use) {
     /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
     const text = (name, value, digits = 4) =>
       (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, given[name].unit, digits));
+    const names = Object.keys(values);
     const equals = (name, one) => `${INPUTS[name].symbol} = ${text(name, one[name])}`;
-    const lines = Object.keys(values).map((name) => {
+    const best = names.map((name) => {
       const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2)}`;
       return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end)).join(" to ")})`;
     });
-    const others = solutions.slice(1).map((one) => Object.keys(values).map((name) => equals(name, one)).join(", "));
-    lines.push(...others.map((one) => `the points allow as well: ${one}`));
-    if (asked.std && scatter !== null) lines.push(`reduced χ² = ${show(scatter, 3)}`);
-    $("fit-found").replaceChildren(...items(lines));
-    $("fit-warnings").replaceChildren(...items(warnings));
-    last = Object.fromEntries(Object.entries(values).map(([name, value]) =>
-      [name, value === "rigid" ? RIGID : rounded(name, value, given[name].unit, 6)]));
+    const lines = [[best.join("; "), values, 6]];
+    for (const other of solutions.slice(1)) {
+      const given = Object.fromEntries(names.map((name) => [name, other[name]]));
+      lines.push([`the points allow as well: ${names.map((name) => equals(name, other)).join(", ")}`, given, 6]);
+    }
+    if (asked.std && scatter !== null) lines.push([`reduced χ² = ${show(scatter, 3)}`]);
+    told = lines.map(([line]) => line).join("; ");
+    list("fit-found", lines, use);
+    list("fit-warnings", warnings.map((line) => [line]));
     paint = (width, height) => picture(width, height, asked, curve, given.v0.unit);
     plot.redraw();
   });

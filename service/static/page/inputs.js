@@ -170,9 +170,9 @@ export function readInterval(name, text, unit) {
 /** A typed range of the law: an interval, or nothing. */
 const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval(name, text, unit));
 
-/** A value of an input [SI] as a quantity with so many digits. */
+/** A value of an input [SI], or "rigid", as a quantity with so many digits. */
 export const rounded = (name, value, unit, digits) =>
-  readValue(name, String(Number(fromSI(name, value, unit).toPrecision(digits))), unit);
+  readValue(name, String(value === "rigid" ? value : Number(fromSI(name, value, unit).toPrecision(digits))), unit);
 
 const COLUMNS = [["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)/i], ["std", /^(std|±|sigma|s$|u$)/i]];
 
@@ -227,9 +227,6 @@ export function valueOf({ given }, name) {
   const { low, high } = given[name];
   return low === high ? low : Math.sqrt(low) * Math.sqrt(high);
 }
-
-/** Whether k is an interval. */
-export const isWide = ({ given: { k } }) => k.low < k.high;
 
 /** The inputs as the service takes them, without some of them; with `whole` an interval of k as such. */
 export function caseOf(state, without = [], whole = false) {

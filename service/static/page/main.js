@@ -3,7 +3,7 @@ import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
 import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
-  ANY, CHOICES, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, isWide, namesOf, question, readTyped,
+  ANY, CHOICES, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
   rounded, setNames, show, startState, toAddress, untyped, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
@@ -56,10 +56,10 @@ function takeBack({ key, target: { name } }) {
 }
 
 /** Sets inputs to values in SI, in the units that their fields have; what cannot be is left as it is. */
-function setSI(values, digits = 4) {
+function setSI(values, digits = 4, more = {}) {
   const read = ([name, value]) => [name, rounded(name, value, state.given[name].unit, digits)];
   const { found } = attempt(() => Object.entries(values).map(read));
-  if (found) setInputs(Object.fromEntries(found));
+  if (found) setInputs(Object.fromEntries(found), more);
 }
 
 /** Makes an input larger or smaller by steps of 5 %; true. */
@@ -82,8 +82,9 @@ function readAddress({ newURL }) {
 /** Shows an answer; with the digits that k supports, or with all that the table supports. */
 function showAnswer({ asked, ...found }) {
   const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound, limits, groups, power } = found;
-  const [wide, { k }, all] = [isWide(asked), asked.given, asked.digits === "all"];
-  const [normal, width] = [asked.direction === "normal", wide ? high - low : 0];
+  const [{ k }, all] = [asked.given, asked.digits === "all"];
+  const [normal, wide] = [asked.direction === "normal", k.low < k.high];
+  const width = wide ? high - low : 0;
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
   const kind = k.low === Infinity ? "rigid contact" : CHOICES.contact[asked.contact];
   const motion = CHOICES.direction[asked.direction];
@@ -134,9 +135,9 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 function start(names) {
   setNames(names);
   for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.has(part.dataset.needs);
-  parts = [inputForm(setInputs, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
+  parts = [inputForm(setInputs, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
   const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.has(name));
-  parts.push(...panels.map(([, panel]) => panel(setInputs)));
+  parts.push(...panels.map(([, panel]) => panel(setSI)));
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);

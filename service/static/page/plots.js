@@ -38,11 +38,6 @@ class Axis {
     return Math.min(Math.max(this.log ? 10 ** x : x, this.low), this.high);
   }
 
-  /** -1 below the axis, 1 above it, 0 on it. */
-  side(value) {
-    return this.share(value) < -1e-9 ? -1 : Number(this.share(value) > 1 + 1e-9);
-  }
-
   /** [value, label] of the ticks, with `room` pixels for each. */
   ticks(room) {
     const raw = (this.b - this.a) / Math.max(2, Math.floor(Math.abs(this.to - this.from) / room));
@@ -107,11 +102,12 @@ export class Frame {
 
   /** The user's point; where it is outside, an arrow on the frame that points to it. */
   point(x, y) {
-    const out = [this.x.side(x), this.y.side(y)];
-    const shape = out[0] || out[1] ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
-    const turn = (Math.atan2(-out[1], out[0]) * 180) / Math.PI;
-    const place = [[this.x, x], [this.y, y]].map(([axis, value]) =>
-      axis.from + Math.min(Math.max(axis.share(value), 0), 1) * (axis.to - axis.from));
+    const at = [this.x.share(x), this.y.share(y)];
+    const inside = at.map((share) => Math.min(Math.max(share, 0), 1));
+    const [right, up] = at.map((share, i) => Math.sign(Math.trunc(1e9 * (share - inside[i]))));
+    const shape = right || up ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
+    const turn = (Math.atan2(-up, right) * 180) / Math.PI;
+    const place = [this.x, this.y].map(({ from, to }, i) => from + inside[i] * (to - from));
     return make("path", { d: shape, class: "point", transform: `translate(${place}) rotate(${turn})` });
   }
 }
@@ -168,17 +164,14 @@ export class Plot {
     const narrow = 7 * text.length > width - 32 ? { textLength: width - 32, lengthAdjust: "spacingAndGlyphs" } : {};
     const words = { x: 16, y: height + 12, fill, "font-family": "sans-serif", "font-size": 13, ...narrow };
     const back = make("rect", { ...size, fill: backgroundColor });
-    const copy = make("svg", size, back, [...this.svg.children].map(withLooks), make("text", words, text));
-    save(new XMLSerializer().serializeToString(copy), "image/svg+xml", name);
+    const drawn = this.svg.cloneNode(true);
+    const [copies, originals] = [drawn, this.svg].map((one) => one.querySelectorAll("*"));
+    copies.forEach(({ style }, i) => { // which looks the same without the style sheet
+      for (const look of LOOKS) style.setProperty(look, getComputedStyle(originals[i]).getPropertyValue(look));
+    });
+    const picture = make("svg", size, back, [...drawn.children], make("text", words, text));
+    save(new XMLSerializer().serializeToString(picture), "image/svg+xml", name);
   }
-}
-
-/** A copy of a drawn element that looks the same without the style sheet. */
-function withLooks(element) {
-  const copy = element.cloneNode(!element.children.length); // with its text
-  for (const name of LOOKS) copy.style.setProperty(name, getComputedStyle(element).getPropertyValue(name));
-  copy.append(...[...element.children].map(withLooks));
-  return copy;
 }
 
 /** Saves a text as a file of the user. */
