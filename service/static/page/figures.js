@@ -7,13 +7,13 @@ import {
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
 
-const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
-// viridis: one colour between two levels
-const COLOURS = [0x440154, 0x481b6d, 0x46327e, 0x3f4788, 0x365c8d, 0x2e6e8e, 0x277f8e, 0x21918c, 0x1fa187, 0x2db27d,
-  0x4ac16d, 0x73d056, 0xa0da39, 0xd0e11c, 0xfde725];
-// level -> where along v~ its number stands, so that they keep clear of each other
-const LABELS = [[0.01, 0.3], [0.1, 0.4], [0.3, 0.5], [0.5, 0.6], [0.7, 0.7], [0.9, 0.82], [0.99, 0.93]];
-const FINE = 8; // painted cells per cell of the grid, along each side
+// [level, colour of what is below it, painted over that of the level before, where along v~ its number stands]; viridis
+const SHADES = [
+  [Infinity, "#fde725"], [0.99, "#d0e11c", 0.93], [0.95, "#a0da39"], [0.9, "#73d056", 0.82], [0.8, "#4ac16d"],
+  [0.7, "#2db27d", 0.7], [0.6, "#1fa187"], [0.5, "#21918c", 0.6], [0.4, "#277f8e"], [0.3, "#2e6e8e", 0.5],
+  [0.2, "#365c8d"], [0.1, "#3f4788", 0.4], [0.05, "#46327e"], [0.02, "#481b6d"], [0.01, "#440154", 0.3],
+];
+const FINE = 1000; // steps from the foot of the map to its top
 
 const isMapped = ({ contact, direction }) => contact === "spring" && direction === "across";
 
@@ -27,23 +27,17 @@ function interpolated({ v_tilde: { n: columns }, y_tilde: { n: rows }, mu_ratio,
   };
 }
 
-/** The colours of the map as the address of a picture. */
-function coloured(ratio, width, height) {
-  const image = new ImageData(width, height);
-  for (let i = 0; i < width * height; i += 1) {
-    const here = ratio(((i % width) + 0.5) / width, 1 - (Math.floor(i / width) + 0.5) / height);
-    const rgb = COLOURS[LEVELS.filter((level) => level <= here).length];
-    image.data.set([rgb >> 16, (rgb >> 8) & 255, rgb & 255, 255], 4 * i);
-  }
-  const canvas = make("canvas", { width, height });
-  canvas.getContext("2d").putImageData(image, 0, 0);
-  return canvas.toDataURL();
-}
-
 /** The map: `set({ name: value [SI] })`, `nudge(name, steps)`; that it cannot be had is told to `status`. */
 export function mapPanel(set, nudge, status) {
-  let state, answer, data, ratio, image, frame, point;
+  let state, answer, data, ratio, shades, frame, point;
   const plot = new Plot($("map"), paint);
+
+  /** How high the ratio falls below a level; in shares of the axes. */
+  function crossing(x, level) {
+    let up = 0;
+    while (up < 1 && ratio(x, up) >= level) up += 1 / FINE;
+    return up;
+  }
 
   function read(x, y) {
     if (x === undefined || !frame?.holds(x, y)) return "";
@@ -92,14 +86,17 @@ export function mapPanel(set, nudge, status) {
     const { x: left, y: top, width: wide, height: tall } = frame.box;
     const border = (kind) => frame.curve(...[0, 1].map((i) => data.border.map((at) => at[i])), kind);
     const at = (text, x, up, kind) => label(text, left + x * wide, top + (1 - up) * tall + 4, kind);
-    // the number of a level stands where it is crossed on the way up
-    const steps = Array.from({ length: FINE * data.y_tilde.n }, (_, j) => j / (FINE * data.y_tilde.n));
-    const crossed = LABELS.map(([level, x]) => [level, x, steps.find((up) => ratio(x, up) < level)]);
+    const shade = ({ colour, heights }) => {
+      const edge = heights.map((up, i) => `${left + (i * wide) / (heights.length - 1)} ${top + (1 - up) * tall}`);
+      const path = make("path", { d: `M${edge.join("L")}V${top}H${left}Z`, class: "shade" });
+      path.style.fill = colour;
+      return path;
+    };
     return [
-      make("image", { ...frame.box, href: image, preserveAspectRatio: "none" }), frame.axes(false),
+      shades.map(shade), frame.axes(false),
       frame.inside(
-        crossed.map(([level, x, up]) => (up === undefined ? null : at(String(level), x, up, "tag"))),
-        border("border shade"), border("border"),
+        SHADES.map(([level, , x]) => x && at(String(level), x, crossing(x, level), "tag")),
+        border("border back"), border("border"),
         at("stick–slip", 0.16, 0.3, "tag area"), at("continuous", 0.78, 0.16, "tag area")),
       point && frame.point(...point),
     ];
@@ -113,7 +110,8 @@ export function mapPanel(set, nudge, status) {
   $("map-image").addEventListener("click", () => plot.save(caption(state), "friction-map.svg"));
   status.channel("map", () => get("static/page/map.json"), (found) => {
     [data, ratio] = [found, interpolated(found)];
-    image = coloured(ratio, FINE * (data.v_tilde.n - 1), FINE * (data.y_tilde.n - 1));
+    const shares = Array.from({ length: data.v_tilde.n }, (_, i) => i / (data.v_tilde.n - 1));
+    shades = SHADES.map(([level, colour]) => ({ colour, heights: shares.map((x) => crossing(x, level)) }));
     mark();
   }).push(null);
   return (...now) => {

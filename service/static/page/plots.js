@@ -1,14 +1,14 @@
 // Elements, and what the plots share: an SVG that follows its size, axes with ticks, curves, pictures for download.
 
 export const $ = (id) => document.getElementById(id);
-const SVG = ["svg", "path", "rect", "circle", "text", "image"];
+const SVG = ["svg", "path", "rect", "circle", "text"];
 
 /** An element of HTML or SVG with attributes and children; null children are left out. */
 export function make(tag, attributes = {}, ...children) {
   const element = SVG.includes(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
     : document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  element.append(...children.flat(3).filter(Boolean));
+  element.append(...children.flat(Infinity).filter(Boolean));
   return element;
 }
 
@@ -38,7 +38,7 @@ class Axis {
     return Math.min(Math.max(this.log ? 10 ** x : x, this.low), this.high);
   }
 
-  /** [value, label] of the ticks, with `room` pixels for each. */
+  /** [pixel, label] of the ticks, with `room` pixels for each. */
   ticks(room) {
     const raw = (this.b - this.a) / Math.max(2, Math.floor(Math.abs(this.to - this.from) / room));
     const unit = this.log ? 1 : 10 ** Math.floor(Math.log10(raw));
@@ -46,7 +46,7 @@ class Axis {
     const step = this.log ? Math.max(1, Math.ceil(raw)) : unit * nice;
     const [first, last] = [Math.ceil(this.a / step - 1e-9), Math.floor(this.b / step + 1e-9)];
     return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step)
-      .map((at) => (this.log ? [10 ** at, power(at)] : [at, String(Number(at.toPrecision(6)))]));
+      .map((at) => [this.pixel(this.log ? 10 ** at : at), this.log ? power(at) : String(Number(at.toPrecision(6)))]);
   }
 }
 
@@ -63,14 +63,10 @@ export class Frame {
     const { x, y, box } = this;
     const line = (d) => make("path", { d, class: "grid" });
     return [
-      ...x.ticks(56).flatMap(([value, text]) => {
-        const at = x.pixel(value);
-        return [line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")];
-      }),
-      ...y.ticks(36).flatMap(([value, text]) => {
-        const at = y.pixel(value);
-        return [line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")];
-      }),
+      x.ticks(56).map(([at, text]) => [
+        line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")]),
+      y.ticks(36).map(([at, text]) => [
+        line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")]),
       label(x.title, box.x + box.width / 2, y.from + 38),
       make("text", { class: "upright", transform: `translate(15 ${box.y + box.height / 2}) rotate(-90)` }, y.title),
     ];
@@ -139,15 +135,14 @@ export class Plot {
    *  the arrow keys: step(right, up), larger with Shift, true if it is of use. */
   follow({ move, pick, step }) {
     const { svg } = this;
-    const place = ({ clientX, clientY }) => {
-      const box = svg.getBoundingClientRect();
-      return [clientX - box.left, clientY - box.top];
+    const point = ({ buttons, clientX, clientY }) => {
+      const { x, y } = svg.getBoundingClientRect();
+      (buttons & 1 ? pick : move)(clientX - x, clientY - y);
     };
-    svg.addEventListener("pointermove", (event) => (event.buttons & 1 ? pick : move)(...place(event)));
+    svg.addEventListener("pointermove", point);
     svg.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
       if (event.pointerType === "mouse") svg.setPointerCapture(event.pointerId);
-      pick(...place(event));
+      point(event);
     });
     svg.addEventListener("pointerleave", () => move());
     svg.addEventListener("keydown", (event) => {
