@@ -1,6 +1,7 @@
 """The pages: their headers, whether they fit the screen, accessibility, and the API key."""
 
 import json
+import math
 import os
 import re
 import shutil
@@ -13,6 +14,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from mumacro import Surrogate
+from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs import UNITS_OF
 from service.app import create_app
@@ -42,7 +44,12 @@ def test_units_and_geometries_are_the_librarys(client: Any) -> None:
 
     told = client.get("/static/page/names.json").json()
     expected = {name: scales(units) for name, units in {**UNITS_OF, "Fz_amplitude": UNITS_OF["Fz"]}.items()}
+    cycles = {unit: [2 * math.pi * times, over] for unit, (times, over) in expected.pop("f").items()}
+    expected["omega"] |= cycles | dict.fromkeys(expected["omega"].keys() & cycles)  # a unit of both says neither
     assert {name: one["units"] for name, one in told["inputs"].items()} == expected
+    assert all(set(one["offered"]) <= set(one["units"]) for one in told["inputs"].values())
+    assert {name: list(words) for name, words in told["choices"].items()} == {
+        "contact": list(CONTACTS), "direction": list(DIRECTIONS)}
     assert {name: (one["meaning"], one["arguments"]) for name, one in told["geometries"].items()} == {
         name: (one.meaning, [*one.arguments, *BODIES]) for name, one in GEOMETRIES.items()
     }

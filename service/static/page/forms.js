@@ -1,7 +1,7 @@
 // The form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  CHOICES, INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
+  INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
   readValue, show, symbolOf, untyped, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
@@ -29,7 +29,7 @@ export function inputForm(set, setSI, status) {
   let elastic = readValue("k", INPUTS.k.start); // which the switch of a rigid contact brings back
   const rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
   rigid.addEventListener("change", () => set({ k: rigid.checked ? RIGID : elastic }));
-  for (const [name, words] of Object.entries(CHOICES)) {
+  for (const [name, words] of Object.entries(about.choices)) {
     const radio = (value) => make("label", {}, make("input", { type: "radio", name, value }), value);
     $(name).append(...Object.keys(words).map(radio));
   }

@@ -1,42 +1,22 @@
 // The inputs: units and bounds, what a person types, numbers as text, the state of the page, its case and its address.
 // Nothing here needs a browser; tests/page tests it with node.
 
-/** By name: label, symbol, offered units, the slider's decimal exponents (SI), start value. */
-export const INPUTS = {
-  mu0: { label: "friction µ₀", symbol: "µ₀", offered: ["-"], range: [-2, 0.5], start: "0.3 -" },
-  Fz: { label: "force Fz", symbol: "Fz", offered: ["N", "mN", "kN"], range: [-3, 5], start: "10 N" },
-  k: { label: "stiffness k", symbol: "k", offered: ["N/µm", "kN/m", "N/m"], range: [2, 10], start: "1 N/µm" },
-  y0: { label: "amplitude y₀", symbol: "y₀", offered: ["µm", "nm", "mm", "m"], range: [-10, -3], start: "2 µm" },
-  Fz_amplitude: { label: "force ΔFz", symbol: "ΔFz", offered: ["N", "mN", "kN"], range: [-3, 5], start: "5 N" },
-  omega: { label: "frequency", symbol: "ω", offered: ["kHz", "Hz", "rad/s"], range: [0, 7], start: "20 kHz" },
-  v0: { label: "speed v₀", symbol: "v₀", offered: ["mm/s", "µm/s", "m/s"], range: [-7, 2], start: "10 mm/s" },
-};
-/** What may be chosen, with its part of the model line; the first is the usual one. */
-export const CHOICES = {
-  contact: { spring: "one spring of stiffness k", ball: "a ball (Hertz) with the initial stiffness k" },
-  direction: {
-    across: "oscillation across the sliding direction", along: "oscillation along the sliding direction",
-    normal: "an oscillating normal force",
-  },
-};
+/** By name: label, symbol, units, bound, offered units, the slider's decimal exponents (SI), start value. */
+export const INPUTS = {};
+/** What names.json says besides: the choices with their words, what the host `knows`, geometries, their arguments. */
+export const about = {};
+
+/** Takes what names.json says; nothing here works before that. */
+export function setNames({ inputs, knows, ...others }) {
+  Object.assign(INPUTS, inputs);
+  Object.assign(about, { knows: new Set(knows), ...others });
+}
+
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
 const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9], W: [1, 1] } };
+
 export const RIGID = { text: "rigid", unit: "N/µm", low: Infinity, high: Infinity };
-
-/** What names.json says: `knows` (what the host of the page can do), the geometries of a contact, their arguments. */
-export const about = { knows: new Set(), geometries: {}, arguments: {} };
-
-/** Takes units and bounds as names.json tells them; nothing here works before that. */
-export function setNames({ inputs, knows, geometries, arguments: others }) {
-  for (const [name, input] of Object.entries(INPUTS)) Object.assign(input, structuredClone(inputs[name]));
-  // a frequency f stands for omega = 2 pi f; a unit of both (1/s) says neither
-  const { units } = INPUTS.omega;
-  for (const [unit, [times, over]] of Object.entries(inputs.f.units)) {
-    units[unit] = unit in units ? null : [times * 2 * Math.PI, over];
-  }
-  Object.assign(about, { knows: new Set(knows), geometries, arguments: others });
-}
 
 /** What is known of a quantity: an input, an argument of a geometry, or a power. */
 const kindOf = (name) => INPUTS[name] ?? about.arguments[name] ?? POWER;
@@ -235,7 +215,7 @@ export function caseOf(state, without = [], whole = false) {
     if (whole && low < high) return ["k_range", [low, high]];
     return [name, low === Infinity ? "rigid" : valueOf(state, name)];
   };
-  const chosen = Object.entries(CHOICES).filter(([name, all]) => state[name] !== Object.keys(all)[0]);
+  const chosen = Object.entries(about.choices).filter(([name, all]) => state[name] !== Object.keys(all)[0]);
   return Object.fromEntries([
     ...namesOf(state).filter((name) => !without.includes(name)).map(entry),
     ...chosen.map(([name]) => [name, state[name]]),
@@ -260,11 +240,11 @@ export function question(state) {
 
 const inAddress = ({ text }) =>
   encodeURIComponent(text.replaceAll(" ", "").replaceAll("µ", "u")).replaceAll("%2F", "/");
-/** The words that other parts of the state may be, in the order in which an address is read. */
+/** The words that a part of the state may be, in the order in which an address is read; the first choice is known to all. */
+const wordsOf = (name) => Object.keys(about.choices[name]).slice(0, about.knows.has(name) ? undefined : 1);
 const WORDS = {
-  ...Object.fromEntries(Object.entries(CHOICES).map(([name, all]) => [
-    name, () => Object.keys(all).slice(0, about.knows.has(name) ? undefined : 1)])),
-  digits: () => ["few", "all"], along: namesOf, scale: () => ["log", "linear"],
+  contact: () => wordsOf("contact"), direction: () => wordsOf("direction"), digits: () => ["few", "all"],
+  along: namesOf, scale: () => ["log", "linear"],
 };
 
 /** The state as the part of an address behind "#". */

@@ -3,7 +3,7 @@ import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
 import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
-  ANY, CHOICES, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
+  ANY, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
   rounded, setNames, show, startState, toAddress, untyped, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
@@ -86,8 +86,8 @@ function showAnswer({ asked, ...found }) {
   const [normal, wide] = [asked.direction === "normal", k.low < k.high];
   const width = wide ? high - low : 0;
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
-  const kind = k.low === Infinity ? "rigid contact" : CHOICES.contact[asked.contact];
-  const motion = CHOICES.direction[asked.direction];
+  const kind = k.low === Infinity ? "rigid contact" : about.choices.contact[asked.contact];
+  const motion = about.choices.direction[asked.direction];
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
