@@ -40,7 +40,7 @@ export function mapPanel(set, nudge, status) {
   }
 
   function read(x, y) {
-    if (x === undefined || !frame?.holds(x, y)) return "";
+    if (!frame?.holds(x, y)) return "";
     const [v, a] = [frame.x.value(x), frame.y.value(y)];
     const here = ratio(frame.x.share(v), frame.y.share(a)).toFixed(2);
     return `ṽ = ${show(v, 3)}, ỹ = ${show(a, 3)}: µ/µ₀ ≈ ${here}`;
@@ -170,13 +170,6 @@ export function lawPanel(set, nudge) {
     $("law-read").textContent = i === null ? "" : told();
   }
 
-  /** The index of the value that is nearest to a place; null outside. */
-  function nearest(x) {
-    if (x === undefined || !frame.holds(x)) return null;
-    const away = law.values.map((value) => Math.abs(frame.x.pixel(shown(value)) - x));
-    return away.indexOf(Math.min(...away));
-  }
-
   function paint(width, height) {
     if (law?.along !== along) return [...$("law").children]; // until there is another one
     const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, mu_static: still, regime, scale } = law;
@@ -216,7 +209,7 @@ export function lawPanel(set, nudge) {
   }
 
   plot.follow({
-    move: (x) => frame && read(nearest(x)),
+    move: (x) => frame && read(frame.holds(x) ? Math.round((POINTS - 1) * frame.x.share(frame.x.value(x))) : null),
     pick: (x) => frame && set({ [along]: toSI(along, frame.x.value(x), unit) }),
     step: (right) => right && nudge(along, right),
   });

@@ -32,7 +32,7 @@ function change(changed) {
   follow();
   for (const name of ["contact", "direction", "along", "scale"]) $("form").elements[name].value = state[name];
   $("digits").checked = state.digits === "all";
-  $("main").dataset.direction = state.direction;
+  for (const swing of document.querySelectorAll("#sketch g")) swing.toggleAttribute("hidden", !swing.matches(`.${state.direction}`));
   // browsers refuse an address that changes with every step of a slider
   clearTimeout(addressTimer);
   addressTimer = setTimeout(() => history.replaceState(null, "", toAddress(state)), 150);
@@ -115,12 +115,10 @@ const list = (id, texts) => $(id).replaceChildren(...Object.entries(texts).map((
 
 /** Per cent that mu_macro changes when an input grows by 1 %. */
 function showBars({ gradient, mu_macro: mu }, asked) {
-  const names = namesOf(asked);
   const share = (name) => (gradient[name] === null || !mu ? null : (gradient[name] * valueOf(asked, name)) / mu);
-  const shares = names.map(share);
-  const most = Math.max(1, ...shares.map(Math.abs));
-  $("bars").replaceChildren(...names.map((name, i) => {
-    const share = shares[i];
+  const shares = namesOf(asked).map((name) => [name, share(name)]);
+  const most = Math.max(1, ...shares.map(([, share]) => Math.abs(share)));
+  $("bars").replaceChildren(...shares.map(([name, share]) => {
     const width = (50 * Math.abs(share)) / most;
     const fill = { x: share < 0 ? 50 - width : 50, width, height: 10, class: share < 0 ? "less" : "more" };
     const box = { class: "bar", viewBox: "0 0 100 10", preserveAspectRatio: "none", "aria-hidden": true };
