@@ -111,7 +111,7 @@ test("an address in the words of the command line gives the same state back", ()
     assert.equal(toAddress(state), address);
   }
   const { state } = fromAddress("#y0=1e-6&Fz=5&f=1000");
-  assert.deepEqual([state.given.y0, state.given.Fz, state.given.omega].map(({ text }) => text), ["0.000001 m", "5 N", "1000 Hz"]);
+  assert.deepEqual([state.y0, state.Fz, state.omega].map(({ text }) => text), ["0.000001 m", "5 N", "1000 Hz"]);
 });
 
 for (const [address, said] of [

@@ -126,9 +126,9 @@ const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 
 /** The interval of the swept input: what was chosen, else whole decades around the point and its border. */
-function lawRange({ along, scale, given }, border) {
-  if (given.range.text) return given.range;
-  const { unit, low, high } = given[along];
+function lawRange({ along, scale, range, ...state }, border) {
+  if (range.text) return range;
+  const { unit, low, high } = state[along];
   const sizes = [low, high, along === "v0" ? border : null].filter((value) => value > 0 && Number.isFinite(value));
   if (!sizes.length) sizes.push(readValue(along, INPUTS[along].start).low);
   const shown = sizes.map((value) => fromSI(along, Math.min(Math.max(value, LEAST), MOST), unit));
@@ -217,12 +217,12 @@ export function lawPanel(set, nudge) {
   $("law-image").addEventListener("click", () => law && plot.save(caption(state, along), `friction-law-${along}.svg`));
 
   return (...now) => {
-    const { range } = now[0].given;
+    const [{ range }] = now;
     if (now[0] !== state) fill($("range"), range); // what is being typed stays
     [state, answer] = now;
     offer($("along"), state, "symbol");
     along = state.along;
-    unit = state.given[along].unit;
+    unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
     $("range").placeholder = chosen;
     status.set("typed", range.fault && `range: ${range.fault}.`);

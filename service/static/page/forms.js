@@ -47,10 +47,10 @@ export function inputForm(set, setSI, status) {
   return (now) => {
     if (now === state) return; // what is being typed stays
     state = now;
-    rigid.checked = state.given.k === RIGID;
-    if (!rigid.checked) elastic = untyped(state.given.k);
+    rigid.checked = state.k === RIGID;
+    if (!rigid.checked) elastic = untyped(state.k);
     for (const { name, symbol, row, input, slider, fault } of rows) {
-      const [quantity, size] = [state.given[name], valueOf(state, name)];
+      const [quantity, size] = [state[name], valueOf(state, name)];
       row.hidden = !namesOf(state).includes(name);
       input.disabled = slider.disabled = quantity === RIGID;
       fill(input, quantity);
@@ -110,7 +110,7 @@ export function solver(use) {
     const { low: target } = within("target", () => readQuantity("mu0", text, "-"));
     return { ...caseOf(state, [unknown]), unknown, quantity, target, include: powerOf(state) };
   }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
-    const { unit } = state.given[unknown];
+    const { unit } = state[unknown];
     const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
     const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
       const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
@@ -167,10 +167,10 @@ export function fit(use) {
   return panel("fit", "v1/fit", (state) => {
     const unknowns = $("unknowns").value.split(" ");
     return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...readPoints($("points").value) };
-  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, { given }) => {
+  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, state) => {
     /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
     const text = (name, value, digits = 4) =>
-      (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, given[name].unit, digits));
+      (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, state[name].unit, digits));
     const names = Object.keys(values);
     const equals = (name, one) => `${INPUTS[name].symbol} = ${text(name, one[name])}`;
     const best = names.map((name) => {
@@ -186,7 +186,7 @@ export function fit(use) {
     told = lines.map(([line]) => line).join("; ");
     list("fit-found", lines, use);
     list("fit-warnings", warnings.map((line) => [line]));
-    paint = (width, height) => picture(width, height, asked, curve, given.v0.unit);
+    paint = (width, height) => picture(width, height, asked, curve, state.v0.unit);
     plot.redraw();
   });
 }

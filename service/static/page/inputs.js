@@ -184,34 +184,32 @@ export function readPoints(text) {
 /** The range of a law over which nobody chose one. */
 export const ANY = { text: "" };
 
-/** `given` has a quantity for each input, and the `range` of the input that the law goes along. */
-export function startState() {
-  const given = Object.fromEntries(Object.entries(INPUTS).map(([name, { start }]) => [name, readValue(name, start)]));
-  const chosen = { contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log" };
-  return { ...chosen, given: { ...given, range: ANY } };
-}
+/** A quantity for each input and for the `range` of the one that the law goes along, and what is chosen. */
+export const startState = () => ({
+  ...Object.fromEntries(Object.entries(INPUTS).map(([name, { start }]) => [name, readValue(name, start)])),
+  contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
+});
 
 /** What is typed for an input or the range; if it cannot be used, what was there, with `typed` and its `fault`. */
-export function readTyped({ given, along }, name, text) {
-  const input = name === "range" ? along : name;
-  const read = name === "range" ? readRange : readValue;
-  const { found, fault } = attempt(() => read(input, text, given[input].unit));
-  return fault ? { ...given[name], typed: text, fault } : found;
+export function readTyped(state, name, text) {
+  const [input, read] = name === "range" ? [state.along, readRange] : [name, readValue];
+  const { found, fault } = attempt(() => read(input, text, state[input].unit));
+  return fault ? { ...state[name], typed: text, fault } : found;
 }
 
 /** A quantity without what is typed and cannot be used. */
 export const untyped = ({ typed, fault, ...good }) => good;
 
 /** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
-export function valueOf({ given }, name) {
-  const { low, high } = given[name];
+export function valueOf(state, name) {
+  const { low, high } = state[name];
   return low === high ? low : Math.sqrt(low) * Math.sqrt(high);
 }
 
 /** The inputs as the service takes them, without some of them; with `whole` an interval of k as such. */
 export function caseOf(state, without = [], whole = false) {
   const entry = (name) => {
-    const { low, high } = state.given[name];
+    const { low, high } = state[name];
     if (whole && low < high) return ["k_range", [low, high]];
     return [name, low === Infinity ? "rigid" : valueOf(state, name)];
   };
@@ -225,7 +223,7 @@ export function caseOf(state, without = [], whole = false) {
 /** The inputs in one line, without one of them. */
 export function caption(state, without) {
   const names = namesOf(state).filter((name) => name !== without);
-  return names.map((name) => `${symbolOf(name, state.given[name].unit)} = ${state.given[name].text}`).join(", ");
+  return names.map((name) => `${symbolOf(name, state[name].unit)} = ${state[name].text}`).join(", ");
 }
 
 /** The power, where it is known: not for a normal force that oscillates. */
@@ -250,32 +248,32 @@ const WORDS = {
 /** The state as the part of an address behind "#". */
 export function toAddress(state) {
   const usual = startState();
-  const keyOf = (name) => (symbolOf(name, state.given[name].unit) === "f" ? "f" : name);
-  const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state.given[name])}`);
+  const keyOf = (name) => (symbolOf(name, state[name].unit) === "f" ? "f" : name);
+  const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state[name])}`);
   parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
-  if (state.given.range.text) parts.push(`range=${inAddress(state.given.range)}`);
+  if (state.range.text) parts.push(`range=${inAddress(state.range)}`);
   return `#${parts.join("&")}`;
 }
 
 /** { state, faults }: what an address says, start values in place of what cannot be used, and why, in words. */
 export function fromAddress(hash) {
-  const [state, faults, given] = [startState(), [], new Map(new URLSearchParams(hash.slice(1)))];
+  const [state, faults, texts] = [startState(), [], new Map(new URLSearchParams(hash.slice(1)))];
   /** Sets a part of the state to what `read` makes of a text of the address, if it has that key. */
-  const take = (key, read, part = state, name = key) => {
-    if (!given.has(key)) return;
-    const { found, fault } = attempt(() => read(given.get(key)));
-    if (fault) faults.push(`${key} = ${given.get(key) || "nothing"} (${fault})`);
-    else part[name] = found;
-    given.delete(key);
+  const take = (key, read, name = key) => {
+    if (!texts.has(key)) return;
+    const { found, fault } = attempt(() => read(texts.get(key)));
+    if (fault) faults.push(`${key} = ${texts.get(key) || "nothing"} (${fault})`);
+    else state[name] = found;
+    texts.delete(key);
   };
   for (const [key, words] of Object.entries(WORDS)) {
     const known = words(state);
     take(key, (word) => (known.includes(word) ? word : refuse(`must be one of ${known.join(", ")}`)));
   }
-  if (given.has("omega")) take("f", () => refuse("omega is given, too"));
-  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, INPUTS[name].unit), state.given);
-  take("f", (text) => readValue("omega", text, "Hz"), state.given, "omega");
-  take("range", (text) => readInterval(state.along, text, INPUTS[state.along].unit), state.given);
-  for (const key of [...given.keys()]) take(key, () => refuse("unknown"));
+  if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
+  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, INPUTS[name].unit));
+  take("f", (text) => readValue("omega", text, "Hz"), "omega");
+  take("range", (text) => readInterval(state.along, text, INPUTS[state.along].unit));
+  for (const key of [...texts.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };
 }

@@ -28,7 +28,7 @@ const follow = () => parts.forEach((part) => part(state, answer));
 let addressTimer = null;
 function change(changed) {
   state = { ...state, ...changed };
-  if (!namesOf(state).includes(state.along)) state = { ...state, along: "v0", given: { ...state.given, range: ANY } };
+  if (!namesOf(state).includes(state.along)) state = { ...state, along: "v0", range: ANY };
   follow();
   for (const name of ["contact", "direction", "along", "scale"]) $("form").elements[name].value = state[name];
   $("digits").checked = state.digits === "all";
@@ -36,35 +36,31 @@ function change(changed) {
   // browsers refuse an address that changes with every step of a slider
   clearTimeout(addressTimer);
   addressTimer = setTimeout(() => history.replaceState(null, "", toAddress(state)), 150);
-  if (!namesOf(state).some((name) => state.given[name].fault)) askPoint.push(state);
+  if (!namesOf(state).some((name) => state[name].fault)) askPoint.push(state);
 }
-
-/** Sets inputs, and with `more` other parts of the state. */
-const setInputs = (given, more = {}) => change({ given: { ...state.given, ...given }, ...more });
 
 /** Takes what is typed in a field, on Enter and on leaving it, and what is chosen. */
 function take({ target: { name, value, checked } }) {
-  if (name in state.given) setInputs({ [name]: readTyped(state, name, value) });
-  else if (name === "along") setInputs({ range: ANY }, { along: value });
-  else if (name === "digits") change({ digits: checked ? "all" : "few" });
-  else if (name in state) change({ [name]: value });
+  if (name === "digits") change({ digits: checked ? "all" : "few" });
+  else if (name === "along") change({ along: value, range: ANY });
+  else if (name in state) change({ [name]: typeof state[name] === "string" ? value : readTyped(state, name, value) });
 }
 
 /** Brings back what was good in a field. */
 function takeBack({ key, target: { name } }) {
-  if (key === "Escape" && name in state.given) setInputs({ [name]: untyped(state.given[name]) });
+  if (key === "Escape" && state[name]?.text !== undefined) change({ [name]: untyped(state[name]) });
 }
 
-/** Sets inputs to values in SI, in the units that their fields have; what cannot be is left as it is. */
+/** Sets inputs to values in SI, in the units that their fields have, and with `more` other parts of the state; what cannot be is left as it is. */
 function setSI(values, digits = 4, more = {}) {
-  const read = ([name, value]) => [name, rounded(name, value, state.given[name].unit, digits)];
+  const read = ([name, value]) => [name, rounded(name, value, state[name].unit, digits)];
   const { found } = attempt(() => Object.entries(values).map(read));
-  if (found) setInputs(Object.fromEntries(found), more);
+  if (found) change({ ...Object.fromEntries(found), ...more });
 }
 
 /** Makes an input larger or smaller by steps of 5 %; true. */
 function nudge(name, steps) {
-  const from = state.given[name].low || 10 ** INPUTS[name].range[0];
+  const from = state[name].low || 10 ** INPUTS[name].range[0];
   if (from !== Infinity) setSI({ [name]: from * 1.05 ** steps }, 6);
   return true;
 }
@@ -82,7 +78,7 @@ function readAddress({ newURL }) {
 /** Shows an answer; with the digits that k supports, or with all that the table supports. */
 function showAnswer({ asked, ...found }) {
   const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound, limits, groups, power } = found;
-  const [{ k }, all] = [asked.given, asked.digits === "all"];
+  const [{ k }, all] = [asked, asked.digits === "all"];
   const [normal, wide] = [asked.direction === "normal", k.low < k.high];
   const width = wide ? high - low : 0;
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
@@ -133,7 +129,7 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 function start(names) {
   setNames(names);
   for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.has(part.dataset.needs);
-  parts = [inputForm(setInputs, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
+  parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
   const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.has(name));
   parts.push(...panels.map(([, panel]) => panel(setSI)));
   readAddress({ newURL: location.href });
