@@ -1,6 +1,6 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
-import { fill, offer } from "./forms.js";
+import { fill } from "./forms.js";
 import {
   INPUTS, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
@@ -220,7 +220,6 @@ export function lawPanel(set, nudge) {
     const [{ range }] = now;
     if (now[0] !== state) fill($("range"), range); // what is being typed stays
     [state, answer] = now;
-    offer($("along"), state, "symbol");
     along = state.along;
     unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);

@@ -15,14 +15,6 @@ export function fill(input, { text, fault, typed = text }) {
   input.setAttribute("aria-invalid", String(fault !== undefined && typed.trim() !== ""));
 }
 
-/** Offers the inputs of a state in a choice, each with a word about it; -> whether there are others than before. */
-export function offer(choice, state, word) {
-  const options = namesOf(state).map((name) => new Option(INPUTS[name][word], name));
-  const other = String(options.map(({ value }) => value)) !== String([...choice.options].map(({ value }) => value));
-  if (other) choice.replaceChildren(...options);
-  return other;
-}
-
 /** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are told to `status`. */
 export function inputForm(set, setSI, status) {
   let state;
@@ -33,6 +25,11 @@ export function inputForm(set, setSI, status) {
     const radio = (value) => make("label", {}, make("input", { type: "radio", name, value }), value);
     $(name).append(...Object.keys(words).map(radio));
   }
+  const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
+    $(id).append(...Object.entries(INPUTS).map(([name, input]) => new Option(input[word], name)));
+    return [...$(id).options];
+  });
+  $("unknown").value = "y0";
   const rows = Object.entries(INPUTS).map(([name, { label, symbol, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
@@ -49,6 +46,8 @@ export function inputForm(set, setSI, status) {
     state = now;
     rigid.checked = state.k === RIGID;
     if (!rigid.checked) elastic = untyped(state.k);
+    for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
+    if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
     for (const { name, symbol, row, input, slider, fault } of rows) {
       const [quantity, size] = [state[name], valueOf(state, name)];
       row.hidden = !namesOf(state).includes(name);
@@ -105,7 +104,7 @@ const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...g
 
 /** Which value of an input gives a wanted friction.  `use({ name: value [SI] }, digits, more)` takes it. */
 export function solver(use) {
-  const follow = panel("solve", "v1/solve-for", (state) => {
+  return panel("solve", "v1/solve-for", (state) => {
     const { unknown, quantity, target: text } = Object.fromEntries(new FormData($("solve-form")));
     const { low: target } = within("target", () => readQuantity("mu0", text, "-"));
     return { ...caseOf(state, [unknown]), unknown, quantity, target, include: powerOf(state) };
@@ -119,10 +118,6 @@ export function solver(use) {
     });
     list("solve-result", lines.length ? lines : [[none]], use);
   });
-  return (state) => {
-    if (offer($("unknown"), state, "label")) $("unknown").value = namesOf(state)[3]; // the amplitude
-    follow(state);
-  };
 }
 
 /** k from geometry and materials. */

@@ -78,16 +78,15 @@ function readAddress({ newURL }) {
 /** Shows an answer; with the digits that k supports, or with all that the table supports. */
 function showAnswer({ asked, ...found }) {
   const { mu_macro: mu, mu_macro_low: low, mu_macro_high: high, error_bound: bound, limits, groups, power } = found;
-  const [{ k }, all] = [asked, asked.digits === "all"];
-  const [normal, wide] = [asked.direction === "normal", k.low < k.high];
+  const { k, contact, direction } = asked;
+  const [normal, wide, all] = [direction === "normal", k.low < k.high, asked.digits === "all"];
   const width = wide ? high - low : 0;
   const group = (value) => (value === null ? "∞" : show(value, all ? 15 : 4));
-  const kind = k.low === Infinity ? "rigid contact" : about.choices.contact[asked.contact];
-  const motion = about.choices.direction[asked.direction];
+  const kind = k.low === Infinity ? "rigid contact" : about.choices.contact[contact];
   $("mu").textContent = all ? friction(mu, bound, 15) : friction(mu, width / 2, found.digits);
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
-  $("model").textContent = `Model: ${kind}, ${motion}; not compared with measured points.`;
+  $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; not compared with measured points.`;
   $("rows").replaceChildren(...(found.model ?? []).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
   list("values", {
     "µ/µ₀": all ? friction(found.mu_ratio, bound / valueOf(asked, "mu0"), 15) : show(found.mu_ratio, 4),
