@@ -70,8 +70,10 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]} for name, one in GEOMETRIES.items()
     }
     arguments = {name: {**one._asdict(), "units": _scales(one.units)} for name, one in ARGUMENTS.items()}
-    told = {"geometries": geometries, "arguments": arguments, "knows": list(knows)}
-    return {"inputs": inputs, "choices": _CHOICES, **told}
+    known = list(knows)
+    choices = {name: words if name in known else dict([*words.items()][:1]) for name, words in _CHOICES.items()}
+    told = {"geometries": geometries, "arguments": arguments, "knows": known}
+    return {"inputs": inputs, "choices": choices, **told}
 
 
 def map_of(surrogate: Surrogate) -> dict[str, Any]:

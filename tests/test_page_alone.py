@@ -127,7 +127,7 @@ def test_its_numbers_are_pythons(open_page: Any, host: Any, table: Surrogate) ->
 
 def both(open_page: Any, host: Any, client: Any, path: Any, asked: Any) -> Any:
     page = open_page("", url=host)
-    found = page.run(f"return (await import('./static/page/service.js')).post('{path}', {asked});")
+    found = page.run(f"return (await import('./static/page/service.js')).post('{path}', {asked});")["found"]
     return found, client.post(f"/{path}", json={**asked, "tolerance": 1e-7}).json()
 
 

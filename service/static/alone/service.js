@@ -1,11 +1,9 @@
 // Answers without a service: from the table in mumacro.wasm, in the form in which the service gives them.
-import { Trouble } from "./ask.js";
-
 const FIELDS = ["mu0", "Fz", "k", "y0", "omega", "v0"];
 const FOUND = ["error", "mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "source", "regime", "v0_crit",
   "power", "stick_fraction"];
 const finite = (value) => (Number.isFinite(value) ? value : null);
-const refuse = (why) => { throw new Trouble("refused", why); };
+const refuse = (why) => { throw new RangeError(why); };
 
 const bytes = await (await fetch("static/page/mumacro.wasm")).arrayBuffer();
 const { instance: { exports: table } } = await WebAssembly.instantiate(bytes);
@@ -72,15 +70,15 @@ function law({ along, start, stop, points, scale, ...others }) {
 }
 
 /** A file of the page itself. */
-export async function get(path) {
-  try {
-    return await (await fetch(path)).json();
-  } catch {
-    throw new Trouble("later", "A file of this page cannot be read.");
-  }
-}
+export const get = (path) => fetch(path).then((response) => response.json())
+  .then((found) => ({ found }), () => ({ later: "A file of this page cannot be read." }));
 
 /** Answers what the page asks. */
 export async function post(path, body) {
-  return { "v1/mu-macro": point, "v1/law": law }[path](body);
+  try {
+    return { found: { "v1/mu-macro": point, "v1/law": law }[path](body) };
+  } catch (error) {
+    if (error instanceof RangeError) return { refused: error.message };
+    throw error;
+  }
 }

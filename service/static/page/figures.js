@@ -120,8 +120,6 @@ export function mapPanel(set, nudge, status) {
   };
 }
 
-// --- the friction law ---------------------------------------------------------------------------------------
-
 const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 

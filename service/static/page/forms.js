@@ -2,7 +2,7 @@
 import { Status } from "./ask.js";
 import {
   INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
-  readValue, show, symbolOf, untyped, valueOf, within,
+  readValue, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
@@ -18,9 +18,9 @@ export function fill(input, { text, fault, typed = text }) {
 /** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are told to `status`. */
 export function inputForm(set, setSI, status) {
   let state;
-  let elastic = readValue("k", INPUTS.k.start); // which the switch of a rigid contact brings back
+  let elastic = INPUTS.k.start; // which the switch of a rigid contact brings back
   const rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
-  rigid.addEventListener("change", () => set({ k: rigid.checked ? RIGID : elastic }));
+  rigid.addEventListener("change", () => set({ k: rigid.checked ? RIGID : readValue("k", elastic) }));
   for (const [name, words] of Object.entries(about.choices)) {
     const radio = (value) => make("label", {}, make("input", { type: "radio", name, value }), value);
     $(name).append(...Object.keys(words).map(radio));
@@ -45,7 +45,7 @@ export function inputForm(set, setSI, status) {
     if (now === state) return; // what is being typed stays
     state = now;
     rigid.checked = state.k === RIGID;
-    if (!rigid.checked) elastic = untyped(state.k);
+    if (!rigid.checked) elastic = state.k.text;
     for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
     if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
     for (const { name, symbol, row, input, slider, fault } of rows) {

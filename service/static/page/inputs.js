@@ -197,9 +197,6 @@ export function readTyped(state, name, text) {
   return fault ? { ...state[name], typed: text, fault } : found;
 }
 
-/** A quantity without what is typed and cannot be used. */
-export const untyped = ({ typed, fault, ...good }) => good;
-
 /** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
 export function valueOf(state, name) {
   const { low, high } = state[name];
@@ -238,11 +235,10 @@ export function question(state) {
 
 const inAddress = ({ text }) =>
   encodeURIComponent(text.replaceAll(" ", "").replaceAll("µ", "u")).replaceAll("%2F", "/");
-/** The words that a part of the state may be, in the order in which an address is read; the first choice is known to all. */
-const wordsOf = (name) => Object.keys(about.choices[name]).slice(0, about.knows.has(name) ? undefined : 1);
+/** The words that a part of the state may be, in the order in which an address is read. */
 const WORDS = {
-  contact: () => wordsOf("contact"), direction: () => wordsOf("direction"), digits: () => ["few", "all"],
-  along: namesOf, scale: () => ["log", "linear"],
+  contact: () => Object.keys(about.choices.contact), direction: () => Object.keys(about.choices.direction),
+  digits: () => ["few", "all"], along: namesOf, scale: () => ["log", "linear"],
 };
 
 /** The state as the part of an address behind "#". */

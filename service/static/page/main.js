@@ -4,7 +4,7 @@ import { lawPanel, mapPanel } from "./figures.js";
 import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
   ANY, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
-  rounded, setNames, show, startState, toAddress, untyped, valueOf,
+  rounded, setNames, show, startState, toAddress, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
 import { get, post } from "./service.js";
@@ -20,8 +20,6 @@ const askPoint = status.channel("point", (asked) => post("v1/mu-macro", question
   showAnswer(answer);
   follow();
 });
-
-// --- the state --------------------------------------------------------------------------------------------
 
 const follow = () => parts.forEach((part) => part(state, answer));
 
@@ -46,9 +44,9 @@ function take({ target: { name, value, checked } }) {
   else if (name in state) change({ [name]: typeof state[name] === "string" ? value : readTyped(state, name, value) });
 }
 
-/** Brings back what was good in a field. */
+/** Brings back the last good text of a field. */
 function takeBack({ key, target: { name } }) {
-  if (key === "Escape" && state[name]?.text !== undefined) change({ [name]: untyped(state[name]) });
+  if (key === "Escape" && state[name]?.text !== undefined) take({ target: { name, value: state[name].text } });
 }
 
 /** Sets inputs to values in SI, in the units that their fields have, and with `more` other parts of the state; what cannot be is left as it is. */
@@ -68,12 +66,10 @@ function nudge(name, steps) {
 function readAddress({ newURL }) {
   const read = fromAddress(new URL(newURL).hash); // the address line itself may hold an earlier state by now
   $("notice").hidden = !read.faults.length;
-  const why = `This link has values that cannot be used; start values replace them: ${read.faults.join("; ")}.`;
-  $("notice-text").textContent = why;
+  $("notice-text").textContent =
+    `This link has values that cannot be used; start values replace them: ${read.faults.join("; ")}.`;
   change(read.state);
 }
-
-// --- the answer -------------------------------------------------------------------------------------------
 
 /** Shows an answer; with the digits that k supports, or with all that the table supports. */
 function showAnswer({ asked, ...found }) {
@@ -122,8 +118,6 @@ function showBars({ gradient, mu_macro: mu }, asked) {
     return make("tr", {}, make("th", { scope: "row" }, INPUTS[name].symbol), bar, make("td", {}, text));
   }));
 }
-
-// --- start ------------------------------------------------------------------------------------------------
 
 function start(names) {
   setNames(names);
