@@ -24,7 +24,8 @@ export function evaluate(values) {
   if (found.error) refuse(text(table.error_text(found.error)));
   const slope = (i) => (given[i] === Infinity ? null : finite(numbers[FOUND.length + i]));
   const gradient = Object.fromEntries(FIELDS.map((name, i) => [name, slope(i)]));
-  return { ...found, gradient, source: text(table.source_name(found.source)), regime: text(table.regime_name(found.regime)) };
+  const [source, regime] = [table.source_name(found.source), table.regime_name(found.regime)].map(text);
+  return { ...found, gradient, source, regime };
 }
 
 const staticOf = (values) => evaluate({ ...values, v0: 0 }).mu_macro;

@@ -3,7 +3,7 @@
 import { $ } from "./plots.js";
 
 const SLOW_MS = 1_500; // after which the old answer is marked as old
-const AGAIN_S = 8; // at most, between attempts; the first ones follow sooner
+const AGAIN_S = 3; // between attempts, where the service does not say it
 const channels = [];
 const wakeAll = () => channels.forEach((one) => one.wake());
 addEventListener("online", wakeAll);
@@ -12,8 +12,8 @@ addEventListener("online", wakeAll);
  * One question in flight; while it is, only the newest of those that come is kept.  Where there is no answer it is
  * asked again until there is one: after a while, when the network is back, or when a key is entered.
  *
- * `ask(question)` -> { found }, or why there is none: { refused }, { later, seconds } (worth asking again, after so many
- * seconds if told) or { key }; `use(found, question)`; `tell(reason, calm)`, null if there is none; `calm`: it mends itself.
+ * `ask(question)` -> { found }, or why not: { refused }, { later, seconds to wait if told } or { key: true };
+ * `use(found, question)`; `tell(reason, calm)`, reason null if there is none, calm if it mends itself.
  */
 export class Channel {
   constructor(ask, use, tell) {
@@ -29,7 +29,6 @@ export class Channel {
 
   async run() {
     this.mark(true);
-    let tries = 0;
     while (this.next !== null) {
       const asked = this.next;
       this.next = null;
@@ -37,10 +36,8 @@ export class Channel {
       const answer = await this.ask(asked.question);
       clearTimeout(slow);
       if (this.next !== null) continue;
-      tries += 1;
-      if (answer.later || answer.key) await this.again(asked, answer, tries);
+      if (answer.later || answer.key) await this.again(asked, answer);
       else {
-        tries = 0;
         showKeyForm(false); // the key was taken, or none is wanted
         this.tell(answer.refused ?? null);
         if (!answer.refused) this.use(answer.found, asked.question);
@@ -49,13 +46,13 @@ export class Channel {
     this.mark(false);
   }
 
-  again(asked, { later, seconds, key }, tries) {
+  again(asked, { later, seconds, key }) {
     this.next = asked;
     this.tell(later ? `${later} Asking again by itself.` : null, true);
     if (key) showKeyForm(true);
     return new Promise((wake) => {
       this.wake = wake;
-      if (later) setTimeout(wake, 1000 * (seconds ?? Math.min(2 ** (tries - 1), AGAIN_S)));
+      if (later) setTimeout(wake, 1000 * (seconds ?? AGAIN_S));
     });
   }
 

@@ -2,7 +2,7 @@
 import { Status } from "./ask.js";
 import { fill } from "./forms.js";
 import {
-  INPUTS, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  RIGID, about, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
 import { get, post } from "./service.js";
@@ -58,13 +58,12 @@ export function mapPanel(set, nudge, status) {
     point = null;
     plot.redraw();
     if (!answer) return;
-    const { groups: { v_tilde, y_tilde, l0 }, asked, mu_ratio, regime } = answer;
-    const [v0, y0, omega, k] = ["v0", "y0", "omega", "k"].map((name) => valueOf(asked, name));
-    const [v, y] = [v_tilde ?? v0 / (l0 * omega), y_tilde ?? y0 / l0];
+    const { groups: { v_tilde, y_tilde }, asked, mu_ratio, regime } = answer;
+    const [v, y] = [v_tilde ?? Infinity, y_tilde ?? Infinity];
     let out = "";
     if (!isMapped(asked)) out = "This map is that of one spring across. It does not hold for what is chosen.";
-    else if (k === Infinity) out = "A rigid contact has no point on the map.";
-    else if (Number.isNaN(v)) out = "A contact at rest has no point on the map.";
+    else if (asked.k === RIGID) out = "A rigid contact has no point on the map.";
+    else if (v_tilde === null && asked.v0.low === 0) out = "A contact at rest has no point on the map.";
     else {
       point = [v, y];
       const away = [["ṽ", v, data?.v_tilde], ["ỹ", y, data?.y_tilde]]
@@ -128,10 +127,10 @@ function lawRange({ along, scale, range, ...state }, border) {
   if (range.text) return range;
   const { unit, low, high } = state[along];
   const sizes = [low, high, along === "v0" ? border : null].filter((value) => value > 0 && Number.isFinite(value));
-  if (!sizes.length) sizes.push(readValue(along, INPUTS[along].start).low);
+  if (!sizes.length) sizes.push(readValue(along, about.inputs[along].start).low);
   const shown = sizes.map((value) => fromSI(along, Math.min(Math.max(value, LEAST), MOST), unit));
   const [least, most] = [Math.min(...shown), Math.max(...shown)];
-  const linear = [INPUTS[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
+  const linear = [about.inputs[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
   const decades = [`1e${Math.floor(Math.log10(least)) - 2}`, `1e${Math.ceil(Math.log10(most)) + 2}`];
   return readInterval(along, (scale === "linear" ? linear : decades).join(".."), unit);
 }

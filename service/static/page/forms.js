@@ -1,7 +1,7 @@
 // The form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
+  RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
   readValue, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
@@ -18,7 +18,7 @@ export function fill(input, { text, fault, typed = text }) {
 /** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are told to `status`. */
 export function inputForm(set, setSI, status) {
   let state;
-  let elastic = INPUTS.k.start; // which the switch of a rigid contact brings back
+  let elastic = about.inputs.k.start; // which the switch of a rigid contact brings back
   const rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
   rigid.addEventListener("change", () => set({ k: rigid.checked ? RIGID : readValue("k", elastic) }));
   for (const [name, words] of Object.entries(about.choices)) {
@@ -26,11 +26,11 @@ export function inputForm(set, setSI, status) {
     $(name).append(...Object.keys(words).map(radio));
   }
   const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
-    $(id).append(...Object.entries(INPUTS).map(([name, input]) => new Option(input[word], name)));
+    $(id).append(...Object.entries(about.inputs).map(([name, input]) => new Option(input[word], name)));
     return [...$(id).options];
   });
   $("unknown").value = "y0";
-  const rows = Object.entries(INPUTS).map(([name, { label, symbol, range: [low, high] }]) => {
+  const rows = Object.entries(about.inputs).map(([name, { label, symbol, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
     const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
@@ -149,7 +149,7 @@ export function stiffness(use) {
   }, ({ k, contact }, { Fz }) => {
     const model = contact === "ball" ? "ball (Hertz)" : "one spring";
     const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}`;
-    list("stiffness-result", [[told, { k }, 6, about.knows.has("contact") ? { contact } : {}]], use);
+    list("stiffness-result", [[told, { k }, 6, about.knows.includes("contact") ? { contact } : {}]], use);
   });
 }
 
@@ -167,7 +167,7 @@ export function fit(use) {
     const text = (name, value, digits = 4) =>
       (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, state[name].unit, digits));
     const names = Object.keys(values);
-    const equals = (name, one) => `${INPUTS[name].symbol} = ${text(name, one[name])}`;
+    const equals = (name, one) => `${about.inputs[name].symbol} = ${text(name, one[name])}`;
     const best = names.map((name) => {
       const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2)}`;
       return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end)).join(" to ")})`;

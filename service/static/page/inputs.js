@@ -1,17 +1,10 @@
 // The inputs: units and bounds, what a person types, numbers as text, the state of the page, its case and its address.
 // Nothing here needs a browser; tests/page tests it with node.
 
-/** By name: label, symbol, units, bound, offered units, the slider's decimal exponents (SI), start value. */
-export const INPUTS = {};
-/** What names.json says besides: the choices with their words, what the host `knows`, geometries, their arguments. */
+/** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
+ *  slider's decimal exponents (SI), start value; beside them the choices with their words, what the host `knows`,
+ *  geometries and their arguments. */
 export const about = {};
-
-/** Takes what names.json says; nothing here works before that. */
-export function setNames({ inputs, knows, ...others }) {
-  Object.assign(INPUTS, inputs);
-  Object.assign(about, { knows: new Set(knows), ...others });
-}
-
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
 const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9], W: [1, 1] } };
@@ -19,11 +12,11 @@ const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9]
 export const RIGID = { text: "rigid", unit: "N/µm", low: Infinity, high: Infinity };
 
 /** What is known of a quantity: an input, an argument of a geometry, or a power. */
-const kindOf = (name) => INPUTS[name] ?? about.arguments[name] ?? POWER;
+const kindOf = (name) => about.inputs[name] ?? about.arguments[name] ?? POWER;
 
 /** The inputs of a case: an oscillating normal force has its amplitude in the place of y0. */
 export const namesOf = ({ direction }) =>
-  Object.keys(INPUTS).filter((name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"));
+  Object.keys(about.inputs).filter((name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"));
 
 // --- numbers as text --------------------------------------------------------------------------------------
 
@@ -31,7 +24,7 @@ export const toSI = (name, value, unit) => (value * kindOf(name).units[unit][0])
 export const fromSI = (name, value, unit) => (value * kindOf(name).units[unit][1]) / kindOf(name).units[unit][0];
 
 /** The symbol that goes with a unit: a frequency in Hz is f. */
-export const symbolOf = (name, unit) => (name === "omega" && unit.endsWith("Hz") ? "f" : INPUTS[name].symbol);
+export const symbolOf = (name, unit) => (name === "omega" && unit.endsWith("Hz") ? "f" : about.inputs[name].symbol);
 
 const withUnit = (text, unit) => (unit === "-" ? text : `${text} ${unit}`);
 
@@ -123,14 +116,14 @@ export function readQuantity(name, text, unit) {
 }
 
 /** A typed value of an input: a number, or for k "rigid" or "low..high". */
-export function readValue(name, text, unit = INPUTS[name].offered[0]) {
+export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return RIGID;
   if (name === "k" && text.includes("..")) {
-    return about.knows.has("k_range") ? readInterval(name, text, unit)
+    return about.knows.includes("k_range") ? readInterval(name, text, unit)
       : refuse("must be one number: this service knows no interval");
   }
   const read = readQuantity(name, text, unit);
-  const { positive, bound } = INPUTS[name];
+  const { positive, bound } = about.inputs[name];
   if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);
   return read;
 }
@@ -186,7 +179,7 @@ export const ANY = { text: "" };
 
 /** A quantity for each input and for the `range` of the one that the law goes along, and what is chosen. */
 export const startState = () => ({
-  ...Object.fromEntries(Object.entries(INPUTS).map(([name, { start }]) => [name, readValue(name, start)])),
+  ...Object.fromEntries(Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)])),
   contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
 });
 
@@ -228,7 +221,7 @@ export const powerOf = ({ direction }) => (direction === "normal" ? [] : ["power
 
 /** The question for the readout. */
 export function question(state) {
-  const model = about.knows.has("contact") ? ["model"] : []; // of a service that has several
+  const model = about.knows.includes("contact") ? ["model"] : []; // of a service that has several
   const include = ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), ...model];
   return { ...caseOf(state, [], true), include };
 }
@@ -267,9 +260,9 @@ export function fromAddress(hash) {
     take(key, (word) => (known.includes(word) ? word : refuse(`must be one of ${known.join(", ")}`)));
   }
   if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
-  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, INPUTS[name].unit));
+  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));
   take("f", (text) => readValue("omega", text, "Hz"), "omega");
-  take("range", (text) => readInterval(state.along, text, INPUTS[state.along].unit));
+  take("range", (text) => readInterval(state.along, text, about.inputs[state.along].unit));
   for (const key of [...texts.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };
 }

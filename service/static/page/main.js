@@ -3,8 +3,8 @@ import { Status } from "./ask.js";
 import { lawPanel, mapPanel } from "./figures.js";
 import { fit, inputForm, solver, stiffness } from "./forms.js";
 import {
-  ANY, INPUTS, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
-  rounded, setNames, show, startState, toAddress, valueOf,
+  ANY, about, attempt, friction, fromAddress, inUnit, inWords, namesOf, question, readTyped,
+  rounded, show, startState, toAddress, valueOf,
 } from "./inputs.js";
 import { $, make } from "./plots.js";
 import { get, post } from "./service.js";
@@ -30,7 +30,9 @@ function change(changed) {
   follow();
   for (const name of ["contact", "direction", "along", "scale"]) $("form").elements[name].value = state[name];
   $("digits").checked = state.digits === "all";
-  for (const swing of document.querySelectorAll("#sketch g")) swing.toggleAttribute("hidden", !swing.matches(`.${state.direction}`));
+  for (const swing of document.querySelectorAll("#sketch g")) {
+    swing.toggleAttribute("hidden", !swing.matches(`.${state.direction}`));
+  }
   // browsers refuse an address that changes with every step of a slider
   clearTimeout(addressTimer);
   addressTimer = setTimeout(() => history.replaceState(null, "", toAddress(state)), 150);
@@ -49,7 +51,7 @@ function takeBack({ key, target: { name } }) {
   if (key === "Escape" && state[name]?.text !== undefined) take({ target: { name, value: state[name].text } });
 }
 
-/** Sets inputs to values in SI, in the units that their fields have, and with `more` other parts of the state; what cannot be is left as it is. */
+/** Sets inputs to values in SI, in the units of their fields, with `more` of the state; what cannot be is left alone. */
 function setSI(values, digits = 4, more = {}) {
   const read = ([name, value]) => [name, rounded(name, value, state[name].unit, digits)];
   const { found } = attempt(() => Object.entries(values).map(read));
@@ -58,7 +60,7 @@ function setSI(values, digits = 4, more = {}) {
 
 /** Makes an input larger or smaller by steps of 5 %; true. */
 function nudge(name, steps) {
-  const from = state[name].low || 10 ** INPUTS[name].range[0];
+  const from = state[name].low || 10 ** about.inputs[name].range[0];
   if (from !== Infinity) setSI({ [name]: from * 1.05 ** steps }, 6);
   return true;
 }
@@ -115,15 +117,15 @@ function showBars({ gradient, mu_macro: mu }, asked) {
     const box = { class: "bar", viewBox: "0 0 100 10", preserveAspectRatio: "none", "aria-hidden": true };
     const bar = make("td", {}, make("svg", box, make("rect", fill), make("path", { d: "M50 0v10" })));
     const text = share === null ? "–" : `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`;
-    return make("tr", {}, make("th", { scope: "row" }, INPUTS[name].symbol), bar, make("td", {}, text));
+    return make("tr", {}, make("th", { scope: "row" }, about.inputs[name].symbol), bar, make("td", {}, text));
   }));
 }
 
 function start(names) {
-  setNames(names);
-  for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.has(part.dataset.needs);
+  Object.assign(about, names);
+  for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.includes(part.dataset.needs);
   parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
-  const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.has(name));
+  const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.includes(name));
   parts.push(...panels.map(([, panel]) => panel(setSI)));
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
