@@ -108,12 +108,16 @@ class Page:
         )
 
     def settle(self) -> Any:
-        """Wait until every request that follows from the state is answered, and what follows is drawn."""
+        """Wait until every request that follows from the state is answered, and what follows is drawn.
+
+        The browser may complain of refused and lost requests, which it logs, and of nothing else.
+        """
         self.run(
             "while (document.getElementById('main')?.dataset.asking !== 'false')"
             " await new Promise((next) => setTimeout(next, 10));"
             "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
+        assert [told for told in self.complaints() if not re.search(r"status of (401|422|50\d)", told)] == []
         return self
 
     def until(self, found: Any, told: Any) -> Any:
@@ -232,14 +236,4 @@ class Page:
             " await new Promise(requestAnimationFrame);"
             "const changes = document.getAnimations().filter((one) => one instanceof CSSTransition);"
             "await Promise.allSettled(changes.map((one) => one.finished));"
-        )
-
-    def offline(self, state: Any) -> None:
-        rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
-        self.browser.execute_cdp_cmd("Network.enable", {})
-        self.browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": state, **rates})
-        self.run(  # the browser applies it a moment later
-            f"const state = {json.dumps(state)};"
-            " while ((await fetch('/livez').then(() => false, () => true)) !== state)"
-            " await new Promise((next) => setTimeout(next, 10));"
         )

@@ -51,7 +51,6 @@ def test_it_loads_and_shows_the_known_value(open_page: Any, surrogate: Surrogate
     loaded = page.run("return performance.getEntriesByType('resource').map((entry) => entry.name);")
     assert len(loaded) >= len(ASSETS)
     assert {urlsplit(address).netloc for address in loaded} == {urlsplit(live_server.url).netloc}
-    assert page.complaints() == []
 
 
 def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
@@ -75,7 +74,6 @@ def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
         page.wait_for("#solve-status", said)
     page.choose("#target", "2", "input")
     assert not page.is_old("#solve")
-    page.complaints()  # a refusal is logged by the browser
 
 
 def test_the_map_is_read_and_moved_on(open_page: Any, surrogate: Surrogate) -> None:
@@ -94,7 +92,6 @@ def test_the_map_is_read_and_moved_on(open_page: Any, surrogate: Surrogate) -> N
     assert f"speed {page.rounded(expected.v_tilde, 3)}" in page.find("#map").get_attribute("aria-label")
     page.press("#law", "ARROW_LEFT")
     assert page.number() == page.rounded(surrogate.evaluate(**{**START, "y0": 2.1e-6}).mu_macro)
-    assert page.complaints() == []
 
 
 OUTSIDE = (("#v0=100", (0, 0), "^$"), ("#v0=1e6", (1, 0), "ṽ = 2.65e6"), ("#v0=0", (-1, 0), "ṽ = 0"),
@@ -115,7 +112,6 @@ def test_a_point_outside_of_the_map_is_marked_on_its_frame(open_page: Any, addre
     found = (x > 0.8) - (x < 0.2), (y < 0.1) - (y > 0.8)
     assert all(one in (0, at) for one, at in zip(side, found, strict=True))
     assert page.text("#status") == ""
-    assert page.complaints() == []
 
 
 def test_the_map_has_a_colour_between_two_levels(open_page: Any, surrogate: Surrogate, repository: Path) -> None:
@@ -168,7 +164,6 @@ def test_the_law_is_read_in_the_units_of_its_field_over_a_range(open_page: Any, 
     at = float(page.wait_for("#law-read", r"f = (\S+) kHz")[1])
     page.touched("#law", 0.5, 0.5, click=True)
     assert float(page.value("#field-omega").removesuffix(" kHz")) == close(at, rel=0.05)
-    page.complaints()  # a refusal is logged by the browser
 
 
 ENDS = {
@@ -188,7 +183,6 @@ def test_every_law_and_the_ends_of_every_range_are_answered(open_page: Any, addr
     assert "Macroscopic friction from" in page.find("#law").get_attribute("aria-label")
     assert (page.text("#status"), page.text("#law-status")) == ("", "")
     assert not re.search(ODD, page.run(SEEN))
-    assert page.complaints() == []
 
 
 def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None:
@@ -205,7 +199,6 @@ def test_downloads(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None
         assert min(float(picture.attrib[side]) for side in ("width", "height")) >= 300
         # it looks the same without the page's style sheet
         assert all("fill:" in one.attrib["style"] for one in picture.iter("{http://www.w3.org/2000/svg}path"))
-    assert page.complaints() == []
 
 
 @pytest.mark.parametrize("direction", ["across", "along", "normal"])
@@ -223,7 +216,6 @@ def test_all_contacts_and_directions_answer(open_page: Any, surrogate: Surrogate
         assert (f"contact={contact}" in page.address()) is (contact != "spring")
         if (contact, direction) == ("ball", "normal"):
             page.wait_for("#status", "refuses this: .*(ball|contact)")
-            page.complaints()
             return
         swing = {"y0": None, "Fz_amplitude": 5.0} if normal else {}
         case = {name: x for name, x in {**START, **swing, "k": None}.items() if x is not None}
@@ -241,7 +233,6 @@ def test_all_contacts_and_directions_answer(open_page: Any, surrogate: Surrogate
         assert page.text("#status") == page.text("#law-status") == ""
         page.click("#reset")
         assert (page.text("#map-out"), page.value("#field-k")) == ("", "1 N/µm")
-        assert page.complaints() == []
 
 
 def test_the_panels_ask_and_fill_the_form(open_page: Any, surrogate: Surrogate, tmp_path: Path) -> None:
@@ -285,4 +276,3 @@ def test_the_panels_ask_and_fill_the_form(open_page: Any, surrogate: Surrogate, 
         assert page.is_old("#fit")  # the result is that of other points
         page.click("#fit-form button")
         page.wait_for("#fit-status", "^needs two or three columns: v0, mu_macro, std. Grey")
-        page.complaints()  # a refusal is logged by the browser
