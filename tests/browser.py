@@ -6,6 +6,7 @@ import re
 import shutil
 import time
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +31,12 @@ def start(folder: Path) -> Any:
     LookupError
         Selenium, Chromium or its ChromeDriver is not installed.
     """
-    try:
-        from selenium import webdriver
-    except ImportError:
-        raise LookupError("the PyPI package selenium is not installed") from None
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     driver = shutil.which("chromedriver")
-    if chromium is None or driver is None:
-        raise LookupError("there is no Chromium with its ChromeDriver on the PATH")
+    if chromium is None or driver is None or find_spec("selenium") is None:
+        raise LookupError("the PyPI package selenium, or Chromium with its ChromeDriver on the PATH, is missing")
+    from selenium import webdriver
+
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     for argument in (
@@ -82,12 +81,12 @@ class Opened:
         return page
 
     @contextmanager
-    def faked(self, function: Any, address: str = "", **size: Any) -> Any:
+    def faked(self, function: Any, address: str = "", wait: bool = True) -> Any:
         """The page with a function in the place of ``fetch`` from its first question on; ``real`` is the true one."""
         source = f"const real = window.fetch; window.fetch = {function};"
         added = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
         try:
-            yield self(address, new=True, wait=False, **size)
+            yield self(address, new=True, wait=wait)
         finally:
             self.browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
             self.shown = None
@@ -131,9 +130,6 @@ class Page:
     def find(self, selector: str) -> Any:
         return self.browser.find_element("css selector", selector)
 
-    def count(self, selector: str) -> Any:
-        return len(self.browser.find_elements("css selector", selector))
-
     def text(self, selector: str) -> Any:
         return self.run(f"return document.querySelector({selector!r}).textContent;")
 
@@ -154,9 +150,6 @@ class Page:
             lambda: re.search(pattern, self.text(selector)),
             lambda: f"{selector} is {self.text(selector)!r}, not {pattern}",
         )
-
-    def wait_until_shown(self, selector: str) -> None:
-        self.until(lambda: self.find(selector).is_displayed(), lambda: f"{selector} does not appear")
 
     def type(self, selector: str, text: str, commit: bool = True) -> None:
         from selenium.webdriver import Keys
@@ -183,15 +176,12 @@ class Page:
         self.run(f"document.querySelector({selector!r}).click();")
         self.settle()
 
-    def open_all(self) -> None:
-        self.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
-
     def is_old(self, selector: str = "#main") -> Any:
         return "old" in self.find(selector).get_attribute("class").split()
 
     def is_red(self, selector: str) -> Any:
         """Whether a text has the colour of errors, in the light scheme."""
-        return self.run(f"return getComputedStyle(document.querySelector({selector!r})).color;") == "rgb(179, 38, 30)"
+        return self.find(selector).value_of_css_property("color") == "rgba(179, 38, 30, 1)"
 
     def complaints(self) -> Any:
         log = self.browser.get_log("browser")
