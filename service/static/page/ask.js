@@ -88,8 +88,7 @@ export class Status {
   }
 }
 
-// --- the API key: kept for this tab, sent as a header, never part of an address ------------------------------
-
+// The API key is kept for this tab, sent as a header, never part of an address.
 const NAME = "mumacro-api-key";
 /** What `use(storage)` is; null where storage is switched off: there the key lives as long as the page. */
 function stored(use) {

@@ -1,6 +1,5 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
-import { fill } from "./forms.js";
 import {
   RIGID, about, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
@@ -214,14 +213,12 @@ export function lawPanel(set, nudge) {
   $("law-image").addEventListener("click", () => law && plot.save(caption(state, along), `friction-law-${along}.svg`));
 
   return (...now) => {
-    const [{ range }] = now;
-    if (now[0] !== state) fill($("range"), range); // what is being typed stays
     [state, answer] = now;
     along = state.along;
     unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
     $("range").placeholder = chosen;
-    status.set("typed", range.fault && `range: ${range.fault}.`);
+    status.set("typed", state.range.fault && `range: ${state.range.fault}.`);
     tell();
     const request = { ...caseOf(state, [along], true), along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;

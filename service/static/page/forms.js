@@ -10,7 +10,7 @@ import { post } from "./service.js";
 const STEPS = 1000; // of a slider, a decade
 
 /** Shows a quantity in its field; what is typed and cannot be used stays, and is marked unless it is empty. */
-export function fill(input, { text, fault, typed = text }) {
+function fill(input, { text, fault, typed = text }) {
   input.value = typed;
   input.setAttribute("aria-invalid", String(fault !== undefined && typed.trim() !== ""));
 }
@@ -46,6 +46,7 @@ export function inputForm(set, setSI, status) {
     state = now;
     rigid.checked = state.k === RIGID;
     if (!rigid.checked) elastic = state.k.text;
+    fill($("range"), state.range);
     for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
     if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
     for (const { name, symbol, row, input, slider, fault } of rows) {
@@ -61,10 +62,7 @@ export function inputForm(set, setSI, status) {
   };
 }
 
-/**
- * A form that asks `path` for what `read(state)` says, and `show(found, asked, state)`s the answer; grey while it would
- * ask for something else.  -> a function that follows the state.
- */
+/** A form that asks `path` for what `read(state)` says; what it `show`s is grey while it would ask for something else. */
 function panel(name, path, read, show) {
   const status = new Status(`${name}-status`, name);
   let state, answered; // the question that the result belongs to, as text

@@ -18,8 +18,6 @@ const kindOf = (name) => about.inputs[name] ?? about.arguments[name] ?? POWER;
 export const namesOf = ({ direction }) =>
   Object.keys(about.inputs).filter((name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"));
 
-// --- numbers as text --------------------------------------------------------------------------------------
-
 export const toSI = (name, value, unit) => (value * kindOf(name).units[unit][0]) / kindOf(name).units[unit][1];
 export const fromSI = (name, value, unit) => (value * kindOf(name).units[unit][1]) / kindOf(name).units[unit][0];
 
@@ -54,8 +52,6 @@ export function friction(value, uncertainty = 0, usual = 4) {
   const places = uncertainty > 0 ? Math.floor(Math.log10(value)) - Math.floor(Math.log10(uncertainty)) + 2 : usual;
   return value.toPrecision(Math.min(Math.max(places, 1), 15));
 }
-
-// --- what a person types: understood as a whole, or refused with the reason ---------------------------------
 
 class Fault extends Error {}
 const refuse = (why) => { throw new Fault(why); };
@@ -140,7 +136,6 @@ export function readInterval(name, text, unit) {
   return { text: `${first}..${high.text}`, unit: high.unit, low: low.low, high: high.low };
 }
 
-/** A typed range of the law: an interval, or nothing. */
 const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval(name, text, unit));
 
 /** A value of an input [SI], or "rigid", as a quantity with so many digits. */
@@ -171,8 +166,6 @@ export function readPoints(text) {
     return within(`${line}, ${name}`, () => readQuantity(kind, row[j], usual)).low;
   })]));
 }
-
-// --- the state of the page, the case that it asks for, and its address, in the words of the command line: "y0=2um" ---
 
 /** The range of a law over which nobody chose one. */
 export const ANY = { text: "" };

@@ -124,9 +124,9 @@ function showBars({ gradient, mu_macro: mu }, asked) {
 function start(names) {
   Object.assign(about, names);
   for (const part of document.querySelectorAll("[data-needs]")) part.hidden = !about.knows.includes(part.dataset.needs);
-  parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge)];
   const panels = Object.entries({ service: solver, stiffness, fit }).filter(([name]) => about.knows.includes(name));
-  parts.push(...panels.map(([, panel]) => panel(setSI)));
+  parts = [inputForm(change, setSI, status), mapPanel(setSI, nudge, status), lawPanel(setSI, nudge),
+    ...panels.map(([, panel]) => panel(setSI))];
   readAddress({ newURL: location.href });
   addEventListener("hashchange", readAddress);
   addEventListener("change", take);

@@ -115,15 +115,13 @@ const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharr
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
 export class Plot {
   constructor(svg, paint) {
-    Object.assign(this, { svg, paint, waiting: false });
+    Object.assign(this, { svg, paint });
     new ResizeObserver(() => this.redraw()).observe(svg);
   }
 
   redraw() {
-    if (this.waiting) return;
-    this.waiting = true;
-    requestAnimationFrame(() => {
-      this.waiting = false;
+    cancelAnimationFrame(this.next);
+    this.next = requestAnimationFrame(() => {
       const { clientWidth: width, clientHeight: height } = this.svg;
       if (!width || !height) return;
       this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
