@@ -248,7 +248,7 @@ def test_the_panels_ask_and_fill_the_form(open_page: Any, surrogate: Surrogate, 
         page.click("#stiffness-result button")
         assert page.value("#field-k") == f"{found.k / 1e6:.6g} N/µm"
         assert page.find("[name=contact][value=ball]").is_selected()
-        page.choose("#geometry", "cylinder")
+        page.choose("#geometry", "cylinder", "input")
         assert page.value("#argument-radius") == "5 mm"  # what two geometries share stays
         for text, said in (("10 parsec", "^length: “parsec” is not a unit of length: give m, .*Grey results belong"),
                            ("-1 mm", "refuses this: length")):  # fmt: skip

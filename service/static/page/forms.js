@@ -134,7 +134,7 @@ export function stiffness(use) {
     const known = about.geometries[$("geometry").value].arguments;
     for (const row of $("arguments").children) row.disabled = row.hidden = !known.includes(row.name);
   }
-  $("geometry").addEventListener("change", choose);
+  $("geometry").addEventListener("input", choose); // before the form compares
   choose();
   return panel("stiffness", "v1/stiffness", (state) => {
     const { geometry, ...typed } = Object.fromEntries(new FormData($("stiffness-form"))); // of what is not disabled
