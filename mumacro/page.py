@@ -54,7 +54,7 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
     The page shows what needs them only if they are there: ``service`` (what is computed by the service only),
     ``guide``, ``stiffness`` and ``fit``; ``contact``, ``direction`` and ``k_range``, fields of a case.
     """
-    inputs = {
+    inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label, "symbol": symbol, "offered": offered, "range": slider, "start": start,
             "unit": unit_of(name), "units": _scales(UNITS_OF[LIKE.get(name, name)]),
@@ -63,7 +63,7 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
         for name, (label, symbol, offered, slider, start) in _INPUTS.items()
     }  # fmt: skip
     # a frequency f stands for omega = 2 pi f; a unit of both (1/s) says neither
-    angular: dict[str, Any] = inputs["omega"]["units"]
+    angular = inputs["omega"]["units"]
     for unit, (times, over) in UNITS_OF["f"].items():
         angular[unit] = None if unit in angular else [RAD_PER_CYCLE * times, over]
     geometries = {

@@ -62,7 +62,7 @@ export function inputForm(set, setSI, status) {
   };
 }
 
-/** A form that asks `path` for what `read(state)` says; what it `show`s is grey while it would ask for something else. */
+/** A form that asks `path` for what `read(state)` says; what it `show`s is grey while it would ask something else. */
 function panel(name, path, read, show) {
   const status = new Status(`${name}-status`, name);
   let state, answered; // the question that the result belongs to, as text

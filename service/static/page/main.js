@@ -51,7 +51,7 @@ function takeBack({ key, target: { name } }) {
   if (key === "Escape" && state[name]?.text !== undefined) take({ target: { name, value: state[name].text } });
 }
 
-/** Sets inputs to values in SI, in the units of their fields, with `more` of the state; what cannot be is left alone. */
+/** Sets inputs to values in SI, in the units of their fields, with `more` of the state; what cannot be is left. */
 function setSI(values, digits = 4, more = {}) {
   const read = ([name, value]) => [name, rounded(name, value, state[name].unit, digits)];
   const { found } = attempt(() => Object.entries(values).map(read));
