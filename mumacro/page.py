@@ -13,7 +13,7 @@ import numpy as np
 
 from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
-from mumacro.inputs import BOUNDS, POSITIVE, SI, UNITS_OF, Scale, refusal
+from mumacro.inputs import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, UNITS_OF, Scale, unit_of
 from mumacro.surrogate import Surrogate
 
 __all__ = ["POLICY", "map_of", "names"]
@@ -24,6 +24,24 @@ POLICY = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
+# label, symbol, offered units, decimal exponents of the slider [SI], start value
+_INPUTS = {
+    "mu0": ("friction µ₀", "µ₀", ["-"], [-2, 0.5], "0.3 -"),
+    "Fz": ("force Fz", "Fz", ["N", "mN", "kN"], [-3, 5], "10 N"),
+    "k": ("stiffness k", "k", ["N/µm", "kN/m", "N/m"], [2, 10], "1 N/µm"),
+    "y0": ("amplitude y₀", "y₀", ["µm", "nm", "mm", "m"], [-10, -3], "2 µm"),
+    AMPLITUDE: ("force ΔFz", "ΔFz", ["N", "mN", "kN"], [-3, 5], "5 N"),
+    "omega": ("frequency", "ω", ["kHz", "Hz", "rad/s"], [0, 7], "20 kHz"),
+    "v0": ("speed v₀", "v₀", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s"),
+}
+# what may be chosen, with its part of the model line; the first is the usual one
+_CHOICES = {
+    "contact": {"spring": "one spring of stiffness k", "ball": "a ball (Hertz) with the initial stiffness k"},
+    "direction": {
+        "across": "oscillation across the sliding direction", "along": "oscillation along the sliding direction",
+        "normal": "an oscillating normal force",
+    },
+}  # fmt: skip
 # The range of the map [-]: from deep in creep to fast sliding, twenty points per decade.
 _PER_DECADE = 20
 _V_DECADES, _Y_DECADES = (-4, 3), (-2, 3)
@@ -31,24 +49,31 @@ _UNIT = 1e-4  # of the map's integers: a shade of colour is a hundred times coar
 
 
 def names(knows: Iterable[str] = ()) -> dict[str, Any]:
-    """``names.json``: inputs, units, bounds, geometries with arguments, and what the page's host ``knows``.
+    """``names.json``: inputs, choices, geometries with arguments, and what the page's host ``knows``.
 
     The page shows what needs them only if they are there: ``service`` (what is computed by the service only),
     ``guide``, ``stiffness`` and ``fit``; ``contact``, ``direction`` and ``k_range``, fields of a case.
     """
-    inputs = {
+    inputs: dict[str, dict[str, Any]] = {
         name: {
-            "unit": SI[name][0], "bound": refusal(name, -1.0).removeprefix("must be "), "positive": name in POSITIVE,
-            "units": _scales(known),
+            "label": label, "symbol": symbol, "offered": offered, "range": slider, "start": start,
+            "unit": unit_of(name), "units": _scales(UNITS_OF[LIKE.get(name, name)]),
+            "bound": BOUNDS["y0" if name == AMPLITUDE else name], "positive": name in POSITIVE,
         }
-        for name, known in UNITS_OF.items()
+        for name, (label, symbol, offered, slider, start) in _INPUTS.items()
     }  # fmt: skip
-    inputs[AMPLITUDE] = {**inputs["Fz"], "bound": BOUNDS["y0"], "positive": False}
+    # a frequency f stands for omega = 2 pi f; a unit of both (1/s) says neither
+    angular = inputs["omega"]["units"]
+    for unit, (times, over) in UNITS_OF["f"].items():
+        angular[unit] = None if unit in angular else [RAD_PER_CYCLE * times, over]
     geometries = {
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]} for name, one in GEOMETRIES.items()
     }
     arguments = {name: {**one._asdict(), "units": _scales(one.units)} for name, one in ARGUMENTS.items()}
-    return {"inputs": inputs, "geometries": geometries, "arguments": arguments, "knows": list(knows)}
+    known = list(knows)
+    choices = {name: words if name in known else dict([*words.items()][:1]) for name, words in _CHOICES.items()}
+    told = {"geometries": geometries, "arguments": arguments, "knows": known}
+    return {"inputs": inputs, "choices": choices, **told}
 
 
 def map_of(surrogate: Surrogate) -> dict[str, Any]:

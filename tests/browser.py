@@ -6,6 +6,7 @@ import re
 import shutil
 import time
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +31,12 @@ def start(folder: Path) -> Any:
     LookupError
         Selenium, Chromium or its ChromeDriver is not installed.
     """
-    try:
-        from selenium import webdriver
-    except ImportError:
-        raise LookupError("the PyPI package selenium is not installed") from None
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     driver = shutil.which("chromedriver")
-    if chromium is None or driver is None:
-        raise LookupError("there is no Chromium with its ChromeDriver on the PATH")
+    if chromium is None or driver is None or find_spec("selenium") is None:
+        raise LookupError("the PyPI package selenium, or Chromium with its ChromeDriver on the PATH, is missing")
+    from selenium import webdriver
+
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     for argument in (
@@ -82,12 +81,12 @@ class Opened:
         return page
 
     @contextmanager
-    def faked(self, function: Any, address: str = "", **size: Any) -> Any:
+    def faked(self, function: Any, address: str = "", wait: bool = True) -> Any:
         """The page with a function in the place of ``fetch`` from its first question on; ``real`` is the true one."""
         source = f"const real = window.fetch; window.fetch = {function};"
         added = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
         try:
-            yield self(address, new=True, wait=False, **size)
+            yield self(address, new=True, wait=wait)
         finally:
             self.browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
             self.shown = None
@@ -108,12 +107,16 @@ class Page:
         )
 
     def settle(self) -> Any:
-        """Wait until every request that follows from the state is answered, and what follows is drawn."""
+        """Wait until every request that follows from the state is answered, and what follows is drawn.
+
+        The browser may complain of refused and lost requests, which it logs, and of nothing else.
+        """
         self.run(
             "while (document.getElementById('main')?.dataset.asking !== 'false')"
             " await new Promise((next) => setTimeout(next, 10));"
             "for (let i = 0; i < 2; i += 1) await new Promise(requestAnimationFrame);"
         )
+        assert [told for told in self.complaints() if not re.search(r"status of (401|422|50\d)", told)] == []
         return self
 
     def until(self, found: Any, told: Any) -> Any:
@@ -126,9 +129,6 @@ class Page:
 
     def find(self, selector: str) -> Any:
         return self.browser.find_element("css selector", selector)
-
-    def count(self, selector: str) -> Any:
-        return len(self.browser.find_elements("css selector", selector))
 
     def text(self, selector: str) -> Any:
         return self.run(f"return document.querySelector({selector!r}).textContent;")
@@ -150,9 +150,6 @@ class Page:
             lambda: re.search(pattern, self.text(selector)),
             lambda: f"{selector} is {self.text(selector)!r}, not {pattern}",
         )
-
-    def wait_until_shown(self, selector: str) -> None:
-        self.until(lambda: self.find(selector).is_displayed(), lambda: f"{selector} does not appear")
 
     def type(self, selector: str, text: str, commit: bool = True) -> None:
         from selenium.webdriver import Keys
@@ -179,15 +176,12 @@ class Page:
         self.run(f"document.querySelector({selector!r}).click();")
         self.settle()
 
-    def open_all(self) -> None:
-        self.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
-
     def is_old(self, selector: str = "#main") -> Any:
         return "old" in self.find(selector).get_attribute("class").split()
 
     def is_red(self, selector: str) -> Any:
         """Whether a text has the colour of errors, in the light scheme."""
-        return self.run(f"return getComputedStyle(document.querySelector({selector!r})).color;") == "rgb(179, 38, 30)"
+        return self.find(selector).value_of_css_property("color") == "rgba(179, 38, 30, 1)"
 
     def complaints(self) -> Any:
         log = self.browser.get_log("browser")
@@ -232,14 +226,4 @@ class Page:
             " await new Promise(requestAnimationFrame);"
             "const changes = document.getAnimations().filter((one) => one instanceof CSSTransition);"
             "await Promise.allSettled(changes.map((one) => one.finished));"
-        )
-
-    def offline(self, state: Any) -> None:
-        rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
-        self.browser.execute_cdp_cmd("Network.enable", {})
-        self.browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": state, **rates})
-        self.run(  # the browser applies it a moment later
-            f"const state = {json.dumps(state)};"
-            " while ((await fetch('/livez').then(() => false, () => true)) !== state)"
-            " await new Promise((next) => setTimeout(next, 10));"
         )

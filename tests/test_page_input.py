@@ -19,7 +19,6 @@ def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -
         assert page.number() == page.rounded(surrogate.evaluate(**{**START, **changed}).mu_macro)
 
     page.type("#field-y0", "2.9", commit=False)
-    page.run("await new Promise((next) => setTimeout(next, 100));")
     expect()  # not while it is typed
     page.find("#field-Fz").click()  # but on leaving the field
     page.settle()
@@ -29,13 +28,10 @@ def test_a_typed_value_applies_on_commit(open_page: Any, surrogate: Surrogate) -
         ("y0", "0.0031mm", "0.0031 mm", {"y0": 3.1e-6}),
         ("y0", "0.0032", "0.0032 mm", {"y0": 3.2e-6}),
         ("omega", "1000 Hz", "1000 Hz", {"y0": 3.2e-6, "omega": 2000 * math.pi}),
-        ("omega", "20kHz", "20 kHz", {"y0": 3.2e-6}),
-        ("Fz", "9.123456789012 N", "9.123456789012 N", {"y0": 3.2e-6, "Fz": 9.123456789012}),
     ):
         page.type(f"#field-{field}", typed)
         assert page.value(f"#field-{field}") == shown
         expect(**changed)
-    assert page.complaints() == []
 
 
 def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surrogate: Surrogate) -> None:
@@ -68,7 +64,6 @@ def test_a_bad_value_greys_the_result_and_gives_the_reason(open_page: Any, surro
     assert page.number() == page.rounded(surrogate.evaluate(**{**START, "mu0": 0.4, "v0": 0.1}).mu_macro)
     assert page.text("#regime") == "continuous"
     assert page.find("#slider-v0").get_attribute("aria-valuetext") == "v₀ = 100 mm/s"
-    assert page.complaints() == []
 
 
 def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) -> None:
@@ -86,30 +81,12 @@ def test_a_contact_is_rigid_by_a_switch(open_page: Any, surrogate: Surrogate) ->
     assert page.value("#field-k") == "500000 N/m"  # the earlier value
     page.type("#field-k", "rigid")
     assert page.find("#rigid").is_selected()
-    assert page.complaints() == []
 
 
-def test_offline_the_result_is_grey_until_the_service_is_back(open_page: Any, surrogate: Surrogate) -> None:
-    page = open_page()
-    before = page.number()
-    try:
-        page.offline(True)
-        page.run("const slider = document.querySelector('#slider-v0'); slider.value = -1000;"
-                 "slider.dispatchEvent(new Event('input'));")  # fmt: skip
-        page.wait_for("#status", "^The service does not answer. Asking again by itself. Grey results belong to earlier")
-        assert (page.is_old(), page.is_red("#status"), page.number()) == (True, False, before)
-    finally:
-        page.offline(False)
-    page.settle()
-    assert (page.is_old(), page.text("#status")) == (False, "")
-    assert page.number() == page.rounded(surrogate.evaluate(**{**START, "v0": 0.1}).mu_macro)
-    page.complaints()
-
-
-def test_every_trouble_of_the_service_has_its_own_message(open_page: Any) -> None:
+def test_every_trouble_of_the_service_has_its_own_message(open_page: Any, surrogate: Surrogate) -> None:
     said = "new Response(JSON.stringify({ detail: 'too many cases' }), { status: %s, headers: { 'Retry-After': '1' } })"
     with open_page.faked("(...all) => (window.reply ?? real)(...all)") as page:
-        page.settle()
+        before = page.number()
         for reply, message, red in (
             (f"async () => {said % 503}", "^The service cannot answer now: too many cases. Asking again by its", False),
             (f"async () => {said % 422}", "^The service refuses this: too many cases. Grey results belong to e", True),
@@ -120,11 +97,15 @@ def test_every_trouble_of_the_service_has_its_own_message(open_page: Any) -> Non
         ):  # fmt: skip
             page.run(f"window.reply = {reply}; document.querySelector('#rigid').click();")
             page.wait_for("#status", message)
-            assert (page.is_old(), page.is_red("#status")) == (True, red)
+            assert (page.is_old(), page.is_red("#status"), page.number()) == (True, red, before)
         page.run("delete window.reply; window.late.forEach((answer) => answer());")
         page.settle()
+        page.run("window.reply = () => Promise.reject(new TypeError()); document.querySelector('#rigid').click();")
+        page.wait_for("#status", "^The service does not answer. Asking again by itself. Grey results belong to earlier")
+        page.run("delete window.reply; dispatchEvent(new Event('online'));")
+        page.settle()
+        assert page.number() == page.rounded(surrogate.evaluate(**{**START, "k": None}).mu_macro, 6)
         assert (page.is_old(), page.text("#status")) == (False, "")
-        page.complaints()
 
 
 def test_the_start_is_calm_while_the_service_is_not_ready(open_page: Any, surrogate: Surrogate) -> None:
@@ -132,12 +113,12 @@ def test_the_start_is_calm_while_the_service_is_not_ready(open_page: Any, surrog
         "async (path, options) => (window.ready || path.includes('names.json') ? real(path, options) : new Response("
         "'{\"detail\": \"the tables are not loaded yet\"}', { status: 503, headers: { 'Retry-After': '1' } }))"
     )
-    with open_page.faked(unready) as page:
+    with open_page.faked(unready, wait=False) as page:
         said = "^The service cannot answer now: the tables are not loaded yet. Asking again by itself.$"
         page.wait_for("#status", said)  # no word of earlier values: there are none
         assert not page.is_red("#status")
         assert page.text("#law-status") == page.text("#solve-status") == ""
-        assert page.count("[aria-invalid=true]") == 0
+        assert len(page.texts("[aria-invalid=true]")) == 0
         assert (page.text("#mu"), page.is_old()) == ("…", True)
         page.run("window.ready = true;")
         page.settle()
@@ -147,14 +128,13 @@ def test_the_start_is_calm_while_the_service_is_not_ready(open_page: Any, surrog
 
 def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page("#Fz=12.5&along=y0&v0=0.01m/s&range=1e-7..1e-5&digits=all")
-    link = page.address()
     before = [page.text("#mu"), page.find("#law").get_attribute("aria-label")]
-    again = open_page("#" + link, new=True)
+    again = open_page("#" + page.address(), new=True)
     assert [again.text("#mu"), again.find("#law").get_attribute("aria-label")] == before
     expected = surrogate.evaluate(**{**START, "Fz": 12.5})
     assert float(before[0]) == close(expected.mu_macro, abs=2 * expected.error_bound)
-    assert (again.value("#field-Fz"), again.value("#along")) == ("12.5 N", "y0")
-    assert (again.value("#field-v0"), again.value("#range")) == ("0.01 m/s", "1e-7..0.00001 m")
+    shown = [again.value(f"#{field}") for field in ("field-Fz", "along", "field-v0", "range")]
+    assert shown == ["12.5 N", "y0", "0.01 m/s", "1e-7..0.00001 m"]
     assert not again.find("#notice").is_displayed()
     again.click("#reset")
     assert again.number() == again.rounded(surrogate.evaluate(**START).mu_macro)
@@ -162,4 +142,3 @@ def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> No
     assert "mu0 = -1 (must be finite and > 0)" in bad.text("#notice-text")
     bad.click("#notice-close")
     assert not bad.find("#notice").is_displayed()
-    assert bad.complaints() == []

@@ -3,13 +3,13 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import {
-  RIGID, attempt, caseOf, friction, fromAddress, inUnit, question, readInterval, readPoints, readQuantity, readValue,
-  setNames, show, startState, toAddress, valueOf,
+  RIGID, about, attempt, caseOf, friction, fromAddress, inUnit, question, readInterval, readPoints, readQuantity, readValue,
+  show, startState, toAddress, valueOf,
 } from "../../service/static/page/inputs.js";
 
 const told = JSON.parse(readFileSync(process.env.PAGE_NAMES, "utf8")); // as the service tells them
 const ALL = [...told.knows, "contact", "direction", "k_range"];
-setNames({ ...told, knows: ALL });
+Object.assign(about, told, { knows: ALL });
 
 const near = (value, expected) =>
   assert.ok(Math.abs(value - expected) <= 1e-15 * Math.abs(expected), `${value}, not ${expected}`);
@@ -53,9 +53,9 @@ test("a stiffness is rigid by its word, an interval by two numbers", () => {
     ends.forEach((end, i) => near([read.low, read.high][i], end));
   }
   assert.equal(readInterval("mu0", "0.1..0.2", "-").text, "0.1..0.2");
-  setNames({ ...told, knows: [] });
+  about.knows = [];
   assert.match(attempt(() => readValue("k", "1..2", "kN/m")).fault, /knows no interval/);
-  setNames({ ...told, knows: ALL });
+  about.knows = ALL;
 });
 
 test("an argument of a geometry has its units, and its bounds at the service", () => {
@@ -111,7 +111,7 @@ test("an address in the words of the command line gives the same state back", ()
     assert.equal(toAddress(state), address);
   }
   const { state } = fromAddress("#y0=1e-6&Fz=5&f=1000");
-  assert.deepEqual([state.given.y0, state.given.Fz, state.given.omega].map(({ text }) => text), ["0.000001 m", "5 N", "1000 Hz"]);
+  assert.deepEqual([state.y0, state.Fz, state.omega].map(({ text }) => text), ["0.000001 m", "5 N", "1000 Hz"]);
 });
 
 for (const [address, said] of [

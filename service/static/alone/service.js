@@ -1,11 +1,9 @@
 // Answers without a service: from the table in mumacro.wasm, in the form in which the service gives them.
-import { Trouble } from "./ask.js";
-
 const FIELDS = ["mu0", "Fz", "k", "y0", "omega", "v0"];
 const FOUND = ["error", "mu_macro", "mu_ratio", "error_bound", "v_tilde", "y_tilde", "source", "regime", "v0_crit",
   "power", "stick_fraction"];
 const finite = (value) => (Number.isFinite(value) ? value : null);
-const refuse = (why) => { throw new Trouble("refused", why); };
+const refuse = (why) => { throw new RangeError(why); };
 
 const bytes = await (await fetch("static/page/mumacro.wasm")).arrayBuffer();
 const { instance: { exports: table } } = await WebAssembly.instantiate(bytes);
@@ -17,8 +15,6 @@ function text(at) {
 }
 
 const about = { table: { id: `${text(table.checksum()).slice(0, 12)}, in this page`, tolerance: table.tolerance() } };
-const regimes = new Map(); // code -> name
-const regimeName = (code) => regimes.get(code) ?? regimes.set(code, text(table.regime_name(code))).get(code);
 
 /** All about one case; k "rigid" is rigid contact. */
 export function evaluate(values) {
@@ -28,7 +24,8 @@ export function evaluate(values) {
   if (found.error) refuse(text(table.error_text(found.error)));
   const slope = (i) => (given[i] === Infinity ? null : finite(numbers[FOUND.length + i]));
   const gradient = Object.fromEntries(FIELDS.map((name, i) => [name, slope(i)]));
-  return { ...found, gradient, source: text(table.source_name(found.source)), regime: regimeName(found.regime) };
+  const [source, regime] = [table.source_name(found.source), table.regime_name(found.regime)].map(text);
+  return { ...found, gradient, source, regime };
 }
 
 const staticOf = (values) => evaluate({ ...values, v0: 0 }).mu_macro;
@@ -47,15 +44,13 @@ function point(values) {
 /** Where sliding begins or ends between two values: the end that slides, to the last digit. */
 function borderBetween(slides, low, high) {
   const after = slides(high);
-  for (let middle = low + (high - low) / 2; middle > low && middle < high; middle = low + (high - low) / 2) {
-    if (slides(middle) === after) high = middle;
-    else low = middle;
+  for (let middle = (low + high) / 2; middle > low && middle < high; middle = (low + high) / 2) {
+    [low, high] = slides(middle) === after ? [low, middle] : [middle, high];
   }
   return after ? high : low;
 }
 
 function law({ along, start, stop, points, scale, ...others }) {
-  if (!(stop > start)) refuse("The law cannot be drawn: stop must be > start.");
   if (scale === "log" && start <= 0) refuse("The law cannot be drawn: start must be > 0.");
   const [low, high] = scale === "log" ? [Math.log10(start), Math.log10(stop)] : [start, stop];
   const values = Array.from({ length: points }, (_, i) => {
@@ -68,23 +63,23 @@ function law({ along, start, stop, points, scale, ...others }) {
   const slides = (value) => evaluate(at(value)).regime === "continuous";
   const changes = values.map((_, i) => i).filter((i) => i && slides(values[i]) !== slides(values[i - 1]));
   const border = changes.map((i) => borderBetween(slides, values[i - 1], values[i]));
-  const [mu_macro, regime] = ["mu_macro", "regime"].map((name) => found.map((one) => one[name]));
   return {
-    along, values, mu_macro, mu_static: values.map((value) => staticOf(at(value))), regime, ...about,
+    along, values, ...about, mu_static: values.map((value) => staticOf(at(value))),
+    mu_macro: found.map((one) => one.mu_macro), regime: found.map((one) => one.regime),
     border: border.map((value) => ({ value, mu_macro: evaluate(at(value)).mu_macro })),
   };
 }
 
 /** A file of the page itself. */
-export async function get(path) {
-  try {
-    return await (await fetch(path)).json();
-  } catch {
-    throw new Trouble("later", "A file of this page cannot be read.");
-  }
-}
+export const get = (path) => fetch(path).then((response) => response.json())
+  .then((found) => ({ found }), () => ({ later: "A file of this page cannot be read." }));
 
 /** Answers what the page asks. */
 export async function post(path, body) {
-  return { "v1/mu-macro": point, "v1/law": law }[path](body);
+  try {
+    return { found: { "v1/mu-macro": point, "v1/law": law }[path](body) };
+  } catch (error) {
+    if (error instanceof RangeError) return { refused: error.message };
+    throw error;
+  }
 }

@@ -2,16 +2,8 @@
 // Who answers is said in service.js.
 import { $ } from "./plots.js";
 
-/** Why there is no answer: "refused", "later" (worth asking again, after so many seconds if told), or "key". */
-export class Trouble extends Error {
-  constructor(kind, message, seconds = null) {
-    super(message);
-    Object.assign(this, { kind, seconds });
-  }
-}
-
 const SLOW_MS = 1_500; // after which the old answer is marked as old
-const AGAIN_S = [1, 2, 4, 8]; // between attempts, as long as there is no answer
+const AGAIN_S = 3; // between attempts, where the service does not say it
 const channels = [];
 const wakeAll = () => channels.forEach((one) => one.wake());
 addEventListener("online", wakeAll);
@@ -20,8 +12,8 @@ addEventListener("online", wakeAll);
  * One question in flight; while it is, only the newest of those that come is kept.  Where there is no answer it is
  * asked again until there is one: after a while, when the network is back, or when a key is entered.
  *
- * `ask(question)` -> answer; `use(found, question)`; `tell(reason, calm)` why there is no answer, or null; `calm`: it
- * mends itself.
+ * `ask(question)` -> { found }, or why not: { refused }, { later, seconds to wait if told } or { key: true };
+ * `use(found, question)`; `tell(reason, calm)`, reason null if there is none, calm if it mends itself.
  */
 export class Channel {
   constructor(ask, use, tell) {
@@ -37,35 +29,30 @@ export class Channel {
 
   async run() {
     this.mark(true);
-    let tries = 0;
     while (this.next !== null) {
       const asked = this.next;
       this.next = null;
       const slow = setTimeout(() => this.tell("Waiting for the service.", true), SLOW_MS);
-      const { found, error } = await this.ask(asked.question).then((found) => ({ found }), (error) => ({ error }));
+      const answer = await this.ask(asked.question);
       clearTimeout(slow);
       if (this.next !== null) continue;
-      if (error) await this.failed(error, asked, tries);
+      if (answer.later || answer.key) await this.again(asked, answer);
       else {
         showKeyForm(false); // the key was taken, or none is wanted
-        this.tell(null);
-        this.use(found, asked.question);
+        this.tell(answer.refused ?? null);
+        if (!answer.refused) this.use(answer.found, asked.question);
       }
-      tries = error ? tries + 1 : 0;
     }
     this.mark(false);
   }
 
-  async failed(error, asked, tries) {
-    if (!(error instanceof Trouble)) throw error;
-    const { kind, message, seconds } = error;
-    if (kind === "refused") return this.tell(message);
+  again(asked, { later, seconds, key }) {
     this.next = asked;
-    this.tell(kind === "key" ? null : `${message} Asking again by itself.`, true);
-    if (kind === "key") keyRefused();
+    this.tell(later ? `${later} Asking again by itself.` : null, true);
+    if (key) showKeyForm(true);
     return new Promise((wake) => {
       this.wake = wake;
-      if (kind === "later") setTimeout(wake, 1000 * (seconds ?? AGAIN_S[Math.min(tries, AGAIN_S.length - 1)]));
+      if (later) setTimeout(wake, 1000 * (seconds ?? AGAIN_S));
     });
   }
 
@@ -101,38 +88,35 @@ export class Status {
   }
 }
 
-// --- the API key: kept for this tab, sent as a header, never part of an address ------------------------------
-
+// The API key is kept for this tab, sent as a header, never part of an address.
 const NAME = "mumacro-api-key";
-let apiKey = null;
-try {
-  apiKey = sessionStorage.getItem(NAME);
-} catch { /* storage is switched off: the key lives as long as the page */ }
+/** What `use(storage)` is; null where storage is switched off: there the key lives as long as the page. */
+function stored(use) {
+  try {
+    return use(sessionStorage);
+  } catch {
+    return null;
+  }
+}
+let apiKey = stored((all) => all.getItem(NAME));
 
 function setKey(key) {
   apiKey = key;
-  try {
-    if (key === null) sessionStorage.removeItem(NAME);
-    else sessionStorage.setItem(NAME, key);
-  } catch { /* as above */ }
+  stored((all) => (key === null ? all.removeItem(NAME) : all.setItem(NAME, key)));
 }
 
 /** The options of a request, with the key where there is one; its answer is then kept by nobody. */
 export const withKey = (headers = {}) =>
   (apiKey === null ? { headers } : { headers: { ...headers, "X-API-Key": apiKey }, cache: "no-store" });
 
+/** Asks for the key, and says so when the one that was sent is not it; or does not ask. */
 function showKeyForm(wanted) {
+  if (wanted && apiKey !== null) $("key-status").textContent = "That is not the key of this service.";
+  if (wanted) setKey(null);
   if ($("forget")) $("forget").hidden = apiKey === null;
   if ($("key-form").hidden === !wanted) return;
   $("key-form").hidden = !wanted;
   if (wanted) $("key").focus();
-}
-
-/** Asks for the key, and says so when the one that was sent is not it. */
-function keyRefused() {
-  if (apiKey !== null) $("key-status").textContent = "That is not the key of this service.";
-  setKey(null);
-  showKeyForm(true);
 }
 
 $("key-form").addEventListener("submit", (event) => {

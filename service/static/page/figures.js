@@ -1,20 +1,18 @@
 // The map of mu~ over (v~, y~), and the friction law over one input; both with the user's point.
 import { Status } from "./ask.js";
-import { Field } from "./forms.js";
 import {
-  INPUTS, caseOf, fromSI, inUnit, inWords, namesOf, readInterval, readValue, show, symbolOf, toSI, valueOf,
+  RIGID, about, caption, caseOf, fromSI, inUnit, inWords, readInterval, readValue, show, symbolOf, toSI, valueOf,
 } from "./inputs.js";
 import { $, Frame, Plot, label, make, save } from "./plots.js";
-import { post } from "./service.js";
+import { get, post } from "./service.js";
 
-const EMPTY = "\u00a0"; // keeps its line
-const LEVELS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
-// viridis: one colour between two levels
-const COLOURS = [0x440154, 0x481b6d, 0x46327e, 0x3f4788, 0x365c8d, 0x2e6e8e, 0x277f8e, 0x21918c, 0x1fa187, 0x2db27d,
-  0x4ac16d, 0x73d056, 0xa0da39, 0xd0e11c, 0xfde725];
-// level -> where along v~ its number stands, so that they keep clear of each other
-const LABELS = [[0.01, 0.3], [0.1, 0.4], [0.3, 0.5], [0.5, 0.6], [0.7, 0.7], [0.9, 0.82], [0.99, 0.93]];
-const FINE = 8; // painted cells per cell of the grid, along each side
+// [level, colour of what is below it, painted over that of the level before, where along v~ its number stands]; viridis
+const SHADES = [
+  [Infinity, "#fde725"], [0.99, "#d0e11c", 0.93], [0.95, "#a0da39"], [0.9, "#73d056", 0.82], [0.8, "#4ac16d"],
+  [0.7, "#2db27d", 0.7], [0.6, "#1fa187"], [0.5, "#21918c", 0.6], [0.4, "#277f8e"], [0.3, "#2e6e8e", 0.5],
+  [0.2, "#365c8d"], [0.1, "#3f4788", 0.4], [0.05, "#46327e"], [0.02, "#481b6d"], [0.01, "#440154", 0.3],
+];
+const FINE = 1000; // steps from the foot of the map to its top
 
 const isMapped = ({ contact, direction }) => contact === "spring" && direction === "across";
 
@@ -28,26 +26,20 @@ function interpolated({ v_tilde: { n: columns }, y_tilde: { n: rows }, mu_ratio,
   };
 }
 
-/** The colours of the map as the address of a picture. */
-function coloured(ratio, width, height) {
-  const image = new ImageData(width, height);
-  for (let i = 0; i < width * height; i += 1) {
-    const here = ratio(((i % width) + 0.5) / width, 1 - (Math.floor(i / width) + 0.5) / height);
-    const rgb = COLOURS[LEVELS.filter((level) => level <= here).length];
-    image.data.set([rgb >> 16, (rgb >> 8) & 255, rgb & 255, 255], 4 * i);
-  }
-  const canvas = make("canvas", { width, height });
-  canvas.getContext("2d").putImageData(image, 0, 0);
-  return canvas.toDataURL();
-}
-
-/** The map: `set({ name: value [SI] })`, `nudge(name, steps)`; its parts are called when what they take is there. */
-export function mapPanel(set, nudge) {
-  let state, caption, data, ratio, image, frame, answer, point;
+/** The map: `set({ name: value [SI] })`, `nudge(name, steps)`; that it cannot be had is told to `status`. */
+export function mapPanel(set, nudge, status) {
+  let state, answer, data, ratio, shades, frame, point;
   const plot = new Plot($("map"), paint);
 
+  /** How high the ratio falls below a level; in shares of the axes. */
+  function crossing(x, level) {
+    let up = 0;
+    while (up < 1 && ratio(x, up) >= level) up += 1 / FINE;
+    return up;
+  }
+
   function read(x, y) {
-    if (x === undefined || !frame?.holds(x, y)) return EMPTY;
+    if (!frame?.holds(x, y)) return "";
     const [v, a] = [frame.x.value(x), frame.y.value(y)];
     const here = ratio(frame.x.share(v), frame.y.share(a)).toFixed(2);
     return `ṽ = ${show(v, 3)}, ỹ = ${show(a, 3)}: µ/µ₀ ≈ ${here}`;
@@ -60,18 +52,17 @@ export function mapPanel(set, nudge) {
     if (length && omega && isMapped(state)) set({ v0: v * length * omega, y0: y * length });
   }
 
-  /** Marks the point of an answer: { asked, groups, mu_ratio, regime }; says where there is none. */
-  function mark(found = answer) {
-    [answer, point] = [found, null];
+  /** Marks the point of the answer; says where there is none. */
+  function mark() {
+    point = null;
     plot.redraw();
     if (!answer) return;
-    const { groups: { v_tilde, y_tilde, l0 }, asked, mu_ratio, regime } = answer;
-    const [v0, y0, omega, k] = ["v0", "y0", "omega", "k"].map((name) => valueOf(asked, name));
-    const [v, y] = [v_tilde ?? v0 / (l0 * omega), y_tilde ?? y0 / l0];
+    const { groups: { v_tilde, y_tilde }, asked, mu_ratio, regime } = answer;
+    const [v, y] = [v_tilde ?? Infinity, y_tilde ?? Infinity];
     let out = "";
     if (!isMapped(asked)) out = "This map is that of one spring across. It does not hold for what is chosen.";
-    else if (k === Infinity) out = "A rigid contact has no point on the map.";
-    else if (Number.isNaN(v)) out = "A contact at rest has no point on the map.";
+    else if (asked.k === RIGID) out = "A rigid contact has no point on the map.";
+    else if (v_tilde === null && asked.v0.low === 0) out = "A contact at rest has no point on the map.";
     else {
       point = [v, y];
       const away = [["ṽ", v, data?.v_tilde], ["ỹ", y, data?.y_tilde]]
@@ -93,14 +84,17 @@ export function mapPanel(set, nudge) {
     const { x: left, y: top, width: wide, height: tall } = frame.box;
     const border = (kind) => frame.curve(...[0, 1].map((i) => data.border.map((at) => at[i])), kind);
     const at = (text, x, up, kind) => label(text, left + x * wide, top + (1 - up) * tall + 4, kind);
-    // the number of a level stands where it is crossed on the way up
-    const steps = Array.from({ length: FINE * data.y_tilde.n }, (_, j) => j / (FINE * data.y_tilde.n));
-    const crossed = LABELS.map(([level, x]) => [level, x, steps.find((up) => ratio(x, up) < level)]);
+    const shade = ({ colour, heights }) => {
+      const edge = heights.map((up, i) => `${left + (i * wide) / (heights.length - 1)} ${top + (1 - up) * tall}`);
+      const path = make("path", { d: `M${edge.join("L")}V${top}H${left}Z`, class: "shade" });
+      path.style.fill = colour;
+      return path;
+    };
     return [
-      make("image", { ...frame.box, href: image, preserveAspectRatio: "none" }), frame.axes(false),
+      shades.map(shade), frame.axes(false),
       frame.inside(
-        crossed.map(([level, x, up]) => (up === undefined ? null : at(String(level), x, up, "tag"))),
-        border("border shade"), border("border"),
+        SHADES.map(([level, , x]) => x && at(String(level), x, crossing(x, level), "tag")),
+        border("border back"), border("border"),
         at("stick–slip", 0.16, 0.3, "tag area"), at("continuous", 0.78, 0.16, "tag area")),
       point && frame.point(...point),
     ];
@@ -111,40 +105,38 @@ export function mapPanel(set, nudge) {
     pick: (x, y) => frame && pick(frame.x.value(x), frame.y.value(y)),
     step: (right, up) => isMapped(state) && nudge(right ? "v0" : "y0", right || up),
   });
-  $("map-image").addEventListener("click", () => plot.save(caption, "friction-map.svg"));
-  return {
-    mark, sync: (...now) => { [state, caption] = now; },
-    /** Takes map.json. */
-    show(found) {
-      [data, ratio] = [found, interpolated(found)];
-      image = coloured(ratio, FINE * (data.v_tilde.n - 1), FINE * (data.y_tilde.n - 1));
-      mark();
-    },
+  $("map-image").addEventListener("click", () => plot.save(caption(state), "friction-map.svg"));
+  status.channel("map", () => get("static/page/map.json"), (found) => {
+    [data, ratio] = [found, interpolated(found)];
+    const shares = Array.from({ length: data.v_tilde.n }, (_, i) => i / (data.v_tilde.n - 1));
+    shades = SHADES.map(([level, colour]) => ({ colour, heights: shares.map((x) => crossing(x, level)) }));
+    mark();
+  }).push(null);
+  return (...now) => {
+    [state, answer] = now;
+    mark();
   };
 }
-
-// --- the friction law ---------------------------------------------------------------------------------------
 
 const POINTS = 301;
 const [LEAST, MOST] = [1e-280, 1e280]; // of what a range that nobody chose is laid around
 
 /** The interval of the swept input: what was chosen, else whole decades around the point and its border. */
-function lawRange({ along, scale, given, range }, border) {
-  if (range) return range;
-  const { unit, low, high } = given[along];
+function lawRange({ along, scale, range, ...state }, border) {
+  if (range.text) return range;
+  const { unit, low, high } = state[along];
   const sizes = [low, high, along === "v0" ? border : null].filter((value) => value > 0 && Number.isFinite(value));
-  if (!sizes.length) sizes.push(readValue(along, INPUTS[along].start).low);
+  if (!sizes.length) sizes.push(readValue(along, about.inputs[along].start).low);
   const shown = sizes.map((value) => fromSI(along, Math.min(Math.max(value, LEAST), MOST), unit));
   const [least, most] = [Math.min(...shown), Math.max(...shown)];
-  const linear = [INPUTS[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
+  const linear = [about.inputs[along].positive ? (least / 100).toPrecision(1) : 0, (4 * most).toPrecision(1)];
   const decades = [`1e${Math.floor(Math.log10(least)) - 2}`, `1e${Math.ceil(Math.log10(most)) + 2}`];
   return readInterval(along, (scale === "linear" ? linear : decades).join(".."), unit);
 }
 
-/** The law: `change(part of the state)`, `set({ name: value [SI] })`, `nudge(name, steps)`; -> what follows the state
- *  with its caption and the last answer. */
-export function lawPanel(change, set, nudge) {
-  let state, caption, answer, asked, law, frame, along, unit;
+/** The law: `set({ name: value [SI] })`, `nudge(name, steps)`. */
+export function lawPanel(set, nudge) {
+  let state, answer, asked, law, frame, along, unit;
   let cursor = null;
   const status = new Status("law-status", "law-section");
   const channel = status.channel("law", (request) => post("v1/law", request), (found, { scale }) => {
@@ -171,14 +163,7 @@ export function lawPanel(change, set, nudge) {
     cursor = i;
     plot.redraw();
     const told = () => `${text(law.values[i])}: µ = ${show(law.mu_macro[i])}, ${inWords(law.regime[i])}`;
-    $("law-read").textContent = i === null ? EMPTY : told();
-  }
-
-  /** The index of the value that is nearest to a place; null outside. */
-  function nearest(x) {
-    if (x === undefined || !frame.holds(x)) return null;
-    const away = law.values.map((value) => Math.abs(frame.x.pixel(shown(value)) - x));
-    return away.indexOf(Math.min(...away));
+    $("law-read").textContent = i === null ? "" : told();
   }
 
   function paint(width, height) {
@@ -220,30 +205,20 @@ export function lawPanel(change, set, nudge) {
   }
 
   plot.follow({
-    move: (x) => frame && read(nearest(x)),
+    move: (x) => frame && read(frame.holds(x) ? Math.round((POINTS - 1) * frame.x.share(frame.x.value(x))) : null),
     pick: (x) => frame && set({ [along]: toSI(along, frame.x.value(x), unit) }),
     step: (right) => right && nudge(along, right),
   });
-  const range = new Field($("range"), (typed) => (typed.trim() === "" ? null : readInterval(along, typed, unit)),
-    (found) => change({ range: found }), (fault) => status.set("typed", fault && `range: ${fault}.`));
-  $("along").addEventListener("change", () => change({ along: $("along").value, range: null }));
-  $("scale").addEventListener("change", () => change({ scale: $("scale").value }));
   $("csv").addEventListener("click", () => law && save(csv(), "text/csv", `friction-law-${along}.csv`));
-  $("law-image").addEventListener("click", () => law && plot.save(caption, `friction-law-${along}.svg`));
+  $("law-image").addEventListener("click", () => law && plot.save(caption(state, along), `friction-law-${along}.svg`));
 
   return (...now) => {
-    if (state?.direction !== now[0].direction) {
-      $("along").replaceChildren(...namesOf(now[0]).map((name) => new Option(INPUTS[name].symbol, name)));
-    }
-    [state, caption, answer] = now;
-    if (along !== state.along) range.blame(null);
+    [state, answer] = now;
     along = state.along;
-    unit = state.given[along].unit;
-    $("along").value = along;
-    $("scale").value = state.scale;
+    unit = state[along].unit;
     const { text: chosen, low: start, high: stop } = lawRange(state, answer?.limits.v0_crit);
-    range.input.placeholder = chosen;
-    range.show(state.range ? chosen : "");
+    $("range").placeholder = chosen;
+    status.set("typed", state.range.fault && `range: ${state.range.fault}.`);
     tell();
     const request = { ...caseOf(state, [along], true), along, start, stop, points: POINTS, scale: state.scale };
     if (!answer || JSON.stringify(request) === asked) return;

@@ -1,119 +1,68 @@
-// Typed fields, the form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
+// The form of the inputs, and three panels: solve for an input, k from materials, fit of measured points.
 import { Status } from "./ask.js";
 import {
-  CHOICES, INPUTS, RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
-  readValue, rounded, show, symbolOf, valueOf, within,
+  RIGID, about, attempt, caseOf, fromSI, inUnit, inWords, namesOf, powerOf, readPoints, readQuantity,
+  readValue, show, symbolOf, valueOf, within,
 } from "./inputs.js";
 import { $, Frame, Plot, make } from "./plots.js";
 import { post } from "./service.js";
 
 const STEPS = 1000; // of a slider, a decade
 
-/** A typed text: read on Enter and on leaving the field; Escape brings the last good one back. */
-export class Field {
-  /** `read(text)` -> what `use` takes, or a fault; `blame(fault, empty)` with the reason, or null. */
-  constructor(input, read, use, blame) {
-    Object.assign(this, { input, told: blame, fault: null, shown: "" });
-    input.addEventListener("change", () => {
-      const { found, fault = null } = attempt(() => read(input.value));
-      this.blame(fault);
-      if (fault === null) use(found);
-    });
-    input.addEventListener("keydown", ({ key }) => {
-      if (key !== "Escape") return;
-      this.blame(null);
-      this.show(this.shown);
-    });
-  }
-
-  /** Says what is wrong; null forgets what is typed and cannot be used. */
-  blame(fault) {
-    if (fault === this.fault) return;
-    const empty = this.input.value.trim() === "";
-    this.fault = fault;
-    this.input.setAttribute("aria-invalid", String(fault !== null && !empty));
-    this.told(fault, empty);
-  }
-
-  /** Shows a text; what is typed and cannot be used stays. */
-  show(text) {
-    this.shown = text;
-    if (!this.fault) this.input.value = text;
-  }
+/** Shows a quantity in its field; what is typed and cannot be used stays, and is marked unless it is empty. */
+function fill(input, { text, fault, typed = text }) {
+  input.value = typed;
+  input.setAttribute("aria-invalid", String(fault !== undefined && typed.trim() !== ""));
 }
 
-export class Form {
-  /** `set({ name: quantity })`, `change(part of the state)` when something is chosen; `blame(name, fault, empty)`. */
-  constructor(set, change, blame) {
-    Object.assign(this, { blame, rows: {} });
-    this.rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
-    this.rigid.addEventListener("change", () => set({ k: this.rigid.checked ? RIGID : this.elastic }));
-    $("form").append(...Object.keys(INPUTS).map((name) => this.build(name, set)));
-    $("form").addEventListener("submit", (event) => event.preventDefault());
-    for (const [name, words] of Object.entries(CHOICES)) {
-      for (const value of Object.keys(words)) {
-        const radio = make("input", { type: "radio", name, value });
-        radio.addEventListener("change", () => change({ [name]: value }));
-        $(name).append(make("label", {}, radio, value));
-      }
-    }
+/** The form: `set({ name: quantity })`, `setSI({ name: value })`; faults are told to `status`. */
+export function inputForm(set, setSI, status) {
+  let state;
+  let elastic = about.inputs.k.start; // which the switch of a rigid contact brings back
+  const rigid = make("input", { type: "checkbox", id: "rigid", role: "switch" });
+  rigid.addEventListener("change", () => set({ k: rigid.checked ? RIGID : readValue("k", elastic) }));
+  for (const [name, words] of Object.entries(about.choices)) {
+    const radio = (value) => make("label", {}, make("input", { type: "radio", name, value }), value);
+    $(name).append(...Object.keys(words).map(radio));
   }
-
-  build(name, set) {
-    const { label, symbol, range: [low, high] } = INPUTS[name];
+  const options = [["along", "symbol"], ["unknown", "label"]].flatMap(([id, word]) => {
+    $(id).append(...Object.entries(about.inputs).map(([name, input]) => new Option(input[word], name)));
+    return [...$(id).options];
+  });
+  $("unknown").value = "y0";
+  const rows = Object.entries(about.inputs).map(([name, { label, symbol, range: [low, high] }]) => {
     const fault = make("p", { id: `fault-${name}`, class: "fault" });
-    const input = make("input", { spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
+    const input = make("input", { name, spellcheck: "false", id: `field-${name}`, "aria-describedby": fault.id });
     const steps = { min: low * STEPS, max: high * STEPS, step: 1 };
     const slider = make("input", { type: "range", id: `slider-${name}`, "aria-label": `${label}, slider`, ...steps });
-    const unit = () => this.state.given[name].unit;
-    slider.addEventListener("input", () => set({ [name]: rounded(name, 10 ** (slider.value / STEPS), unit(), 4) }));
-    const use = (found) => set({ [name]: found });
-    const field = new Field(input, (text) => readValue(name, text, unit()), use, (why, empty) => {
-      fault.textContent = why && `${symbol}: ${why}.`;
-      fault.classList.toggle("bad", why !== null && !empty);
-      this.blame(name, why && fault.textContent, empty);
-    });
-    const rigid = name === "k" && make("label", { class: "switch" }, this.rigid, "rigid (no spring)");
-    const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider, rigid, fault);
-    this.rows[name] = { row, slider, field };
-    return row;
-  }
-
-  /** Whether something that is typed cannot be used. */
-  get bad() {
-    return Object.values(this.rows).some(({ field }) => field.fault !== null);
-  }
-
-  /** Takes typed texts back: another way of setting these values was used. */
-  settle(names = Object.keys(INPUTS)) {
-    for (const name of names) this.rows[name].field.blame(null);
-  }
-
-  /** Shows a state. */
-  sync(state) {
-    this.state = state;
-    this.rigid.checked = state.given.k === RIGID;
-    if (!this.rigid.checked) this.elastic = state.given.k; // which the switch brings back
-    this.elastic ??= readValue("k", INPUTS.k.start);
-    this.settle(Object.keys(INPUTS).filter((name) => !namesOf(state).includes(name)));
-    for (const [name, { row, slider, field }] of Object.entries(this.rows)) {
-      const [quantity, size] = [state.given[name], valueOf(state, name)];
+    slider.addEventListener("input", () => setSI({ [name]: 10 ** (slider.value / STEPS) }));
+    const elastic = name === "k" && make("label", { class: "switch" }, rigid, "rigid (no spring)");
+    const row = make("div", { class: "field" }, make("label", { for: input.id }, label), input, slider, elastic, fault);
+    return { name, symbol, row, input, slider, fault };
+  });
+  $("form").append(...rows.map(({ row }) => row));
+  return (now) => {
+    if (now === state) return; // what is being typed stays
+    state = now;
+    rigid.checked = state.k === RIGID;
+    if (!rigid.checked) elastic = state.k.text;
+    fill($("range"), state.range);
+    for (const option of options) option.hidden = option.disabled = !namesOf(state).includes(option.value);
+    if ($("unknown").selectedOptions[0].disabled) $("unknown").value = namesOf(state)[3]; // the other amplitude
+    for (const { name, symbol, row, input, slider, fault } of rows) {
+      const [quantity, size] = [state[name], valueOf(state, name)];
       row.hidden = !namesOf(state).includes(name);
-      field.input.disabled = slider.disabled = quantity === RIGID;
-      field.show(quantity.text);
+      input.disabled = slider.disabled = quantity === RIGID;
+      fill(input, quantity);
       slider.value = size > 0 ? Math.round(STEPS * Math.log10(size)) : slider.min;
       slider.setAttribute("aria-valuetext", `${symbolOf(name, quantity.unit)} = ${quantity.text}`);
+      fault.textContent = quantity.fault ? `${symbol}: ${quantity.fault}.` : "";
+      status.set(`typed ${name}`, row.hidden ? "" : fault.textContent, input.ariaInvalid === "false");
     }
-    for (const name of Object.keys(CHOICES)) {
-      for (const radio of document.getElementsByName(name)) radio.checked = radio.value === state[name];
-    }
-  }
+  };
 }
 
-/**
- * A form that asks `path` for what `read(state)` says, and `show(found, asked, state)`s the answer; grey while it would
- * ask for something else.  -> a function that follows the state.
- */
+/** A form that asks `path` for what `read(state)` says; what it `show`s is grey while it would ask something else. */
 function panel(name, path, read, show) {
   const status = new Status(`${name}-status`, name);
   let state, answered; // the question that the result belongs to, as text
@@ -144,97 +93,93 @@ function panel(name, path, read, show) {
   };
 }
 
-const items = (texts) => texts.map((text) => make("li", {}, text));
+/** Shows lines: [text], or [text, ...given] with a button for `use(...given)`. */
+const list = (id, lines, use) => $(id).replaceChildren(...lines.map(([text, ...given]) => {
+  const button = make("button", { "aria-label": `use ${text}` }, "Use");
+  button.addEventListener("click", () => use(...given));
+  return make("li", {}, text, given.length > 0 && button);
+}));
 
-/** Which value of an input gives a wanted friction.  `use({ name: quantity }, more)` takes it, here and below. */
+/** Which value of an input gives a wanted friction.  `use({ name: value [SI] }, digits, more)` takes it. */
 export function solver(use) {
-  let names = "";
-  const follow = panel("solve", "v1/solve-for", (state) => {
-    const [unknown, quantity] = [$("unknown").value, $("quantity").value];
-    const { low: target } = within("target", () => readQuantity("mu0", $("target").value, "-"));
+  return panel("solve", "v1/solve-for", (state) => {
+    const { unknown, quantity, target: text } = Object.fromEntries(new FormData($("solve-form")));
+    const { low: target } = within("target", () => readQuantity("mu0", text, "-"));
     return { ...caseOf(state, [unknown]), unknown, quantity, target, include: powerOf(state) };
   }, ({ unknown, reachable: { min, max }, results: [{ roots, reason }] }, asked, state) => {
-    const { unit } = state.given[unknown];
+    const { unit } = state[unknown];
     const none = min === max ? reason : `No value gives that: here it can be ${show(min, 4)} to ${show(max, 4)}.`;
-    $("solve-result").replaceChildren(...items(roots.length ? [] : [none]), ...roots.map((root) => {
-      const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, root.value, unit, 6)}`;
-      const button = make("button", { "aria-label": `use ${told}` }, "Use");
-      button.addEventListener("click", () => use({ [unknown]: rounded(unknown, root.value, unit, 15) }));
-      const shaker = root.power ? `, shaker ${inUnit("power", root.power.oscillation)}` : "";
-      return make("li", {}, `${told}: µ = ${show(root.mu_macro, 5)}, ${inWords(root.regime)}${shaker}`, button);
-    }));
+    const lines = roots.map(({ value, mu_macro: mu, regime, power }) => {
+      const told = `${symbolOf(unknown, unit)} = ${inUnit(unknown, value, unit, 6)}`;
+      const shaker = power ? `, shaker ${inUnit("power", power.oscillation)}` : "";
+      return [`${told}: µ = ${show(mu, 5)}, ${inWords(regime)}${shaker}`, { [unknown]: value }, 15];
+    });
+    list("solve-result", lines.length ? lines : [[none]], use);
   });
-  return (state) => {
-    if (names !== String(namesOf(state))) {
-      $("unknown").replaceChildren(...namesOf(state).map((name) => new Option(INPUTS[name].label, name)));
-      $("unknown").value = namesOf(state)[3]; // the amplitude
-    }
-    names = String(namesOf(state));
-    follow(state);
-  };
 }
 
 /** k from geometry and materials. */
 export function stiffness(use) {
   $("geometry").append(...Object.entries(about.geometries).map(([name, one]) => new Option(one.meaning, name)));
   const shown = Object.entries(about.arguments).filter(([name]) => name !== "Fz"); // which is that of the form
-  const rows = shown.map(([name, { unit, meaning, choices }]) => {
-    const given = { id: `argument-${name}`, "aria-describedby": `about-${name}`, class: "wide" };
+  $("arguments").append(...shown.map(([name, { unit, meaning, choices }]) => {
+    const given = { name, id: `argument-${name}`, "aria-describedby": `about-${name}`, class: "wide" };
     const input = choices.length ? make("select", given, choices.map((one) => new Option(one)))
       : make("input", { spellcheck: "false", ...given });
     const label = make("label", { for: given.id }, /\w/.test(unit) ? `${name} [${unit}]` : name);
     const told = make("span", { id: `about-${name}`, class: "hint wide" }, meaning);
-    return { name, input, row: make("div", { class: "field" }, label, input, told) };
-  });
-  const belongs = ({ name }) => about.geometries[$("geometry").value].arguments.includes(name);
-  const choose = () => rows.forEach((one) => { one.row.hidden = !belongs(one); });
-  $("arguments").append(...rows.map(({ row }) => row));
-  $("geometry").addEventListener("change", choose);
+    return make("fieldset", { class: "field", name }, label, input, told);
+  }));
+  function choose() {
+    const known = about.geometries[$("geometry").value].arguments;
+    for (const row of $("arguments").children) row.disabled = row.hidden = !known.includes(row.name);
+  }
+  $("geometry").addEventListener("input", choose); // before the form compares
   choose();
-  let last;
-  $("stiffness-use").addEventListener("click", () => use(...last));
   return panel("stiffness", "v1/stiffness", (state) => {
-    const entries = rows.filter((one) => belongs(one) && one.input.value.trim()).map(({ name, input: { value } }) => {
-      const word = about.arguments[name].choices.length || (/^E2?$/.test(name) && /^\s*rigid\s*$/i.test(value));
-      const read = () => readQuantity(name, value, about.arguments[name].unit);
-      return [name, word ? value.trim().toLowerCase() : within(name, read).low];
+    const { geometry, ...typed } = Object.fromEntries(new FormData($("stiffness-form"))); // of what is not disabled
+    const entries = Object.entries(typed).filter(([, text]) => text.trim()).map(([name, text]) => {
+      const { choices, unit } = about.arguments[name];
+      const word = choices.length || (/^E2?$/.test(name) && /^\s*rigid\s*$/i.test(text));
+      return [name, word ? text.trim().toLowerCase() : within(name, () => readQuantity(name, text, unit)).low];
     });
-    return { geometry: $("geometry").value, Fz: valueOf(state, "Fz"), ...Object.fromEntries(entries) };
-  }, ({ k, contact }, { Fz }, state) => {
+    return { geometry, Fz: valueOf(state, "Fz"), ...Object.fromEntries(entries) };
+  }, ({ k, contact }, { Fz }) => {
     const model = contact === "ball" ? "ball (Hertz)" : "one spring";
-    $("stiffness-found").textContent = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}`;
-    last = [{ k: rounded("k", k, state.given.k.unit, 6) }, about.knows.has("contact") ? { contact } : {}];
+    const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}`;
+    list("stiffness-result", [[told, { k }, 6, about.knows.includes("contact") ? { contact } : {}]], use);
   });
 }
 
 /** k and µ₀ from measured points. */
 export function fit(use) {
   let paint = () => [];
-  let last;
+  let told;
   const plot = new Plot($("fit-plot"), (...size) => paint(...size));
-  const found = () => [...$("fit-found").children].map((one) => one.textContent).join("; ");
-  $("fit-image").addEventListener("click", () => plot.save(found(), "friction-fit.svg"));
-  $("fit-use").addEventListener("click", () => use(last));
+  $("fit-image").addEventListener("click", () => plot.save(told, "friction-fit.svg"));
   return panel("fit", "v1/fit", (state) => {
     const unknowns = $("unknowns").value.split(" ");
     return { ...caseOf(state, ["v0", ...unknowns]), unknowns, ...readPoints($("points").value) };
-  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, { given }) => {
+  }, ({ values, std, interval, solutions, warnings, reduced_chi2: scatter, curve }, asked, state) => {
     /** A value of k or µ₀ in the unit of its field; k may be rigid, a bound infinite (null). */
     const text = (name, value, digits = 4) =>
-      (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, given[name].unit, digits));
-    const equals = (name, one) => `${INPUTS[name].symbol} = ${text(name, one[name])}`;
-    const lines = Object.keys(values).map((name) => {
+      (value === null || value === "rigid" ? value ?? "∞" : inUnit(name, value, state[name].unit, digits));
+    const names = Object.keys(values);
+    const equals = (name, one) => `${about.inputs[name].symbol} = ${text(name, one[name])}`;
+    const best = names.map((name) => {
       const spread = std[name] === null ? "not determined" : `± ${text(name, std[name], 2)}`;
       return `${equals(name, values)} ${spread} (95 %: ${interval[name].map((end) => text(name, end)).join(" to ")})`;
     });
-    const others = solutions.slice(1).map((one) => Object.keys(values).map((name) => equals(name, one)).join(", "));
-    lines.push(...others.map((one) => `the points allow as well: ${one}`));
-    if (asked.std && scatter !== null) lines.push(`reduced χ² = ${show(scatter, 3)}`);
-    $("fit-found").replaceChildren(...items(lines));
-    $("fit-warnings").replaceChildren(...items(warnings));
-    last = Object.fromEntries(Object.entries(values).map(([name, value]) =>
-      [name, value === "rigid" ? RIGID : rounded(name, value, given[name].unit, 6)]));
-    paint = (width, height) => picture(width, height, asked, curve, given.v0.unit);
+    const lines = [[best.join("; "), values, 6]];
+    for (const other of solutions.slice(1)) {
+      const given = Object.fromEntries(names.map((name) => [name, other[name]]));
+      lines.push([`the points allow as well: ${names.map((name) => equals(name, other)).join(", ")}`, given, 6]);
+    }
+    if (asked.std && scatter !== null) lines.push([`reduced χ² = ${show(scatter, 3)}`]);
+    told = lines.map(([line]) => line).join("; ");
+    list("fit-found", lines, use);
+    list("fit-warnings", warnings.map((line) => [line]));
+    paint = (width, height) => picture(width, height, asked, curve, state.v0.unit);
     plot.redraw();
   });
 }

@@ -1,60 +1,28 @@
 // The inputs: units and bounds, what a person types, numbers as text, the state of the page, its case and its address.
 // Nothing here needs a browser; tests/page tests it with node.
 
-/** By name: label, symbol, offered units, the slider's decimal exponents (SI), start value. */
-export const INPUTS = {
-  mu0: { label: "friction µ₀", symbol: "µ₀", offered: ["-"], range: [-2, 0.5], start: "0.3 -" },
-  Fz: { label: "force Fz", symbol: "Fz", offered: ["N", "mN", "kN"], range: [-3, 5], start: "10 N" },
-  k: { label: "stiffness k", symbol: "k", offered: ["N/µm", "kN/m", "N/m"], range: [2, 10], start: "1 N/µm" },
-  y0: { label: "amplitude y₀", symbol: "y₀", offered: ["µm", "nm", "mm", "m"], range: [-10, -3], start: "2 µm" },
-  Fz_amplitude: { label: "force ΔFz", symbol: "ΔFz", offered: ["N", "mN", "kN"], range: [-3, 5], start: "5 N" },
-  omega: { label: "frequency", symbol: "ω", offered: ["kHz", "Hz", "rad/s"], range: [0, 7], start: "20 kHz" },
-  v0: { label: "speed v₀", symbol: "v₀", offered: ["mm/s", "µm/s", "m/s"], range: [-7, 2], start: "10 mm/s" },
-};
-/** What may be chosen, with its part of the model line; the first is the usual one. */
-export const CHOICES = {
-  contact: { spring: "one spring of stiffness k", ball: "a ball (Hertz) with the initial stiffness k" },
-  direction: {
-    across: "oscillation across the sliding direction", along: "oscillation along the sliding direction",
-    normal: "an oscillating normal force",
-  },
-};
+/** What names.json says; nothing here works before that.  Of an input: label, symbol, units, bound, offered units, the
+ *  slider's decimal exponents (SI), start value; beside them the choices with their words, what the host `knows`,
+ *  geometries and their arguments. */
+export const about = {};
 /** The name of a regime in words. */
 export const inWords = (name) => name.replaceAll("_", " ");
-const POWER = {
-  offered: ["kW", "mW", "µW", "nW", "W"],
-  units: { kW: [1e3, 1], W: [1, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9] },
-};
+const POWER = { units: { kW: [1e3, 1], mW: [1, 1e3], µW: [1, 1e6], nW: [1, 1e9], W: [1, 1] } };
+
 export const RIGID = { text: "rigid", unit: "N/µm", low: Infinity, high: Infinity };
 
-/** What names.json says: `knows` (what the host of the page can do), the geometries of a contact, their arguments. */
-export const about = { knows: new Set(), geometries: {}, arguments: {} };
-
-/** Takes units and bounds as names.json tells them; nothing here works before that. */
-export function setNames({ inputs, knows, geometries, arguments: others }) {
-  for (const [name, input] of Object.entries(INPUTS)) Object.assign(input, structuredClone(inputs[name]));
-  // a frequency f stands for omega = 2 pi f; a unit of both (1/s) says neither
-  const { units } = INPUTS.omega;
-  for (const [unit, [times, over]] of Object.entries(inputs.f.units)) {
-    units[unit] = unit in units ? null : [times * 2 * Math.PI, over];
-  }
-  Object.assign(about, { knows: new Set(knows), geometries, arguments: others });
-}
-
 /** What is known of a quantity: an input, an argument of a geometry, or a power. */
-const kindOf = (name) => INPUTS[name] ?? about.arguments[name] ?? POWER;
+const kindOf = (name) => about.inputs[name] ?? about.arguments[name] ?? POWER;
 
 /** The inputs of a case: an oscillating normal force has its amplitude in the place of y0. */
 export const namesOf = ({ direction }) =>
-  Object.keys(INPUTS).filter((name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"));
-
-// --- numbers as text --------------------------------------------------------------------------------------
+  Object.keys(about.inputs).filter((name) => name !== (direction === "normal" ? "y0" : "Fz_amplitude"));
 
 export const toSI = (name, value, unit) => (value * kindOf(name).units[unit][0]) / kindOf(name).units[unit][1];
 export const fromSI = (name, value, unit) => (value * kindOf(name).units[unit][1]) / kindOf(name).units[unit][0];
 
 /** The symbol that goes with a unit: a frequency in Hz is f. */
-export const symbolOf = (name, unit) => (name === "omega" && unit.endsWith("Hz") ? "f" : INPUTS[name].symbol);
+export const symbolOf = (name, unit) => (name === "omega" && unit.endsWith("Hz") ? "f" : about.inputs[name].symbol);
 
 const withUnit = (text, unit) => (unit === "-" ? text : `${text} ${unit}`);
 
@@ -64,15 +32,15 @@ export function show(value, digits = 6) {
   if (!Number.isFinite(value)) return "∞";
   const size = Math.abs(value);
   const short = size === 0 || (size >= 1e-4 && size < 10 ** Math.max(digits, 5));
-  if (short) return String(Number(value.toPrecision(digits)));
-  const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-  return `${Number(mantissa)}e${Number(exponent)}`;
+  const close = Number(value.toPrecision(digits));
+  return short ? String(close) : close.toExponential().replace("e+", "e");
 }
 
 /** A value [SI] as text in a unit, or in the offered one that suits it. */
 export function inUnit(name, value, unit = null, digits = 4) {
   if (value === null) return "–";
-  const sizes = kindOf(name).offered.map((one) => [one, Math.abs(fromSI(name, value, one))]);
+  const { units, offered = Object.keys(units) } = kindOf(name);
+  const sizes = offered.map((one) => [one, Math.abs(fromSI(name, value, one))]);
   sizes.sort((a, b) => a[1] - b[1]);
   const [suits] = sizes.find(([, size]) => size >= 1) ?? sizes.at(-1);
   return withUnit(show(fromSI(name, value, unit ?? suits), digits), unit ?? suits);
@@ -84,8 +52,6 @@ export function friction(value, uncertainty = 0, usual = 4) {
   const places = uncertainty > 0 ? Math.floor(Math.log10(value)) - Math.floor(Math.log10(uncertainty)) + 2 : usual;
   return value.toPrecision(Math.min(Math.max(places, 1), 15));
 }
-
-// --- what a person types: understood as a whole, or refused with the reason ---------------------------------
 
 class Fault extends Error {}
 const refuse = (why) => { throw new Fault(why); };
@@ -146,14 +112,14 @@ export function readQuantity(name, text, unit) {
 }
 
 /** A typed value of an input: a number, or for k "rigid" or "low..high". */
-export function readValue(name, text, unit = INPUTS[name].offered[0]) {
+export function readValue(name, text, unit = about.inputs[name].offered[0]) {
   if (name === "k" && /^rigid$/i.test(text.trim())) return RIGID;
   if (name === "k" && text.includes("..")) {
-    return about.knows.has("k_range") ? readInterval(name, text, unit)
+    return about.knows.includes("k_range") ? readInterval(name, text, unit)
       : refuse("must be one number: this service knows no interval");
   }
   const read = readQuantity(name, text, unit);
-  const { positive, bound } = INPUTS[name];
+  const { positive, bound } = about.inputs[name];
   if (!Number.isFinite(read.low) || read.low < 0 || (positive && read.low === 0)) refuse(`must be ${bound}`);
   return read;
 }
@@ -170,9 +136,11 @@ export function readInterval(name, text, unit) {
   return { text: `${first}..${high.text}`, unit: high.unit, low: low.low, high: high.low };
 }
 
-/** A value of an input [SI] as a quantity with so many digits. */
+const readRange = (name, text, unit) => (text.trim() === "" ? ANY : readInterval(name, text, unit));
+
+/** A value of an input [SI], or "rigid", as a quantity with so many digits. */
 export const rounded = (name, value, unit, digits) =>
-  readValue(name, String(Number(fromSI(name, value, unit).toPrecision(digits))), unit);
+  readValue(name, String(value === "rigid" ? value : Number(fromSI(name, value, unit).toPrecision(digits))), unit);
 
 const COLUMNS = [["v0", /^(v|speed)/i], ["mu_macro", /^(mu|µ|μ|friction)/i], ["std", /^(std|±|sigma|s$|u$)/i]];
 
@@ -182,19 +150,15 @@ export function readPoints(text) {
   const lines = text.split("\n").map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
   const rows = lines.map((line) => line.split(between).map((cell) => cell.trim()));
   if (!rows.length) refuse("paste points: v₀ and µ, one point a line");
-  let [names, unit] = [COLUMNS.map(([name]) => name).slice(0, rows[0].length), "m/s"];
   const headed = /^[^\d.+−-]/.test(rows[0][0]);
-  if (headed) {
-    const head = rows.shift();
-    names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
-    const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
-    if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, each once`);
-    const named = /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1];
-    if (named !== undefined) unit = readUnit("v0", named);
-  }
+  const head = headed ? rows.shift() : COLUMNS.map(([name]) => name).slice(0, rows[0].length);
+  const names = head.map((cell) => COLUMNS.find(([, sign]) => sign.test(cell))?.[0]);
+  const strange = names.findIndex((name, i) => name === undefined || names.indexOf(name) < i);
+  if (strange >= 0) refuse(`column “${head[strange]}” is not one of v0, mu_macro, std, each once`);
   const complete = names.includes("v0") && names.includes("mu_macro") && (headed || rows[0].length <= 3);
   if (!complete) refuse("needs two or three columns: v0, mu_macro, std");
   if (!rows.length) refuse("paste points below the names of the columns");
+  const unit = readUnit("v0", /[[(](.*)[\])]/.exec(head[names.indexOf("v0")])?.[1] ?? "m/s");
   return Object.fromEntries(names.map((name, j) => [name, rows.map((row, i) => {
     const line = `line ${i + 1 + headed}`;
     if (row.length !== names.length) refuse(`${line} has ${row.length} values, not ${names.length}`);
@@ -203,35 +167,46 @@ export function readPoints(text) {
   })]));
 }
 
-// --- the state of the page, the case that it asks for, and its address, in the words of the command line: "y0=2um" ---
+/** The range of a law over which nobody chose one. */
+export const ANY = { text: "" };
 
-/** `given` has a quantity for each input; `range` is null or an interval of the input that the law goes along. */
+/** A quantity for each input and for the `range` of the one that the law goes along, and what is chosen. */
 export const startState = () => ({
-  given: Object.fromEntries(Object.entries(INPUTS).map(([name, { start }]) => [name, readValue(name, start)])),
-  contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: null,
+  ...Object.fromEntries(Object.entries(about.inputs).map(([name, { start }]) => [name, readValue(name, start)])),
+  contact: "spring", direction: "across", digits: "few", along: "v0", scale: "log", range: ANY,
 });
 
-/** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
-export function valueOf({ given }, name) {
-  const { low, high } = given[name];
-  return low === high ? low : Math.sqrt(low) * Math.sqrt(high);
+/** What is typed for an input or the range; if it cannot be used, what was there, with `typed` and its `fault`. */
+export function readTyped(state, name, text) {
+  const [input, read] = name === "range" ? [state.along, readRange] : [name, readValue];
+  const { found, fault } = attempt(() => read(input, text, state[input].unit));
+  return fault ? { ...state[name], typed: text, fault } : found;
 }
 
-/** Whether k is an interval. */
-export const isWide = ({ given: { k } }) => k.low < k.high;
+/** An input of the state [SI]: of an interval its geometric middle, of a rigid contact Infinity. */
+export function valueOf(state, name) {
+  const { low, high } = state[name];
+  return low === high ? low : Math.sqrt(low) * Math.sqrt(high);
+}
 
 /** The inputs as the service takes them, without some of them; with `whole` an interval of k as such. */
 export function caseOf(state, without = [], whole = false) {
   const entry = (name) => {
-    const { low, high } = state.given[name];
+    const { low, high } = state[name];
     if (whole && low < high) return ["k_range", [low, high]];
     return [name, low === Infinity ? "rigid" : valueOf(state, name)];
   };
-  const chosen = Object.entries(CHOICES).filter(([name, all]) => state[name] !== Object.keys(all)[0]);
+  const chosen = Object.entries(about.choices).filter(([name, all]) => state[name] !== Object.keys(all)[0]);
   return Object.fromEntries([
     ...namesOf(state).filter((name) => !without.includes(name)).map(entry),
     ...chosen.map(([name]) => [name, state[name]]),
   ]);
+}
+
+/** The inputs in one line, without one of them. */
+export function caption(state, without) {
+  const names = namesOf(state).filter((name) => name !== without);
+  return names.map((name) => `${symbolOf(name, state[name].unit)} = ${state[name].text}`).join(", ");
 }
 
 /** The power, where it is known: not for a normal force that oscillates. */
@@ -239,48 +214,48 @@ export const powerOf = ({ direction }) => (direction === "normal" ? [] : ["power
 
 /** The question for the readout. */
 export function question(state) {
-  const model = about.knows.has("contact") ? ["model"] : []; // of a service that has several
+  const model = about.knows.includes("contact") ? ["model"] : []; // of a service that has several
   const include = ["groups", "limits", "stick_fraction", "gradient", ...powerOf(state), ...model];
   return { ...caseOf(state, [], true), include };
 }
 
 const inAddress = ({ text }) =>
   encodeURIComponent(text.replaceAll(" ", "").replaceAll("µ", "u")).replaceAll("%2F", "/");
-/** The words that other parts of the state may be, in the order in which an address is read. */
+/** The words that a part of the state may be, in the order in which an address is read. */
 const WORDS = {
-  ...Object.fromEntries(Object.entries(CHOICES).map(([name, all]) => [
-    name, () => Object.keys(all).slice(0, about.knows.has(name) ? undefined : 1)])),
+  contact: () => Object.keys(about.choices.contact), direction: () => Object.keys(about.choices.direction),
   digits: () => ["few", "all"], along: namesOf, scale: () => ["log", "linear"],
 };
 
 /** The state as the part of an address behind "#". */
 export function toAddress(state) {
   const usual = startState();
-  const keyOf = (name) => (symbolOf(name, state.given[name].unit) === "f" ? "f" : name);
-  const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state.given[name])}`);
+  const keyOf = (name) => (symbolOf(name, state[name].unit) === "f" ? "f" : name);
+  const parts = namesOf(state).map((name) => `${keyOf(name)}=${inAddress(state[name])}`);
   parts.push(...Object.keys(WORDS).filter((key) => state[key] !== usual[key]).map((key) => `${key}=${state[key]}`));
-  return `#${[...parts, ...(state.range ? [`range=${inAddress(state.range)}`] : [])].join("&")}`;
+  if (state.range.text) parts.push(`range=${inAddress(state.range)}`);
+  return `#${parts.join("&")}`;
 }
 
 /** { state, faults }: what an address says, start values in place of what cannot be used, and why, in words. */
 export function fromAddress(hash) {
-  const [state, faults, given] = [startState(), [], new Map(new URLSearchParams(hash.slice(1)))];
+  const [state, faults, texts] = [startState(), [], new Map(new URLSearchParams(hash.slice(1)))];
   /** Sets a part of the state to what `read` makes of a text of the address, if it has that key. */
-  const take = (key, read, part = state, name = key) => {
-    if (!given.has(key)) return;
-    const { found, fault } = attempt(() => read(given.get(key)));
-    if (fault) faults.push(`${key} = ${given.get(key) || "nothing"} (${fault})`);
-    else part[name] = found;
-    given.delete(key);
+  const take = (key, read, name = key) => {
+    if (!texts.has(key)) return;
+    const { found, fault } = attempt(() => read(texts.get(key)));
+    if (fault) faults.push(`${key} = ${texts.get(key) || "nothing"} (${fault})`);
+    else state[name] = found;
+    texts.delete(key);
   };
   for (const [key, words] of Object.entries(WORDS)) {
     const known = words(state);
     take(key, (word) => (known.includes(word) ? word : refuse(`must be one of ${known.join(", ")}`)));
   }
-  if (given.has("omega")) take("f", () => refuse("omega is given, too"));
-  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, INPUTS[name].unit), state.given);
-  take("f", (text) => readValue("omega", text, "Hz"), state.given, "omega");
-  take("range", (text) => readInterval(state.along, text, INPUTS[state.along].unit));
-  for (const key of [...given.keys()]) take(key, () => refuse("unknown"));
+  if (texts.has("omega")) take("f", () => refuse("omega is given, too"));
+  for (const name of namesOf(state)) take(name, (text) => readValue(name, text, about.inputs[name].unit));
+  take("f", (text) => readValue("omega", text, "Hz"), "omega");
+  take("range", (text) => readInterval(state.along, text, about.inputs[state.along].unit));
+  for (const key of [...texts.keys()]) take(key, () => refuse("unknown"));
   return { state, faults };
 }

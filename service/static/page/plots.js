@@ -1,14 +1,14 @@
 // Elements, and what the plots share: an SVG that follows its size, axes with ticks, curves, pictures for download.
 
 export const $ = (id) => document.getElementById(id);
-const SVG = ["svg", "path", "rect", "circle", "text", "image"];
+const SVG = ["svg", "path", "rect", "circle", "text"];
 
 /** An element of HTML or SVG with attributes and children; null children are left out. */
 export function make(tag, attributes = {}, ...children) {
   const element = SVG.includes(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
     : document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  element.append(...children.flat(3).filter(Boolean));
+  element.append(...children.flat(Infinity).filter(Boolean));
   return element;
 }
 
@@ -38,12 +38,7 @@ class Axis {
     return Math.min(Math.max(this.log ? 10 ** x : x, this.low), this.high);
   }
 
-  /** -1 below the axis, 1 above it, 0 on it. */
-  side(value) {
-    return this.share(value) < -1e-9 ? -1 : Number(this.share(value) > 1 + 1e-9);
-  }
-
-  /** [value, label] of the ticks, with `room` pixels for each. */
+  /** [pixel, label] of the ticks, with `room` pixels for each. */
   ticks(room) {
     const raw = (this.b - this.a) / Math.max(2, Math.floor(Math.abs(this.to - this.from) / room));
     const unit = this.log ? 1 : 10 ** Math.floor(Math.log10(raw));
@@ -51,7 +46,7 @@ class Axis {
     const step = this.log ? Math.max(1, Math.ceil(raw)) : unit * nice;
     const [first, last] = [Math.ceil(this.a / step - 1e-9), Math.floor(this.b / step + 1e-9)];
     return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step)
-      .map((at) => (this.log ? [10 ** at, power(at)] : [at, String(Number(at.toPrecision(6)))]));
+      .map((at) => [this.pixel(this.log ? 10 ** at : at), this.log ? power(at) : String(Number(at.toPrecision(6)))]);
   }
 }
 
@@ -68,14 +63,10 @@ export class Frame {
     const { x, y, box } = this;
     const line = (d) => make("path", { d, class: "grid" });
     return [
-      ...x.ticks(56).flatMap(([value, text]) => {
-        const at = x.pixel(value);
-        return [line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")];
-      }),
-      ...y.ticks(36).flatMap(([value, text]) => {
-        const at = y.pixel(value);
-        return [line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")];
-      }),
+      x.ticks(56).map(([at, text]) => [
+        line(`M${at} ${y.from}V${grid ? y.to : y.from + 4}`), label(text, at, y.from + 18, "tick")]),
+      y.ticks(36).map(([at, text]) => [
+        line(`M${x.from} ${at}H${grid ? x.to : x.from - 4}`), label(text, x.from - 7, at + 4, "tick", "end")]),
       label(x.title, box.x + box.width / 2, y.from + 38),
       make("text", { class: "upright", transform: `translate(15 ${box.y + box.height / 2}) rotate(-90)` }, y.title),
     ];
@@ -107,11 +98,12 @@ export class Frame {
 
   /** The user's point; where it is outside, an arrow on the frame that points to it. */
   point(x, y) {
-    const out = [this.x.side(x), this.y.side(y)];
-    const shape = out[0] || out[1] ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
-    const turn = (Math.atan2(-out[1], out[0]) * 180) / Math.PI;
-    const place = [[this.x, x], [this.y, y]].map(([axis, value]) =>
-      axis.from + Math.min(Math.max(axis.share(value), 0), 1) * (axis.to - axis.from));
+    const at = [this.x.share(x), this.y.share(y)];
+    const inside = at.map((share) => Math.min(Math.max(share, 0), 1));
+    const [right, up] = at.map((share, i) => Math.sign(Math.trunc(1e9 * (share - inside[i]))));
+    const shape = right || up ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z";
+    const turn = (Math.atan2(-up, right) * 180) / Math.PI;
+    const place = [this.x, this.y].map(({ from, to }, i) => from + inside[i] * (to - from));
     return make("path", { d: shape, class: "point", transform: `translate(${place}) rotate(${turn})` });
   }
 }
@@ -123,15 +115,13 @@ const LOOKS = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharr
 /** An SVG in CSS pixels, filled by `paint(width, height)` -> elements when its size or what it shows changes. */
 export class Plot {
   constructor(svg, paint) {
-    Object.assign(this, { svg, paint, waiting: false });
+    Object.assign(this, { svg, paint });
     new ResizeObserver(() => this.redraw()).observe(svg);
   }
 
   redraw() {
-    if (this.waiting) return;
-    this.waiting = true;
-    requestAnimationFrame(() => {
-      this.waiting = false;
+    cancelAnimationFrame(this.next);
+    this.next = requestAnimationFrame(() => {
       const { clientWidth: width, clientHeight: height } = this.svg;
       if (!width || !height) return;
       this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
@@ -143,15 +133,14 @@ export class Plot {
    *  the arrow keys: step(right, up), larger with Shift, true if it is of use. */
   follow({ move, pick, step }) {
     const { svg } = this;
-    const place = ({ clientX, clientY }) => {
-      const box = svg.getBoundingClientRect();
-      return [clientX - box.left, clientY - box.top];
+    const point = ({ buttons, clientX, clientY }) => {
+      const { x, y } = svg.getBoundingClientRect();
+      (buttons & 1 ? pick : move)(clientX - x, clientY - y);
     };
-    svg.addEventListener("pointermove", (event) => (event.buttons & 1 ? pick : move)(...place(event)));
+    svg.addEventListener("pointermove", point);
     svg.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
       if (event.pointerType === "mouse") svg.setPointerCapture(event.pointerId);
-      pick(...place(event));
+      point(event);
     });
     svg.addEventListener("pointerleave", () => move());
     svg.addEventListener("keydown", (event) => {
@@ -168,17 +157,14 @@ export class Plot {
     const narrow = 7 * text.length > width - 32 ? { textLength: width - 32, lengthAdjust: "spacingAndGlyphs" } : {};
     const words = { x: 16, y: height + 12, fill, "font-family": "sans-serif", "font-size": 13, ...narrow };
     const back = make("rect", { ...size, fill: backgroundColor });
-    const copy = make("svg", size, back, [...this.svg.children].map(withLooks), make("text", words, text));
-    save(new XMLSerializer().serializeToString(copy), "image/svg+xml", name);
+    const drawn = this.svg.cloneNode(true);
+    const [copies, originals] = [drawn, this.svg].map((one) => one.querySelectorAll("*"));
+    copies.forEach(({ style }, i) => { // which looks the same without the style sheet
+      for (const look of LOOKS) style.setProperty(look, getComputedStyle(originals[i]).getPropertyValue(look));
+    });
+    const picture = make("svg", size, back, [...drawn.children], make("text", words, text));
+    save(new XMLSerializer().serializeToString(picture), "image/svg+xml", name);
   }
-}
-
-/** A copy of a drawn element that looks the same without the style sheet. */
-function withLooks(element) {
-  const copy = element.cloneNode(!element.children.length); // with its text
-  for (const name of LOOKS) copy.style.setProperty(name, getComputedStyle(element).getPropertyValue(name));
-  copy.append(...[...element.children].map(withLooks));
-  return copy;
 }
 
 /** Saves a text as a file of the user. */

@@ -1,5 +1,5 @@
 // Questions to the service.  A page without one has another file in the place of this: ../alone/service.js.
-import { Trouble, withKey } from "./ask.js";
+import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
 
@@ -9,15 +9,15 @@ async function ask(path, options) {
     response = await fetch(path, { ...options, signal: AbortSignal.timeout(WAIT_MS) });
     body = await response.json();
   } catch (error) {
-    if (!response || error.name === "TimeoutError") throw new Trouble("later", "The service does not answer.");
-    throw new Trouble("later", `The response of the service cannot be read (status ${response.status}).`);
+    if (!response || error.name === "TimeoutError") return { later: "The service does not answer." };
+    return { later: `The response of the service cannot be read (status ${response.status}).` };
   }
-  if (response.ok) return body;
+  if (response.ok) return { found: body };
   const { status, headers } = response;
-  if (status === 401) throw new Trouble("key", "This service asks for an API key.");
+  if (status === 401) return { key: true };
   const why = body.detail ?? `status ${status}`;
-  if (status < 500 && ![408, 429].includes(status)) throw new Trouble("refused", `The service refuses this: ${why}.`);
-  throw new Trouble("later", `The service cannot answer now: ${why}.`, Number(headers.get("Retry-After")) || null);
+  if (status < 500 && ![408, 429].includes(status)) return { refused: `The service refuses this: ${why}.` };
+  return { later: `The service cannot answer now: ${why}.`, seconds: Number(headers.get("Retry-After")) || null };
 }
 
 export const get = (path) => ask(path, withKey());
