@@ -6,7 +6,7 @@ import pytest
 from mumacro import Surrogate, charts
 from mumacro.cells import nodes
 from mumacro.charts import CHARTS, NAMES, REGIME_OF_SOURCE, SOURCES, Axis
-from mumacro.library import Kernel, kernels
+from mumacro.library import kernels
 from tests.cases import Array, tables
 from tests.comparing import close
 
@@ -110,28 +110,3 @@ def test_the_form_of_a_value_is_the_value_at_the_nodes(table: Surrogate, quantit
         assert np.all((factor != 0.0) == chart.holds(quantity))
         expected = base + factor * part.nodes[quantity.name][keep] if chart.holds(quantity) else 0.0 * base
         assert np.all(np.abs(value - expected) <= 1.01 * bound + 4e-16), chart.name
-
-
-def test_levels_of_the_processor_place_and_scale_alike(table: Surrogate) -> None:
-    """Places and forms at every instruction level: equal bits with fused multiply-add, else to the last digits."""
-    rng = np.random.default_rng(3)
-    y = 10.0 ** rng.uniform(-8.0, 8.0, 4000)
-    v = table.v_tilde_crit(y) * 10.0 ** rng.uniform(-3.0, 1.0, y.size)
-
-    def found(kernel: Kernel) -> list[Array]:
-        block, a, b = kernel.places(table._data, v, y)
-        parts = [block.astype(float), a, b, kernel.border(table._data, y), kernel.normal_form_root(v, y - 1.0)]
-        for quantity, about in enumerate(charts.QUANTITIES):
-            for index, chart in enumerate(CHARTS):
-                mine = block == index
-                if chart.holds(about):
-                    parts += kernel.forms(quantity, index, v[mine], y[mine], y[mine] - 1.0)
-        return parts
-
-    best = found(kernels[-1])
-    for kernel in kernels[:-1]:
-        for ours, theirs in zip(found(kernel), best, strict=True):
-            if kernel.level == "base":
-                assert ours == close(theirs, rel=1e-13, abs=4e-16)
-            else:
-                np.testing.assert_array_equal(ours, theirs)
