@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from builder.c import wasm
-from builder.c.source import OutputError, files, header_text, write_c
+from builder.c.source import OutputError, header_text, write_c
 from builder.export import export_table
 from builder.verify import CASES, draw
 from mumacro import Surrogate, charts
@@ -189,24 +189,6 @@ def test_arithmetic_without_infinities_is_refused(folder: Path, name: str, optio
         assert "compile without -ffast-math" in done.stderr
 
 
-def test_numbers_are_exact_through_text(table: Surrogate) -> None:
-    text = files(table.table)["mumacro_table.c"]
-    arrays = dict(re.findall(r"static const double mumacro_table_(\w+)\[\d+\] = \{([^}]*)\}", text))
-    table._with("power")
-    data = table._with("stick_fraction")
-    read = {name: np.array(row.split(","), dtype=np.float64) for name, row in arrays.items()}
-    for name in ("border", "pieces", "blocks", "outer"):
-        assert same(read[name], getattr(data, name).ravel())
-    for code, name in enumerate(charts.QUANTITY_NAMES):
-        cells, errors, slope_errors = (array.ravel() for array in data.quantities[code])
-        left = cells.size - read[f"{name}_cells"].size
-        assert (left > 0) == (name == "stick_fraction")
-        assert not cells[:left].any()
-        assert same(read[f"{name}_cells"], cells[left:])
-        assert same(read[f"{name}_errors"], errors)
-        assert same(read[f"{name}_slope_errors"], slope_errors[3 * (left // 64) :])
-
-
 def test_names_of_the_declarations_are_the_kernels() -> None:
     text = (KERNEL / "mumacro.h").read_text("ascii")
     for prefix, names in (("SOURCE_", charts.SOURCES), ("REGIME_", charts.REGIMES)):
@@ -252,10 +234,11 @@ def test_the_command_needs_no_extra(repository: Path, tmp_path: Path, out: Any, 
 # --- the same bits ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["gcc", "clang"])
+@pytest.mark.parametrize("words", [("gcc",), ("clang",), ("gcc", "-DMUMACRO_ONE_LANE")], ids=" ".join)
 @pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
-def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surrogate, name: str, kernel: Any) -> None:
-    driver = build(name, *flags[kernel.level])
+def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surrogate, words: Any, kernel: Any) -> None:
+    """Also with one double at a time, as MSVC compiles it."""
+    driver = build(*words, *flags[kernel.level])
     v, y = points(table, 4000, 1)
     expected, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, dtype=np.int8)
     for code, quantity in enumerate(charts.QUANTITY_NAMES):
@@ -272,16 +255,8 @@ def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surr
         assert np.array_equal(found[7] == 0, source >= 0)
         assert np.array_equal(found[7] == 1, ~(v >= 0.0))
     assert set(source) >= {-1, *range(charts.SOURCES.index("rigid"))}
+    assert same(ask(driver.ratios, v.size, 1, v, y), table.mu_ratio(v, y))
     assert same(ask(driver.borders, y.size, 1, y), kernel.border(table._data, y))
-
-
-def test_one_double_at_a_time_gives_the_same_bits(build: Any, flags: Any, table: Surrogate) -> None:
-    """As MSVC compiles it; with and without fused operations."""
-    v, y = points(table, 1500, 2)
-    for level in (flags["base"], flags[kernels[-1].level]):
-        many, one = build("gcc", *level), build("gcc", *level, "-DMUMACRO_ONE_LANE")
-        assert same(ask(one.ratios, v.size, 1, v, y), ask(many.ratios, v.size, 1, v, y))
-        assert same(ask(one.points, v.size, 9, 1, v, y), ask(many.points, v.size, 9, 1, v, y))
 
 
 @pytest.mark.parametrize(

@@ -105,25 +105,6 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cell
             assert (moving[0], moving[-1]) == (0, cells[axis] - 1)
 
 
-@pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
-def test_no_geometry_and_no_coordinate_makes_the_kernel_read_elsewhere(kernel: Kernel) -> None:
-    """Rows of blocks that count cells anywhere: what is read is one of the table's own cells."""
-    rng = np.random.default_rng(3)
-    made = Cells((3, 3))
-    around = np.zeros((30 * len(CHARTS), WIDTH, WIDTH))
-    own = around[10 * len(CHARTS) : 19 * len(CHARTS)]
-    around[:, -1, -1], own[:, -1, -1] = 7.0, 1.0
-    v, y = 10.0 ** rng.uniform(-9.0, 5.0, 3000), 10.0 ** rng.uniform(-6.0, 8.0, 3000)
-    for size in (1.0, 1e3, 1e9, 1e300, math.inf, math.nan):
-        made.data.blocks[:] = size * rng.normal(size=made.data.blocks.shape)
-        for index in range(len(CHARTS)):
-            mine = kernel.places(made.data, v, y)[0] == index
-            if CHARTS[index].a.name != "inverse_y":  # there a base is added
-                found = made.tabulated(index, own, v[mine], y[mine], kernel)
-                # coordinates that are infinite give no number
-                assert np.all((np.abs(found - 1.0) <= 1e-12) | (np.isnan(found) & (size not in (1.0, 1e3, 1e9))))
-
-
 # --- the coordinates that evaluation uses --------------------------------------------------------------
 
 

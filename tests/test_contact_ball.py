@@ -1,5 +1,6 @@
 """A ball: quadrature over springs against marched springs, adaptive quadrature, closed forms; bounds."""
 
+import itertools
 import math
 from typing import Any
 
@@ -19,28 +20,25 @@ BALL: Case = {"contact": "ball"}
 table = tables(1e-12)
 
 
-def by_quad(table: Surrogate, name: str, v: float, y: float) -> float:
-    """The integral over springs of the same table, adaptively, split where springs cross the border and y~ = 1."""
+def by_quad(table: Surrogate, name: str, v: float, y: float, direction: Any = "across", *cuts: float) -> float:
+    """The integral over springs of the same table, adaptively, split at ``cuts``, at the border and at y~ = 1."""
 
     def share(xi: float) -> float:
         s = 1.0 - xi * xi
         weight = 1.5 * s * (1.5 * s if name == "power" else 1.0)
-        return float(weight * table.quantity(name, v / (1.5 * s), y / (1.5 * s))[0])
+        return float(weight * table.quantity(name, v / (1.5 * s), y / (1.5 * s), direction=direction)[0])
 
     def beyond(xi: float) -> float:
         s = 1.0 - xi * xi
-        return float(v / (1.5 * s) - table.v_tilde_crit(y / (1.5 * s)))
+        return float(v / (1.5 * s) - table.v_tilde_crit(y / (1.5 * s), direction=direction))
 
     xi = 1.0 - np.geomspace(1.0, 1e-9, 4000)
     slides = np.array([beyond(x) >= 0.0 for x in xi])
     turns = np.flatnonzero(slides[1:] != slides[:-1])
-    cuts = [0.0, *(brentq(beyond, xi[i], xi[i + 1], xtol=1e-15) for i in turns), 1.0 - 1e-12]
+    ends = [0.0, *cuts, *(brentq(beyond, xi[i], xi[i + 1], xtol=1e-15) for i in turns), 1.0 - 1e-12]
     if y < 1.5:
-        cuts.append(math.sqrt(1.0 - y / 1.5))
-    return sum(
-        quad(share, a, b, epsabs=1e-13, epsrel=1e-13, limit=400)[0]
-        for a, b in zip(sorted(cuts), sorted(cuts)[1:], strict=False)
-    )
+        ends.append(math.sqrt(1.0 - y / 1.5))
+    return sum(quad(share, a, b, epsabs=1e-13, epsrel=1e-13, limit=400)[0] for a, b in itertools.pairwise(sorted(ends)))
 
 
 @pytest.mark.slow

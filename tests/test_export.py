@@ -178,12 +178,7 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
      (["x.nc"], 2, "--format"), ([str(PATH), "--format", "csv", "--out", "."], 2, "--out")],
 )  # fmt: skip
 def test_what_the_command_cannot_export_is_reported_in_one_line(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: Capture,
-    arguments: Any,
-    code: Any,
-    said: Any,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Capture, arguments: Any, code: Any, said: Any
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)
