@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from builder.c import wasm
-from builder.c.source import OutputError, header_text, write_c
+from builder.c.source import header_text, write_c
 from builder.export import export_table
 from builder.verify import CASES, draw
 from mumacro import Surrogate, charts
@@ -203,18 +203,6 @@ def test_names_of_the_declarations_are_the_kernels() -> None:
 def test_a_header_has_no_names_of_the_kernel_of_its_own(table: Surrogate) -> None:
     text = re.sub(r'/\*.*?\*/|"[^"]*"', "", header_text(table.table), flags=re.DOTALL)
     assert set(re.findall(r"\b(?:mu|MU)_\w+", text)) == {"mu_macro", "mu_ratio"}  # members of structs
-
-
-def test_where_nothing_can_be_written_is_said(table: Surrogate, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("before")
-    (tmp_path / "folder.h").mkdir()
-    with pytest.raises(OutputError, match="is a file"):
-        write_c(table.table, tmp_path / "file")
-    with pytest.raises(OutputError, match="is a folder"):
-        write_c(table.table, tmp_path / "folder.h")
-    with pytest.raises(FileNotFoundError):
-        write_c(table.table, tmp_path / "no" / "mumacro.h")
-    assert (tmp_path / "file").read_text() == "before"
 
 
 @pytest.mark.parametrize(("out", "made"), [("mumacro.h", []), ("made", ["mumacro.c", "mumacro.h", "mumacro_table.c"])])

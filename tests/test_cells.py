@@ -9,13 +9,12 @@ from numpy.polynomial import chebyshev
 
 from mumacro import charts
 from mumacro.cells import WIDTH, cells_1d, cells_2d, nodes
-from mumacro.charts import CHARTS, NAMES, SQRT2, Axis
+from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
 from mumacro.library import Kernel, kernels
 from tests.cases import Array
 from tests.comparing import close
 from tests.made_cells import Cells
 
-PLAIN = Axis("y", 0.0, 1.0)
 AXES = sorted({axis for chart in CHARTS for axis in (chart.a, chart.b)}, key=repr)
 S = Axis("s", 0.0, 1.0)
 ANGLE = Axis("angle", 0.0, 1.0)
@@ -43,17 +42,6 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
         i = min(int(x * cells), cells - 1)
         found = np.polyval(local[i], 2.0 * (x * cells - i) - 1.0)
         assert found == close(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
-
-
-@pytest.mark.parametrize("cells", [(1, 1), (2, 5), (4, 3)])
-def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[int, int]) -> None:
-    rng = np.random.default_rng(sum(cells))
-    c = rng.normal(size=(WIDTH, WIDTH))
-    values: Any = chebyshev.chebgrid2d(nodes(12, -1.0, 1.0), nodes(15, -1.0, 1.0), c)
-    coef = cells_2d(PLAIN, PLAIN, values, cells)
-    assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
-    for x, z in rng.random((80, 2)):
-        assert at(coef, cells, x, z) == close(chebyshev.chebval2d(2 * x - 1, 2 * z - 1, c), abs=2e-10)
 
 
 # --- what the kernel reads ------------------------------------------------------------------------------
@@ -144,19 +132,20 @@ def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
     assert beside == close(0.5 * SQRT2, abs=4e-15)
 
 
-@pytest.mark.parametrize("name", [chart.name for chart in CHARTS if chart.b.name == "s"])
-def test_cells_along_s_follow_a_smooth_function(name: str) -> None:
-    """Cells have an edge at the knot of s; those below the lowest s of a block are never visited."""
-    chart = CHARTS[NAMES.index(name)]
-    low, high = chart.a.span
+@pytest.mark.parametrize("chart", CHARTS, ids=NAMES)
+@pytest.mark.parametrize("cells", [(4, 12), (7, 20)])
+def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[int, int]) -> None:
+    """Along s they have an edge at the knot; those below the lowest s of a block are never visited."""
+    spans = chart.a.span, chart.b.span
 
-    def smooth(a: Any, s: Any) -> Any:
-        return np.exp(-a / chart.a.high) * np.cos(2.0 * s)
+    def smooth(a: Any, b: Any) -> Any:
+        return np.exp(-a / chart.a.high) * np.cos(2.0 * b / chart.b.high)
 
-    a, s = nodes(20, chart.a.low, chart.a.high), nodes(30, chart.b.low, chart.b.high)
-    coef = cells_2d(chart.a, chart.b, smooth(a[:, None], s), (4, 12))
+    a, b = nodes(20, chart.a.low, chart.a.high), nodes(30, chart.b.low, chart.b.high)
+    coef = cells_2d(chart.a, chart.b, smooth(a[:, None], b), cells)
+    least = float(chart.b.to_evaluation(np.array([chart.b.low]))[0] / spans[1][1])
     rng = np.random.default_rng(2)
-    least = chart.b.to_evaluation(np.array([chart.b.low]))[0]
-    for x, sigma in zip(rng.random(200), rng.uniform(least, SQRT2, 200), strict=True):
-        place = chart.a.to_file(np.array([low + (high - low) * x])), chart.b.to_file(np.array([sigma]))
-        assert at(coef, (4, 12), x, sigma / SQRT2) == close(smooth(*place)[0], abs=2e-9)
+    for x, z in zip(rng.random(200), rng.uniform(max(least, 0.0), 1.0, 200), strict=True):
+        shares = zip((chart.a, chart.b), spans, (x, z), strict=True)
+        place = [axis.to_file(np.array([low + (high - low) * share])) for axis, (low, high), share in shares]
+        assert at(coef, cells, x, z) == close(smooth(*place)[0], abs=2e-9)
