@@ -16,7 +16,6 @@ from tests.comparing import close
 from tests.made_cells import Cells
 
 AXES = sorted({axis for chart in CHARTS for axis in (chart.a, chart.b)}, key=repr)
-S = Axis("s", 0.0, 1.0)
 ANGLE = Axis("angle", 0.0, 1.0)
 
 
@@ -120,16 +119,6 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
     assert phi**3 + 2.0 * (y - 1.0) * phi == close(math.pi * v, rel=1e-14)
     assert radius == close(np.hypot(s0 / SQRT2, SQRT2 * phi), rel=1e-15)
     assert ANGLE.to_file(half) == close(2.0 / math.pi * np.arctan2(2.0 * phi, s0), rel=1e-14)
-
-
-def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
-    rho = np.concatenate([np.geomspace(1e-30, 0.5, 50), 1.0 - np.geomspace(1e-12, 0.5, 50)])
-    s = S.to_file(np.where(rho < 0.5, np.sqrt(rho), SQRT2 - np.sqrt(1.0 - rho)))
-    assert np.sin(0.5 * math.pi * s) ** 2 == close(rho, rel=1e-15)
-    assert S.to_file(np.array([0.0, SQRT2])) == close([0.0, 1.0], abs=1e-15)
-    # continuous at its knot
-    beside = S.to_evaluation(np.array([0.5 - 1e-15, 0.5, 0.5 + 1e-15]))
-    assert beside == close(0.5 * SQRT2, abs=4e-15)
 
 
 @pytest.mark.parametrize("chart", CHARTS, ids=NAMES)

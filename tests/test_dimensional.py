@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mumacro import InputError, Surrogate
-from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, as_columns, check_inputs
+from mumacro.inputs import BOUNDS, FIELDS, POSITIVE
 from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
 
@@ -133,18 +133,14 @@ BAD = [
 @pytest.mark.parametrize(("field", "bad"), BAD)
 def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: str, bad: float) -> None:
     for given_inputs, index in (({**CASE, field: bad}, None), ({**CASE, field: [CASE[field], bad, bad]}, 1)):
-        for check in (
-            lambda columns: check_inputs(as_columns(columns)),
-            lambda columns: table.evaluate(columns, gradient=True, illegal="raise"),
-        ):
-            with pytest.raises(InputError) as caught:
-                check(given_inputs)
-            error = caught.value
-            assert (error.field, error.index, error.bound) == (field, index, BOUNDS[field])
-            assert repr(error.value) == repr(bad)
-            where = "" if index is None else " at index 1"
-            assert str(error) == f"{field}{where} must be {BOUNDS[field]}, got {bad!r}"
-            assert isinstance(error, ValueError)
+        with pytest.raises(InputError) as caught:
+            table.evaluate(given_inputs, gradient=True, illegal="raise")
+        error = caught.value
+        assert (error.field, error.index, error.bound) == (field, index, BOUNDS[field])
+        assert repr(error.value) == repr(bad)
+        where = "" if index is None else " at index 1"
+        assert str(error) == f"{field}{where} must be {BOUNDS[field]}, got {bad!r}"
+        assert isinstance(error, ValueError)
 
 
 @pytest.mark.parametrize(("field", "bad"), BAD)
