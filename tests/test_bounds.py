@@ -1,4 +1,4 @@
-"""Every bound covers its error in the hardest cases: exact inputs, corner, border, ends of double precision."""
+"""Every bound covers its error in the hardest cases: exact inputs, corner, border; gradients and power."""
 
 import math
 from fractions import Fraction

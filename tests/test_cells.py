@@ -132,9 +132,10 @@ def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[in
 
     a, b = nodes(20, chart.a.low, chart.a.high), nodes(30, chart.b.low, chart.b.high)
     coef = cells_2d(chart.a, chart.b, smooth(a[:, None], b), cells)
-    least = float(chart.b.to_evaluation(np.array([chart.b.low]))[0] / spans[1][1])
+    start, stop = spans[1]
+    least = (float(chart.b.to_evaluation(np.array([chart.b.low]))[0]) - start) / (stop - start)
     rng = np.random.default_rng(2)
-    for x, z in zip(rng.random(200), rng.uniform(max(least, 0.0), 1.0, 200), strict=True):
+    for x, z in zip(rng.random(200), rng.uniform(least, 1.0, 200), strict=True):
         shares = zip((chart.a, chart.b), spans, (x, z), strict=True)
         place = [axis.to_file(np.array([low + (high - low) * share])) for axis, (low, high), share in shares]
         assert at(coef, cells, x, z) == close(smooth(*place)[0], abs=2e-9)
