@@ -26,7 +26,8 @@ def here(repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captur
     monkeypatch.chdir(repository)
 
     def run(*arguments: object) -> "CompletedProcess[str]":
-        words, code = [*map(str, arguments)], None
+        words = [*map(str, arguments)]
+        code: Any = 0
         try:
             code = main(words)
         except SystemExit as end:

@@ -243,7 +243,6 @@ def test_every_level_gives_the_librarys_bits(build: Any, flags: Any, table: Surr
         assert np.array_equal(found[7] == 0, source >= 0)
         assert np.array_equal(found[7] == 1, ~(v >= 0.0))
     assert set(source) >= {-1, *range(charts.SOURCES.index("rigid"))}
-    assert same(ask(driver.ratios, v.size, 1, v, y), table.mu_ratio(v, y))
     assert same(ask(driver.borders, y.size, 1, y), kernel.border(table._data, y))
 
 
