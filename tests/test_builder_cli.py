@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from builder.__main__ import main
 from builder.assemble import ABS_TO_REL
 from mumacro import Surrogate
 from mumacro.table import read_table, write_table
@@ -17,6 +18,24 @@ from tests.comparing import close
 pytestmark = pytest.mark.slow
 
 Run = Callable[..., "CompletedProcess[str]"]
+
+
+@pytest.fixture
+def here(repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    """``python -m builder ARGUMENTS`` without a process of its own, which would compile the solver anew."""
+    monkeypatch.chdir(repository)
+
+    def run(*arguments: object) -> "CompletedProcess[str]":
+        words = [*map(str, arguments)]
+        code: Any = 0
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+        out, err = capfd.readouterr()
+        return CompletedProcess(words, int(code or 0), out, err)
+
+    return run
 
 
 def refused(done: Any, *parts: str) -> None:
@@ -48,36 +67,36 @@ def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) ->
     assert {"holds": True, "not_covered": 0}.items() <= json.loads(verified.stdout).items()
 
 
-def test_solve_answers_at_the_ends_of_its_range(run_builder: Run) -> None:
+def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> None:
     done = run_builder("solve", "--v", 0.1, "--y", 0.5)
     assert json.loads(done.stdout)["mu_ratio"] == close(0.9420042895137095, abs=1e-15)
     for v, y in (("1e10", "1e-15"), ("1e-60", "1e14")):
-        done = run_builder("solve", "--v", v, "--y", y)
+        done = here("solve", "--v", v, "--y", y)
         assert done.returncode == 0, done.stderr
         answer = json.loads(done.stdout)
         assert answer["status"] == 0
         assert 0.0 < answer["mu_ratio"] <= 1.0
         assert 0.0 <= answer["error_estimate"] < 2e-15
-    answer = json.loads(run_builder("solve", "--v", "1e-9", "--y", "0.5").stdout)
+    answer = json.loads(here("solve", "--v", "1e-9", "--y", "0.5").stdout)
     assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)  # far below the border: not computed
     assert answer["stick_fraction"] > 0.99
 
 
-def test_verify_rejects_a_table_that_misses_its_tolerance(run_builder: Run, tables_dir: Path, tmp_path: Path) -> None:
+def test_verify_rejects_a_table_that_misses_its_tolerance(here: Run, tables_dir: Path, tmp_path: Path) -> None:
     table = read_table(tables_dir / "mumacro-1e-4.nc")
     table.attributes["tolerance"] = 1e-9  # it states a tolerance that it does not meet
     write_table(table, tmp_path / "boast.nc")
-    done = run_builder("verify", tmp_path / "boast.nc", "--points", 300)
+    done = here("verify", tmp_path / "boast.nc", "--points", 300)
     refused(done, "boast.nc", "misses its tolerance of 1e-09")
     report = json.loads(done.stdout)
     assert report["holds"] is False
     assert report["max_abs_error"] > 1e-9
 
 
-def test_verify_refuses_a_damaged_table(run_builder: Run, tables_dir: Path, tmp_path: Path) -> None:
+def test_verify_refuses_a_damaged_table(here: Run, tables_dir: Path, tmp_path: Path) -> None:
     cut = Path(shutil.copy(tables_dir / "mumacro-1e-4.nc", tmp_path / "cut.nc"))
     cut.write_bytes(cut.read_bytes()[:60_000])
-    refused(run_builder("verify", cut), "cut.nc", "not a readable netCDF-4 table")
+    refused(here("verify", cut), "cut.nc", "not a readable netCDF-4 table")
 
 
 ROUGH, V_RANGE = "build --tolerance 1e-3 --out x.nc", "from 1e-60 to 1e+10"
@@ -100,6 +119,6 @@ REFUSED: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("words", REFUSED)
-def test_bad_arguments_are_refused_before_any_work(run_builder: Run, words: str, repository: Path) -> None:
-    refused(run_builder(*words.split()), *REFUSED[words])
+def test_bad_arguments_are_refused_before_any_work(here: Run, words: str, repository: Path) -> None:
+    refused(here(*words.split()), *REFUSED[words])
     assert not list(repository.glob("x.nc*"))

@@ -8,16 +8,14 @@ import pytest
 from numpy.polynomial import chebyshev
 
 from mumacro import charts
-from mumacro.cells import WIDTH, cell_positions, cells_1d, cells_2d, nodes
+from mumacro.cells import WIDTH, cells_1d, cells_2d, nodes
 from mumacro.charts import CHARTS, NAMES, SQRT2, Axis, Chart
 from mumacro.library import Kernel, kernels
 from tests.cases import Array
 from tests.comparing import close
 from tests.made_cells import Cells
 
-PLAIN = Axis("y", 0.0, 1.0)
 AXES = sorted({axis for chart in CHARTS for axis in (chart.a, chart.b)}, key=repr)
-S = Axis("s", 0.0, 1.0)
 ANGLE = Axis("angle", 0.0, 1.0)
 
 
@@ -43,17 +41,6 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
         i = min(int(x * cells), cells - 1)
         found = np.polyval(local[i], 2.0 * (x * cells - i) - 1.0)
         assert found == close(chebyshev.chebval(2.0 * x - 1.0, c), abs=1e-11)
-
-
-@pytest.mark.parametrize("cells", [(1, 1), (2, 5), (4, 3)])
-def test_cells_of_a_plane_reproduce_a_polynomial_of_their_degree(cells: tuple[int, int]) -> None:
-    rng = np.random.default_rng(sum(cells))
-    c = rng.normal(size=(WIDTH, WIDTH))
-    values: Any = chebyshev.chebgrid2d(nodes(12, -1.0, 1.0), nodes(15, -1.0, 1.0), c)
-    coef = cells_2d(PLAIN, PLAIN, values, cells)
-    assert coef.shape == (cells[0] * cells[1], WIDTH, WIDTH)
-    for x, z in rng.random((80, 2)):
-        assert at(coef, cells, x, z) == close(chebyshev.chebval2d(2 * x - 1, 2 * z - 1, c), abs=2e-10)
 
 
 # --- what the kernel reads ------------------------------------------------------------------------------
@@ -105,25 +92,6 @@ def test_cells_are_counted_from_one_end_of_an_axis_to_the_other(index: int, cell
             assert (moving[0], moving[-1]) == (0, cells[axis] - 1)
 
 
-@pytest.mark.parametrize("kernel", kernels, ids=lambda kernel: kernel.level)
-def test_no_geometry_and_no_coordinate_makes_the_kernel_read_elsewhere(kernel: Kernel) -> None:
-    """Rows of blocks that count cells anywhere: what is read is one of the table's own cells."""
-    rng = np.random.default_rng(3)
-    made = Cells((3, 3))
-    around = np.zeros((30 * len(CHARTS), WIDTH, WIDTH))
-    own = around[10 * len(CHARTS) : 19 * len(CHARTS)]
-    around[:, -1, -1], own[:, -1, -1] = 7.0, 1.0
-    v, y = 10.0 ** rng.uniform(-9.0, 5.0, 3000), 10.0 ** rng.uniform(-6.0, 8.0, 3000)
-    for size in (1.0, 1e3, 1e9, 1e300, math.inf, math.nan):
-        made.data.blocks[:] = size * rng.normal(size=made.data.blocks.shape)
-        for index in range(len(CHARTS)):
-            mine = kernel.places(made.data, v, y)[0] == index
-            if CHARTS[index].a.name != "inverse_y":  # there a base is added
-                found = made.tabulated(index, own, v[mine], y[mine], kernel)
-                # coordinates that are infinite give no number
-                assert np.all((np.abs(found - 1.0) <= 1e-12) | (np.isnan(found) & (size not in (1.0, 1e3, 1e9))))
-
-
 # --- the coordinates that evaluation uses --------------------------------------------------------------
 
 
@@ -153,42 +121,21 @@ def test_the_corners_angle_is_taken_as_the_tangent_of_its_half() -> None:
     assert ANGLE.to_file(half) == close(2.0 / math.pi * np.arctan2(2.0 * phi, s0), rel=1e-14)
 
 
-def test_the_edge_coordinate_undoes_the_map_of_the_table() -> None:
-    rho = np.concatenate([np.geomspace(1e-30, 0.5, 50), 1.0 - np.geomspace(1e-12, 0.5, 50)])
-    s = S.to_file(np.where(rho < 0.5, np.sqrt(rho), SQRT2 - np.sqrt(1.0 - rho)))
-    assert np.sin(0.5 * math.pi * s) ** 2 == close(rho, rel=1e-15)
-    assert S.to_file(np.array([0.0, SQRT2])) == close([0.0, 1.0], abs=1e-15)
-    # continuous at its knot
-    beside = S.to_evaluation(np.array([0.5 - 1e-15, 0.5, 0.5 + 1e-15]))
-    assert beside == close(0.5 * SQRT2, abs=4e-15)
+@pytest.mark.parametrize("chart", CHARTS, ids=NAMES)
+@pytest.mark.parametrize("cells", [(4, 12), (7, 20)])
+def test_cells_of_a_block_follow_a_smooth_function(chart: Chart, cells: tuple[int, int]) -> None:
+    """Along s they have an edge at the knot; those below the lowest s of a block are never visited."""
+    spans = chart.a.span, chart.b.span
 
+    def smooth(a: Any, b: Any) -> Any:
+        return np.exp(-a / chart.a.high) * np.cos(2.0 * b / chart.b.high)
 
-@pytest.mark.parametrize("chart", [chart for chart in CHARTS if chart.b.name == "s"], ids=lambda chart: chart.name)
-def test_cells_along_s_are_on_the_nodes_axis_and_have_an_edge_at_the_knot(chart: Chart) -> None:
-    cells = 8
-    sigma, t = (x.reshape(cells, WIDTH) for x in cell_positions(chart.b, cells))
-    assert np.all(np.diff(sigma.ravel()) > 0.0)
-    low, high = chart.b.low, chart.b.high
-    s = 0.5 * (low + high) + 0.5 * (high - low) * t
-    assert s.max() < high
-    edges = chart.b.to_file(SQRT2 * np.arange(cells + 1) / cells)
-    assert edges[cells // 2] == close(0.5, abs=1e-15)  # rho = 1/2, where the map changes its branch
-    for i in range(cells):
-        if edges[i + 1] <= low:
-            assert np.all(s[i] == close(low, abs=1e-15))  # never visited
-        else:
-            assert np.all((s[i] > edges[i]) & (s[i] < edges[i + 1]))
-    x, t = cell_positions(chart.a, 3)
-    assert x.size == t.size == 3 * WIDTH
-    assert np.all(np.abs(t) < 1.0)
-
-
-def test_cells_along_s_follow_a_smooth_function() -> None:
-    chart = CHARTS[NAMES.index("stick_slip_low")]
-    a, s = nodes(20, chart.a.low, chart.a.high), nodes(30, chart.b.low, chart.b.high)
-    values = np.exp(-a[:, None]) * np.cos(2.0 * s[None, :])
-    coef = cells_2d(chart.a, chart.b, values, (4, 12))
+    a, b = nodes(20, chart.a.low, chart.a.high), nodes(30, chart.b.low, chart.b.high)
+    coef = cells_2d(chart.a, chart.b, smooth(a[:, None], b), cells)
+    start, stop = spans[1]
+    least = (float(chart.b.to_evaluation(np.array([chart.b.low]))[0]) - start) / (stop - start)
     rng = np.random.default_rng(2)
-    for x, sigma in zip(rng.random(200), SQRT2 * rng.random(200), strict=True):
-        expected = math.exp(-x * chart.a.high) * math.cos(2.0 * float(chart.b.to_file(np.array([sigma]))[0]))
-        assert at(coef, (4, 12), x, sigma / SQRT2) == close(expected, abs=2e-9)
+    for x, z in zip(rng.random(200), rng.uniform(least, 1.0, 200), strict=True):
+        shares = zip((chart.a, chart.b), spans, (x, z), strict=True)
+        place = [axis.to_file(np.array([low + (high - low) * share])) for axis, (low, high), share in shares]
+        assert at(coef, cells, x, z) == close(smooth(*place)[0], abs=2e-9)

@@ -6,7 +6,6 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mumacro import Surrogate
@@ -14,12 +13,11 @@ from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.closed_forms import master_curve_limit
 from tests.cases import CASE, UNIT, Case, opened, tables, without
 from tests.comparing import close
+from tests.test_contact_ball import by_quad
 from tests.test_tight_bounds import play
 
 ALONG: Case = {"direction": "along"}
 NORMAL: Case = {"direction": "normal"}
-
-
 table = tables(1e-4)
 
 
@@ -119,18 +117,10 @@ def test_a_ball_along_is_its_springs(tolerance: Any) -> None:
     for _ in range(12):
         a = 10.0 ** rng.uniform(-1, 1.5)
         v = a * rng.uniform(0.01, 1.0)
-
-        def share(xi: Any, name: str, v: Any = v, a: Any = a) -> Any:
-            load = 1.0 - xi * xi
-            weight = 1.5 * load * (1.5 * load if name == "power" else 1.0)
-            return weight * s.quantity(name, v / (1.5 * load), a / (1.5 * load), **ALONG)[0]
-
         travel = 2.0 * (math.sqrt(a * a - v * v) - v * math.acos(v / a))
-        cut = math.sqrt(max(1.0 - travel / 3.0, 0.0))
         for name in QUANTITY_NAMES:
-            whole = sum(quad(share, lo, hi, (name,), epsabs=1e-13, epsrel=1e-13, limit=300)[0]
-                        for lo, hi in ((0.0, cut), (cut, 1.0 - 1e-10)))  # fmt: skip
             value, bound, source = s.quantity(name, v, a, contact="ball", **ALONG)
+            whole = by_quad(s, name, v, a, "along", math.sqrt(max(1.0 - travel / 3.0, 0.0)))
             assert value == close(whole, abs=1e-11 + bound)
             assert SOURCES[source] == "along_reverse_slip"
     assert s.ratio_with_bound(1.0, 0.99, contact="ball", **ALONG)[0] == 1.0

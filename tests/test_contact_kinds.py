@@ -1,5 +1,6 @@
 """Ball, oscillation along and of the normal force, intervals of k: what holds for every contact and direction."""
 
+import itertools
 import math
 import pickle
 from typing import Any
@@ -11,14 +12,12 @@ import pytest
 from mumacro import InputError, Surrogate
 from mumacro.charts import QUANTITY_NAMES, SOURCES
 from mumacro.contact import kind_of
-from tests.cases import CASE, PAIRS, Case, as_kind, every_pair, opened, tables, without
+from tests.cases import CASE, PAIRS, TOLERANCES, Case, as_kind, every_pair, opened, tables, without
 from tests.comparing import close
 
 BALL: Case = {"contact": "ball"}
 NORMAL: Case = {"direction": "normal"}
 every_other_pair = pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
-
-
 table = tables(1e-10)
 
 
@@ -45,15 +44,19 @@ def test_the_gradient_is_that_of_the_answers(table: Surrogate, pair: Any) -> Non
 
 @every_pair
 def test_any_groups_have_an_answer_or_none(pair: Any) -> None:
-    s, kind = opened(1e-4), kind_of(*pair)
+    kind = kind_of(*pair)
     size = np.array([0.0, 5e-324, 1e-300, 1e-150, 1e-10, 0.5, 1.0, 1e10, 1e150, 1e281, 1.7e308])
     v, y = (a.ravel() for a in np.meshgrid(size, size))
     legal = y < 1.0 if kind.normal else y < np.inf
-    for name in QUANTITY_NAMES[: 1 if kind.direction else 3]:
+    for s, name in itertools.product(map(opened, TOLERANCES), QUANTITY_NAMES[: 1 if kind.direction else 3]):
         value, bound, source = s.quantity(name, v, y, **kind.names)
         assert np.all(((value >= 0.0) & (bound >= 0.0) & (source >= 0))[legal])
-        assert name != "mu_ratio" or np.all(value[legal] <= 1.0)
+        assert name != "mu_ratio" or np.all(((value <= 1.0) & np.isfinite(bound))[legal])
         assert np.all(np.isnan(value[~legal]) & (source[~legal] == -1))
+        if pair == PAIRS[0]:
+            slopes = np.array(s.slopes(v[legal], y[legal], name, bounds=True))
+            assert not np.isnan(slopes).any()
+            assert np.all(slopes[3:] >= 0.0)
     assert np.isnan(s.ratio_with_bound([-1.0, 1.0, np.nan, 1.0], [0.5, -1.0, 0.5, np.inf], **kind.names)[0]).all()
 
 

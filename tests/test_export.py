@@ -16,6 +16,7 @@ from scipy.io import loadmat
 
 from builder.__main__ import main
 from builder.c import wasm
+from builder.c.source import OutputError
 from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table
 from mumacro import Surrogate
 from mumacro.errors import TableError
@@ -178,12 +179,7 @@ def test_the_command_writes_to_the_current_folder_by_default_and_names_the_file(
      (["x.nc"], 2, "--format"), ([str(PATH), "--format", "csv", "--out", "."], 2, "--out")],
 )  # fmt: skip
 def test_what_the_command_cannot_export_is_reported_in_one_line(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: Capture,
-    arguments: Any,
-    code: Any,
-    said: Any,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Capture, arguments: Any, code: Any, said: Any
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(PATH.parent.parent / "pyproject.toml", tmp_path)
@@ -197,7 +193,8 @@ def test_what_the_command_cannot_export_is_reported_in_one_line(
 
 
 def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    copy = Path(shutil.copy(PATH, tmp_path / "table.nc"))
+    copy, folder = Path(shutil.copy(PATH, tmp_path / "table.nc")), tmp_path / "folder.h"
+    folder.mkdir()
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     for path, kind, out, error, said in (
         (PATH, "parquet", "x.parquet", ExportError, "arrow"),
@@ -205,7 +202,11 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path, m
         (tmp_path / "none.nc", "csv", "x.csv", TableError, "no such file"),
         (copy, "csv", "table.nc", ExportError, "is the table itself"),
         (PATH, "csv", "no/such/x.csv", FileNotFoundError, "no/such"),
+        (PATH, "c", "no/such/x.h", FileNotFoundError, "no/such"),
+        (PATH, "c", "folder.h", OutputError, "is a folder"),
+        (PATH, "c", "table.nc", OutputError, "is a file"),
     ):
         with pytest.raises(error, match=said):
             export_table(path, kind, tmp_path / out)
-    assert [(entry.name, entry.read_bytes()) for entry in tmp_path.iterdir()] == [("table.nc", PATH.read_bytes())]
+    assert {*tmp_path.rglob("*")} == {copy, folder}
+    assert copy.read_bytes() == PATH.read_bytes()

@@ -34,11 +34,11 @@ int values(int quantity, const double *v, const double *y, int n, double *out) {
 
 /* in (6, n); out (n, 21): mu_macro, mu_ratio, bound, v~, y~, source, regime, return value, gradient, its bounds, value
  * alone */
-void cases(const double *in, int n, double *out) {
+void cases(int contact, int direction, const double *in, int n, double *out) {
     for (int i = 0; i < n; ++i, ++in, out += 21) {
         const double mu0 = in[0], Fz = in[n], k = in[2 * n], y0 = in[3 * n], omega = in[4 * n], v0 = in[5 * n];
         mumacro_answer a;
-        out[7] = mumacro_evaluate(mu0, Fz, k, y0, omega, v0, &a);
+        out[7] = mumacro_evaluate_as(contact, direction, mu0, Fz, k, y0, omega, v0, &a);
         out[0] = a.mu_macro, out[1] = a.mu_ratio, out[2] = a.error_bound, out[3] = a.v_tilde, out[4] = a.y_tilde;
         out[5] = a.source, out[6] = a.regime;
         memcpy(out + 8, a.gradient, sizeof a.gradient);

@@ -1,6 +1,6 @@
 /* Every entry of the kernel and of mumacro.h under sanitizers: random, nasty and illegal inputs, with a real table and
- * with tables of nonsense.  Arrays are allocated to the last number, so that one too many is seen.  Prints how much was
- * asked. */
+ * with tables of nonsense.  Arrays are allocated to the last number, so that one too many is seen.  What the numbers are
+ * is tested elsewhere.  Prints how much was asked. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -53,8 +53,7 @@ static void wrong(const char *what) {
     exit(1);
 }
 
-/* Whether two numbers have other bits; NaN is NaN, whatever its sign. */
-static int differ(double a, double b) { return memcmp(&a, &b, sizeof a) && (a == a || b == b); }
+static volatile double used; /* by it no call is left out as needless */
 
 /* Points v, y through every function of points, in an array of n and alone. */
 static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, int64_t n, const double *v,
@@ -65,18 +64,13 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
     for (int quantity = 0; quantity < 3; ++quantity) {
         kernel->values(data, quantity, n, v, y, value, bound, source);
         kernel->values(data, quantity, n, v, y, again, NULL, NULL);
-        if (memcmp(value, again, (size_t)n * sizeof *value)) wrong("values without bounds");
         kernel->values(data, quantity, n, v, y, again, NULL, source);
         kernel->values(data, quantity, n, v, y, again, bound, NULL);
         kernel->slopes(data, quantity, n, v, y, rows, n);
         for (int64_t i = 0; i < n; ++i)
             if (source[i] < -1 || source[i] >= MU_SOURCES) wrong("a source that there is not");
     }
-    kernel->values(data, 0, n, v, y, value, bound, source);
-    for (int64_t i = 0; i < n; ++i) {
-        const double alone = kernel->ratio(data, v[i], y[i]);
-        if (differ(alone, value[i])) wrong("a point alone");
-    }
+    for (int64_t i = 0; i < n; ++i) used = kernel->ratio(data, v[i], y[i]);
     for (int kind = 0; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind) {
         const int contact = kind / MU_DIRECTIONS, direction = kind % MU_DIRECTIONS;
         kernel->border_as(data, contact, direction, n, y, bound);
@@ -104,13 +98,10 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     for (int kind = 1; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
         kernel->cases_as(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW,
                          (const double *const *)columns, strides, 17, rows[2], n, source);
-    kernel->cases(data, n, (const double *const *)columns, strides, 17, rows[2], n, source);
     for (int64_t i = 0; i < n; ++i) {
         double x[6], *found = numbers(i % 2 ? 19 : 7);
         for (int j = 0; j < 6; ++j) x[j] = columns[j][i * strides[j]];
         kernel->one(data, x[0], x[1], x[2], x[3], x[4], x[5], i % 2 ? 19 : 7, found);
-        for (int way = 0; way < 3; ++way)
-            if (differ(found[0], rows[way][i])) wrong("a case alone");
         free(found);
     }
     free(rows[0]), free(rows[1]), free(rows[2]), free(source);
@@ -124,43 +115,25 @@ static void ask_elements(const mumacro_kernel *kernel, int64_t n, double *const 
     free(held), free(sums);
 }
 
-/* One case through the plain functions of mumacro.h: one verdict, and an answer only where it is right. */
+/* One case through the plain functions of mumacro.h: an answer only where it is right. */
 static void check_case(const double *x) {
     mumacro_answer a;
     mumacro_cycle c;
     const int error = mumacro_evaluate(x[0], x[1], x[2], x[3], x[4], x[5], &a);
-    if (mumacro_evaluate_cycle(x[0], x[1], x[2], x[3], x[4], x[5], &c) != error) wrong("two verdicts");
-    if (differ(mumacro_mu_macro(x[0], x[1], x[2], x[3], x[4], x[5]), a.mu_macro)) wrong("two values");
-    if (error) {
-        if (a.source != -1 || a.regime != -1 || a.mu_macro == a.mu_macro) wrong("an answer to an illegal case");
-        if (c.power == c.power) wrong("a power of an illegal case");
-    } else {
-        if (!(a.mu_ratio >= 0.0 && a.mu_ratio <= 1.0 && a.error_bound >= 0.0)) wrong("value or bound");
-        if (a.source < 0 || a.source >= MUMACRO_SOURCES || a.regime < 0) wrong("source or regime");
-        if (!(c.stick_fraction >= 0.0 && c.stick_fraction <= 1.0)) wrong("stick fraction");
-    }
-}
-
-static int is_legal(int quantity, double v, double y) {
-    if (!(v >= 0.0 && y >= 0.0)) return 0;
-    return y < HUGE_VAL || quantity == MUMACRO_STICK_FRACTION || (quantity == MUMACRO_POWER && v < HUGE_VAL);
+    (void)mumacro_evaluate_cycle(x[0], x[1], x[2], x[3], x[4], x[5], &c);
+    used = mumacro_mu_macro(x[0], x[1], x[2], x[3], x[4], x[5]);
+    if (error ? a.source != -1 || a.regime != -1 || a.mu_macro == a.mu_macro
+              : !(a.mu_ratio >= 0.0 && a.mu_ratio <= 1.0 && a.error_bound >= 0.0))
+        wrong("an answer to an illegal case, value or bound");
 }
 
 static void check_point(double v, double y) {
     mumacro_point p;
     for (int quantity = -1; quantity <= 3; ++quantity) {
         const int error = mumacro_evaluate_point(quantity, v, y, &p);
-        if (quantity < 0 || quantity > 2) {
-            if (error != MUMACRO_NO_QUANTITY) wrong("an unknown quantity");
-        } else {
-            if ((error == 0) != is_legal(quantity, v, y)) wrong("legal or not");
-            if ((error == 0) != (p.value == p.value) || (p.source >= 0) != (error == 0)) wrong("value without right");
-        }
+        if ((error == 0) != (p.value == p.value) || (p.source >= 0) != (error == 0)) wrong("value without right");
     }
-    (void)mumacro_mu_ratio(v, y);
-    (void)mumacro_power(v, y);
-    (void)mumacro_stick_fraction(v, y);
-    (void)mumacro_v_tilde_crit(y);
+    used = mumacro_mu_ratio(v, y) + mumacro_power(v, y) + mumacro_stick_fraction(v, y) + mumacro_v_tilde_crit(y);
 }
 
 /* Without a place for the answer, and with codes that there are not. */
@@ -172,37 +145,22 @@ static void check_misuse(void) {
         if (!mumacro_source_name(code)[0] || (code && !mumacro_error_text(code)[0])) wrong("no text");
 }
 
-/* One case in every contact and direction: the bits of arrays; its force, and the elements of a few springs. */
-static void ask_calls(const mumacro_kernel *kernel, const double *x, double v_rest) {
-    static const int64_t strides[6] = {0, 0, 0, 0, 0, 0};
-    const double *const columns[6] = {x, x + 1, x + 2, x + 3, x + 4, x + 5};
-    const double size = mumacro_force(x[5], v_rest, x[0], x[1], x[2], x[3], x[4]);
+/* One case in every contact and direction; its force, and the elements of a few springs. */
+static void ask_calls(const double *x, double v_rest) {
     double held[8], *sum = numbers(2);
     mumacro_answer *answer = (mumacro_answer *)malloc(sizeof *answer);
-    int8_t source;
     if (answer == NULL) exit(2);
     for (int contact = -1; contact <= MU_CONTACTS; ++contact)
         for (int direction = -1; direction <= MU_DIRECTIONS; ++direction) {
             const int error = mumacro_evaluate_as(contact, direction, x[0], x[1], x[2], x[3], x[4], x[5], answer);
-            double rows[17];
             if ((error != 0) != (answer->source < 0) || (error != 0) != (answer->mu_macro != answer->mu_macro))
                 wrong("an answer beside its error");
-            if (mumacro_error_text(error)[0] == 'e') wrong("the text of an error");
-            if (error < 0) continue;
-            if (contact + direction == 0) kernel->cases(&mumacro_table.data, 1, columns, strides, 17, rows, 1, &source);
-            else kernel->cases_as(&mumacro_table.data, contact, direction, 1, columns, strides, 17, rows, 1, &source);
-            if (answer->source != source || differ(answer->mu_macro, rows[0])) wrong("evaluate_as");
-            for (int i = 0; i < 6; ++i)
-                if (differ(answer->gradient[i], rows[5 + i])) wrong("the gradient of evaluate_as");
         }
-    if (differ(size, -mumacro_force(-x[5], v_rest, x[0], x[1], x[2], x[3], x[4]))) wrong("a force that is not odd");
-    if (fabs(size) > x[0] * x[1]) wrong("a force beyond mu0 Fz");
+    used = mumacro_force(x[5], v_rest, x[0], x[1], x[2], x[3], x[4]);
     for (int springs = 0; springs <= 4; ++springs) {
         memset(held, 0, sizeof held);
         for (int step = 0; step < 3; ++step)
-            if (mumacro_element_step(springs, x[0], x[1], x[2], x[3], x[5], held, sum) == 0 &&
-                !(mu_hypot(sum[0], sum[1]) <= x[0] * x[1] * (1.0 + 1e-12) + 1e-307))
-                wrong("an element beyond its limit");
+            (void)mumacro_element_step(springs, x[0], x[1], x[2], x[3], x[5], held, sum);
     }
     free(sum), free(answer);
 }
@@ -233,7 +191,7 @@ static void ask_all(const mumacro_kernel *kernel, const mumacro_data *data, int6
             for (int i = 0; i < 6; ++i) x[i] = columns[i][j];
             check_case(x);
             check_point(x[5], x[3]);
-            if (j < FEW) ask_calls(kernel, x, drawn() < 0.2 ? anything() : x[5] * scaled(-2.0, 2.0));
+            if (j < FEW) ask_calls(x, drawn() < 0.2 ? anything() : x[5] * scaled(-2.0, 2.0));
         }
     if (single < 0) ask_points(kernel, data, n, columns[5], columns[3]);
     if (single < 0) ask_builder(kernel, n, columns[5], columns[3]);
