@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from benchmarks.marching import march
 from builder.steady import border, solve
@@ -154,6 +155,21 @@ def constants() -> str:
     return f"{text}(28) less N_0 is lowest, {fit.min():.5f}, at v~/v~crit = {x[int(np.argmin(fit))]:.3f}."
 
 
+def blend() -> str:
+    """The one fitted number of the closed forms: the parameter of the border's blend."""
+    y = np.geomspace(1e-4, 1e8, 4001)
+    exact, w = table().v_tilde_crit(y), y * y
+    c = (closed_forms.BORDER_CONSTANT / 4.0) ** (2.0 / 3.0)
+
+    def worst(d: float) -> float:
+        formula = 0.5 * w * ((1.0 + (5.0 / 9.0 + d) * w + c * d * w * w) / (1.0 + d * w)) ** -0.75
+        return float(np.abs(formula / exact - 1.0).max())
+
+    found = minimize_scalar(worst, bounds=(0.05, 5.0), method="bounded")
+    rows = [[f"{found.x:.4f}", percent(found.fun)[1:]]]
+    return markdown(["parameter of the blend", "off by [%], least at the most, y~ from 1e-4 to 1e8"], rows, 0)
+
+
 def master_curve() -> str:
     """Eq. (28) and its exact limit, by amplitude."""
     x = np.linspace(0.0, 1.0, 2001)
@@ -250,7 +266,9 @@ def summary() -> str:
     return f"Stick-slip from {slowest:g} v~crit up:\n\n{markdown(header, rows, 2)}"
 
 
-SECTIONS = sections(model, static, angles, deviations, constants, master_curve, continuous, large_amplitudes, summary)
+SECTIONS = sections(
+    model, static, angles, deviations, constants, blend, master_curve, continuous, large_amplitudes, summary
+)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS)

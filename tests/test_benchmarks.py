@@ -60,7 +60,7 @@ def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
     assert tables_readme.tables(build=False, workers=2).strip() in section
 
 
-SLOW = {"model", "angles", "stiffness", "layer", "cusp", "creep"}
+SLOW = {"model", "angles", "stiffness", "cusp", "creep"}
 SECTIONS = [
     pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
     for script in ("validation", "validity", "model_facts", "hard_cases")

@@ -133,6 +133,11 @@ def test_a_fault_loses_no_data(name: str) -> None:
     assert what == "held", seen
 
 
+@pytest.mark.slow
+def test_a_killed_build_resumes_to_the_same_data(tmp_path: Path) -> None:
+    assert "2 kills" in faults.killed_builds(tmp_path, kills=2)
+
+
 def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Path) -> None:
     v, y = np.full(60, 0.1), np.geomspace(0.1, 10.0, 60)
     try:
