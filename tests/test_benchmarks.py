@@ -80,7 +80,7 @@ def test_a_section_is_a_table_of_finite_numbers(section: Any) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "cold_start --quick", "solver --quick"])
+@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "solver --quick"])
 def test_a_script_prints_tables_of_finite_numbers(script: str) -> None:
     check(run(*script.split()))
 

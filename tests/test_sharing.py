@@ -183,43 +183,13 @@ def inherited(table: Surrogate) -> Surrogate:
     return table
 
 
-def child(work: Callable[[], bytes]) -> bytes:
-    """The result of ``work`` in a forked child, within a minute."""
-    read, write = os.pipe()
-    number = os.fork()
-    if number == 0:
-        try:
-            os.close(read)
-            with os.fdopen(write, "wb") as out:
-                out.write(work())
-            os._exit(0)
-        finally:
-            os._exit(1)
-    os.close(write)
-    timer = threading.Timer(60.0, os.kill, (number, 9))
-    timer.start()
-    with os.fdopen(read, "rb") as stream:
-        found = stream.read()
-    _, status = os.waitpid(number, 0)
-    timer.cancel()
-    assert status == 0
-    return found
-
-
-@forks
-@pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
-    assert child(lambda: _ask(1)) == everything(inherited)
-    # a child of the child, and the parent afterwards
-    assert child(lambda: child(lambda: _ask(2))) == everything(inherited, N, 2)
-
-
 @forks
 @pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_forked_workers_give_the_same_bits(inherited: Surrogate) -> None:
     expected, context = [everything(inherited, N, seed) for seed in range(4)], multiprocessing.get_context("fork")
     with ProcessPoolExecutor(2, mp_context=context) as executor:
         assert list(executor.map(_ask, range(4), timeout=120)) == expected
+    assert everything(inherited) == expected[1]  # and the parent afterwards
 
 
 @pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))

@@ -17,10 +17,7 @@ from mumacro.closed_forms import outer
 from tests.cases import CASE, Array, Case, log_uniform, tables
 from tests.comparing import close
 
-table = tables()
-
-
-fine = tables(1e-7)
+table, fine = tables(), tables(1e-7)
 
 
 # --- answers at the edges -----------------------------------------------------------------------------

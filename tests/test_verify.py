@@ -21,8 +21,6 @@ from tests.comparing import close
 pytestmark = pytest.mark.slow
 
 TABLE = Path(__file__).parent.parent / "tables" / "mumacro-1e-7.nc"
-
-
 sound = tables(1e-7)
 
 
