@@ -98,17 +98,11 @@ def workers() -> Iterator[Any]:
         parallel = pytest.importorskip("joblib")
         return parallel.Parallel(2, backend="loky")([parallel.delayed(function)(argument)] * 2)[0]
 
-    def distributed(function: Any, argument: Any) -> Any:
-        library = pytest.importorskip("distributed")
-        with library.Client(processes=False, n_workers=1, dashboard_address=None) as client:
-            return client.submit(function, argument).result()
-
     yield pytest.param(executor(lambda: ThreadPoolExecutor(1)), id="threads")
     for method in ("fork", "spawn") if hasattr(os, "fork") else ("spawn",):
         context = multiprocessing.get_context(method)
         yield pytest.param(executor(lambda c=context: ProcessPoolExecutor(1, mp_context=c)), id=method)
     yield pytest.param(joblib, id="joblib")
-    yield pytest.param(distributed, id="dask distributed")
 
 
 @pytest.mark.filterwarnings("ignore")
