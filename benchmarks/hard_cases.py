@@ -5,9 +5,8 @@
 Each case computes the naive number too.
 """
 
-from benchmarks.measuring import ROOT, main, markdown, progress, quantity, sections  # isort: split
+from benchmarks.measuring import main, markdown, progress, quantity, sections  # isort: split
 
-import csv
 import math
 from collections.abc import Callable
 
@@ -16,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from benchmarks.marching import march
-from builder.model import ANGLE, CHART, FALL, MIN_SPEED, OK, SIGMA, STEPS, SUM_UX, slip
+from benchmarks.solver import march
+from benchmarks.validation import interpolant, orbit, reference
+from builder.model import FALL, OK, SIGMA, STEPS, SUM_UX, slip
 from builder.sections import COS_0, DURATION, SIGMA_0, SIGMA_1, SIN_0, stick_slip
 from builder.steady import border, continuous, solve, workspace
 from builder.stick import stick_excess
@@ -32,30 +32,6 @@ def g(x: float) -> str:
     return quantity(float(x), 2)
 
 
-def reference(case: str) -> list[tuple[float, float, float]]:
-    """v~, y~, mu~ of the quadruple-precision points of one kind."""
-    with (ROOT / "tests" / "data" / "points.csv").open(newline="") as stream:
-        rows = [row for row in csv.DictReader(stream) if row["case"] == case]
-    return [(float(row["v"]), float(row["y"]), float(row["mu_ratio"])) for row in rows]
-
-
-def _lam_samples(v: float, y: float, n: int) -> tuple[Array, float]:
-    """lam at ``n`` + 1 equidistant times of half a period of the continuous orbit, and its smallest value."""
-    w, out, _, _ = workspace()
-    if continuous(v, y, w, out) != OK:
-        raise ArithmeticError(f"no continuous orbit at v~ = {v!r}, y~ = {y!r}")
-    start, least = -(out[ANGLE] + out[CHART] * HALF), float(out[MIN_SPEED])
-    samples = np.empty(n + 1)
-    for i, sigma in enumerate(np.linspace(-HALF, HALF, n + 1)):
-        th = start
-        if i:
-            chart = 1 if start > 0.75 else 0
-            slip(v, y, -HALF, 0, start - chart * HALF, chart, float(sigma), False, w, out)
-            th = out[ANGLE] + out[CHART] * HALF
-        samples[i] = v * math.cos(th) - y * math.sin(sigma) * math.sin(th)
-    return samples, least
-
-
 def grazing() -> str:
     """Short windows of stick just below the border."""
     y = 1.0
@@ -63,9 +39,9 @@ def grazing() -> str:
     rows = []
     for gap in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8):
         v = crit * (1.0 - gap)
-        samples, least = _lam_samples(v, y, 100)
-        full = solve(v, y)
-        rows.append([f"{gap:.0e}", str(int((samples < 0.0).sum())), f"{least:.1e}", f"{full.stick_fraction:.3e}"])
+        at, full = interpolant(orbit(v, y)[2]), solve(v, y)
+        negative = sum(at(tau) < 0.0 for tau in np.linspace(0.0, math.pi, 101))
+        rows.append([f"{gap:.0e}", str(negative), f"{full.min_slip_speed:.1e}", f"{full.stick_fraction:.3e}"])
     header = ("1 - v~/v~crit", "of 101 samples below 0", "smallest lam", "stick fraction, solved")
     return f"y~ = 1, lam along the orbit that slides all the time:\n\n{markdown(header, rows)}"
 

