@@ -34,7 +34,7 @@ def c_header(quick: bool) -> str:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_c(surrogate.table, folder)
-        sources = [DRIVER, folder / "mumacro.c", folder / "mumacro_table.c", f"-I{folder}"]
+        sources: list[str | Path] = [DRIVER, folder / "mumacro.c", folder / "mumacro_table.c", f"-I{folder}"]
         for compiler in filter(shutil.which, ("gcc", "clang")):
             for options in OPTIONS:
                 progress(row := f"`{compiler} {options}`")

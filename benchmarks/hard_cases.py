@@ -28,10 +28,6 @@ Array = NDArray[np.float64]
 HALF = 0.5 * math.pi
 
 
-def g(x: float) -> str:
-    return quantity(float(x), 2)
-
-
 def grazing() -> str:
     """Short windows of stick just below the border."""
     y = 1.0
@@ -64,7 +60,7 @@ def surplus() -> str:
             found.append((abs(out[SIGMA] - orbit[SIGMA_0]), abs(naive - mu) / mu, abs(full.mu_ratio - mu) / mu))
     spread, lost, kept = map(max, zip(*found, strict=True))
     head = ("points below the border", "slip and stick miss half a period by", "mu~ off by", "surplus taken out")
-    return markdown(head, [[str(len(found)), g(spread), g(lost), g(kept)]])
+    return markdown(head, [[str(len(found)), quantity(spread), quantity(lost), quantity(kept)]])
 
 
 def double_root() -> str:
@@ -87,7 +83,15 @@ def double_root() -> str:
             a = mpmath.cos(th) + v * dd
             b = mpmath.sin(th) + y * (mpmath.cos(at + dd) - mpmath.cos(at))
             exact = float(a * a + b * b - 1)
-        rows.append([f"{d:.0e}", f"{exact:.6e}", f"{naive:.6e}", g(abs(naive / exact - 1)), g(abs(ours / exact - 1))])
+        rows.append(
+            [
+                f"{d:.0e}",
+                f"{exact:.6e}",
+                f"{naive:.6e}",
+                quantity(abs(naive / exact - 1)),
+                quantity(abs(ours / exact - 1)),
+            ]
+        )
     header = ("time since the onset", "exact", "naive", "its rel error", "rel error, root divided out")
     return f"v~ = {v}, y~ = {y}:\n\n{markdown(header, rows)}"
 
@@ -99,11 +103,11 @@ def creep() -> str:
         progress(f"marching at v~ = {v:g}, y~ = {y:g}")
         marched, full = march(v, y), solve(v, y)
         cycles = f"{marched.cycles}" + ("" if marched.agreed else " *")
-        off = g(abs(marched.mu_ratio - full.mu_ratio))
+        off = quantity(abs(marched.mu_ratio - full.mu_ratio))
         rows.append([f"{v:g}", f"{y:g}", full.regime.replace("_", "-"), cycles, off])
     text = markdown(("v~", "y~", "regime", "cycles", "error when it stops"), rows, 3)
     here = max(abs(solve(v, y).mu_ratio - mu) / mu for v, y, mu in reference("creep"))
-    return f"{text}\n\nThe solver here, at the reference points of creep: max rel error {g(here)}."
+    return f"{text}\n\nThe solver here, at the reference points of creep: max rel error {quantity(here)}."
 
 
 def _corner(radius: Array, psi: Array) -> tuple[Array, Array, Array]:
@@ -124,7 +128,7 @@ def exact_eta() -> str:
     for radius in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5):
         v, eta, _ = (float(x) for x in _corner(np.array(radius), np.array(0.25 * math.pi)))
         exact, rounded = solve(v, 1.0 + eta, eta).mu_ratio, solve(v, 1.0 + eta).mu_ratio
-        rows.append([f"{radius:.0e}", f"{v:.1e}", f"{eta:.1e}", g(abs(rounded / exact - 1))])
+        rows.append([f"{radius:.0e}", f"{v:.1e}", f"{eta:.1e}", quantity(abs(rounded / exact - 1))])
     header = ("R", "v~", "y~ - 1", "rel change of mu~ by rounding y~")
     return f"psi = pi/4:\n\n{markdown(header, rows, 0)}"
 
@@ -172,7 +176,7 @@ def cusp() -> str:
             _fit_error(n, spans, ratio, phi, s0, inside / phi),
             _fit_error(n, ((0.0, 0.8), (0.0, HALF)), polar, radius, psi, inside / phi),
         )
-        rows.append([f"{n} x {n}", *map(g, errors)])
+        rows.append([f"{n} x {n}", *map(quantity, errors)])
     header = ("Chebyshev nodes", "mu~ on (ln v~, ln y~)", "mu~/phi on (phi, s0)", "mu~/phi on (R, psi)")
     return (
         "Largest absolute error at 2,000 random points; the two right columns over R <= 0.8, the left one over v~ in "
@@ -186,7 +190,7 @@ def small_amplitude() -> str:
     rows = []
     for y in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
         full = solve(v, y)
-        rows.append([f"{y:.0e}", f"{full.deficit:.6e}", g(abs((1.0 - full.mu_ratio) / full.deficit - 1))])
+        rows.append([f"{y:.0e}", f"{full.deficit:.6e}", quantity(abs((1.0 - full.mu_ratio) / full.deficit - 1))])
     header = ("y~", "1 - mu~, solved", "rel error of 1 - fl(mu~)")
     return f"v~ = {v:g}:\n\n{markdown(header, rows, 0)}"
 
@@ -205,7 +209,7 @@ def short_stick() -> str:
         for sigma in (s0 + d, s1 + math.pi):  # s1 = s0 + d - pi is measured from the far turn and rounded there
             slip(v, y, sigma, -1, x, chart, HALF, True, w, out)
             slid.append(float(out[SUM_UX]))
-        rows.append([f"{y:.0e}", f"{d:.2e}", g(abs(slid[1] / slid[0] - 1))])
+        rows.append([f"{y:.0e}", f"{d:.2e}", quantity(abs(slid[1] / slid[0] - 1))])
     header = ("y~", "length of stick", "rel change of the slip's share of mu~, far turn")
     return f"v~ = 0.9 v~crit:\n\n{markdown(header, rows, 0)}"
 

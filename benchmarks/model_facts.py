@@ -3,7 +3,7 @@
 python benchmarks/model_facts.py [--write]
 """
 
-from benchmarks.measuring import main, markdown, sections  # isort: split
+from benchmarks.measuring import main, markdown, quantity, sections  # isort: split
 
 import math
 from typing import Any
@@ -12,7 +12,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from benchmarks.hard_cases import g
 from benchmarks.validation import interpolant, orbit
 from builder.steady import border, solve
 from mumacro import closed_forms
@@ -77,7 +76,7 @@ def next_terms() -> str:
     fast, y = 100.0, 2.0
     first = float(closed_forms.outer(y / fast)) - solve(fast, y).mu_ratio
     both = first + float(closed_forms.second_order(y / fast)) / (fast * fast)
-    text = f"At v~ = {fast:g}, y~ = {y:g} (35) is off by {g(abs(first))}, with the second term by {g(abs(both))}. "
+    text = f"At v~ = {fast:g}, y~ = {y:g} (35) is off by {quantity(abs(first))}, with the second term by {quantity(abs(both))}. "
     rows = []
     for v in (0.1, 0.5, 1.0, 3.0):
         y = 0.1

@@ -148,16 +148,10 @@ def mutants(only: str, jobs: int) -> str:
     return f"{markdown(('file', 'fault', 'result'), rows, 3)}\n\n{killed} of {len(rows)} killed."
 
 
-def main() -> int:
-    """The command line; exit code 1 unless all are killed."""
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="faults whose file or text holds this")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    text = mutants(**vars(parser.parse_args()))
-    print(text)
-    found = text.split()[-4:]
-    return found[0] != found[2]
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    print(text := mutants(**vars(parser.parse_args())))
+    killed, _, tried, _ = text.split()[-4:]
+    raise SystemExit(killed != tried)

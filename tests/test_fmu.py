@@ -14,27 +14,19 @@ from mumacro import Surrogate
 from mumacro.contact import CONTACTS, DIRECTIONS
 from mumacro.inputs import FIELDS
 from tests import compilers
-from tests.cases import CASE, tables
+from tests.cases import CASE, PAIRS, as_kind, tables
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 
-FORMATS = {"fmu": 2, "fmu3": 3}
 table = tables(1e-4)
 
 
-@pytest.fixture(scope="module")
-def units(table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Both units by format."""
-    root = tmp_path_factory.mktemp("fmu")
-    for kind in FORMATS:
-        export_table(table.path, kind, root / f"{kind}.fmu")
-    return {kind: root / f"{kind}.fmu" for kind in FORMATS}
-
-
-@pytest.fixture(params=FORMATS)
-def unit(request: pytest.FixtureRequest, units: Any) -> Any:
-    return units[request.param]
+@pytest.fixture(scope="module", params=["fmu", "fmu3"])
+def unit(request: pytest.FixtureRequest, table: Surrogate, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("fmu") / f"{request.param}.fmu"
+    export_table(table.path, request.param, made)
+    return made
 
 
 @pytest.fixture
@@ -146,23 +138,21 @@ def test_directional_derivatives_are_the_gradient(unit: Path, fmpy: Any, table: 
             assert adjoint == close([2.0 * slope for slope in gradient.values()], rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("contact", "direction"), [("ball", "across"), ("spring", "along"), ("ball", "along"), ("spring", "normal")]
-)
-def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, contact: Any, direction: Any) -> None:
-    kind = {"contact": CONTACTS.index(contact), "direction": DIRECTIONS.index(direction)}
-    case = {name: value for name, value in CASE.items() if direction != "normal" or name != "y0"}
-    case |= {"Fz_amplitude": 4.0} if direction == "normal" else {}
+@pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
+def test_other_contacts(unit: Path, fmpy: Any, table: Surrogate, tmp_path: Path, pair: Any) -> None:
+    kind = {"contact": CONTACTS.index(pair[0]), "direction": DIRECTIONS.index(pair[1])}
+    said, fields, _ = as_kind(CASE, pair)
+    case = {name: {**CASE, "Fz_amplitude": 4.0}[name] for name in fields}
     made = Loaded(fmpy, unit, tmp_path, **kind)
     made.put(Fz_amplitude=4.0)
     assert made.get(*kind, whole=True) == list(kind.values())
     for v0 in 10.0 ** np.linspace(-4.0, 1.0, 21):
         made.put(v0=v0)
-        answer = table.evaluate({**case, "v0": v0}, contact=contact, direction=direction, groups=True)
+        answer = table.evaluate({**case, "v0": v0}, **said, groups=True)
         expected = [answer.mu_macro, answer.y_tilde, answer.mu_macro * CASE["Fz"]]
         assert made.get("mu_macro", "y_tilde", "force") == close(expected, rel=1e-13)
     made.put(v0=CASE["v0"])
-    exact = table.evaluate(case, contact=contact, direction=direction, gradient=True).gradient
+    exact = table.evaluate(case, **said, gradient=True).gradient
     for name in (*FIELDS, "Fz_amplitude"):
         assert made.slope("mu_macro", **{name: 1.0}) == close(exact.get(name, 0.0), rel=1e-9)
     for name, wrong in (("contact", -1), ("contact", 2), ("direction", -1), ("direction", 3), ("source", 0)):
