@@ -83,15 +83,8 @@ def double_root() -> str:
             a = mpmath.cos(th) + v * dd
             b = mpmath.sin(th) + y * (mpmath.cos(at + dd) - mpmath.cos(at))
             exact = float(a * a + b * b - 1)
-        rows.append(
-            [
-                f"{d:.0e}",
-                f"{exact:.6e}",
-                f"{naive:.6e}",
-                quantity(abs(naive / exact - 1)),
-                quantity(abs(ours / exact - 1)),
-            ]
-        )
+        off = (quantity(abs(one / exact - 1.0)) for one in (naive, ours))
+        rows.append([f"{d:.0e}", f"{exact:.6e}", f"{naive:.6e}", *off])
     header = ("time since the onset", "exact", "naive", "its rel error", "rel error, root divided out")
     return f"v~ = {v}, y~ = {y}:\n\n{markdown(header, rows)}"
 

@@ -76,7 +76,7 @@ def next_terms() -> str:
     fast, y = 100.0, 2.0
     first = float(closed_forms.outer(y / fast)) - solve(fast, y).mu_ratio
     both = first + float(closed_forms.second_order(y / fast)) / (fast * fast)
-    text = f"At v~ = {fast:g}, y~ = {y:g} (35) is off by {quantity(abs(first))}, with the second term by {quantity(abs(both))}. "
+    off = f"{quantity(abs(first))}, with the second term by {quantity(abs(both))}"
     rows = []
     for v in (0.1, 0.5, 1.0, 3.0):
         y = 0.1
@@ -87,7 +87,8 @@ def next_terms() -> str:
         cells = [f"{(first - deficit) / y**4:.6f}", f"{second:.6f}", f"{-blend / y**4:.6f}"]
         rows.append([f"{v:g}", *cells, f"{1.0 / (16.0 * (1.0 + v * v) ** 3):.6f}"])
     header = ("v~", "(mu~ - (31))/y~^4", "derived", "(E - mu~)/y~^4", "derived")
-    return f"{text}At y~ = 0.1, solved; both differ from the derived terms by O(y~^2):\n\n{markdown(header, rows, 0)}"
+    text = f"At v~ = {fast:g}, y~ = 2 (35) is off by {off}. At y~ = 0.1, solved; both differ from the derived terms by "
+    return f"{text}O(y~^2):\n\n{markdown(header, rows, 0)}"
 
 
 SECTIONS = sections(limits, creep, contact, next_terms)
