@@ -42,11 +42,8 @@ def started(program: str) -> float:
 
 
 def processes(quick: bool) -> str:
-    medians = {
-        name: statistics.median(started(program) for _ in range(1 if quick else 5))
-        for name, program in PROCESSES.items()
-    }
-    rows = [[name, quantity(seconds)] for name, seconds in medians.items()]
+    rounds = range(1 if quick else 5)
+    rows = [[name, quantity(statistics.median(started(text) for _ in rounds))] for name, text in PROCESSES.items()]
     return markdown(["a new process, median of 5", "[s]"], rows)
 
 

@@ -13,8 +13,7 @@ LEFT_OUT = {"mumacro.__main__", "mumacro._kernel"}  # the second is no module of
 for package in ("jax", "torch"):  # hundreds of megabytes, needed only by their own tests
     if importlib.util.find_spec(package) is None:
         LEFT_OUT.add(f"mumacro.{package}")
-WALKED = (module.name for module in pkgutil.walk_packages(mumacro.__path__, "mumacro."))
-MODULES = sorted({"mumacro", *WALKED} - LEFT_OUT)
+MODULES = sorted({"mumacro", *(one.name for one in pkgutil.walk_packages(mumacro.__path__, "mumacro."))} - LEFT_OUT)
 
 
 @pytest.mark.parametrize("name", MODULES)
