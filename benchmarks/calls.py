@@ -1,9 +1,13 @@
-"""Time of one call, and a point of large arrays; beside scipy's elliptic integral."""
+"""Time of one call, a point of large arrays, and a new process; beside scipy's elliptic integral and numpy."""
 
-from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
+from benchmarks.measuring import ROOT, best_of, main, markdown, quantity  # isort: split
 
+import statistics
+import subprocess
+import sys
 import timeit
 from functools import partial
+from time import perf_counter
 
 import numpy as np
 from scipy.special import ellipk
@@ -23,6 +27,24 @@ ARRAYS = {
     "evaluate, v0 and y0 arrays": "s.evaluate(**many)",
     "evaluate, gradient=True": "s.evaluate(**many, gradient=True)",
 }
+PROCESSES = {
+    "`import numpy`, for comparison": "import numpy",
+    "`import mumacro`": "import mumacro",
+    "one case, `s.evaluate(...)`": f"import mumacro; mumacro.open().evaluate(**{CASE})",
+}
+
+
+def started(program: str) -> float:
+    """Seconds from the start of a process to its end."""
+    begun = perf_counter()
+    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
+    return perf_counter() - begun
+
+
+def processes(quick: bool) -> str:
+    rounds = range(1 if quick else 5)
+    rows = [[name, quantity(statistics.median(started(text) for _ in rounds))] for name, text in PROCESSES.items()]
+    return markdown(["a new process, median of 5", "[s]"], rows)
 
 
 def calls(points: int, quick: bool) -> str:
@@ -38,7 +60,8 @@ def calls(points: int, quick: bool) -> str:
         work = {name: partial(timeit.timeit, text, globals=names, number=number) for name, text in statements.items()}
         best = best_of(2 if quick else 15, work)
         tables.append(markdown([kind, f"[{unit}]"], [[name, quantity(t / number * scale)] for name, t in best.items()]))
-    return "\n\n".join([f"Table 1e-10, kernel of the level {mumacro.library.kernels[-1].level}.", *tables])
+    said = f"Table 1e-10, kernel of the level {mumacro.library.kernels[-1].level}."
+    return "\n\n".join([said, *tables, processes(quick)])
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 """Cost of a ball and of oscillation along and normal beside one spring; and the errors of the ball's rules.
 
-python benchmarks/contacts.py            # nanoseconds a point, one thread, log-uniform points
-python benchmarks/contacts.py --errors   # the constants of mumacro/contact.py, measured anew
+python benchmarks/contacts.py --only costs    # nanoseconds a point, one thread, log-uniform points
+python benchmarks/contacts.py --only errors   # the constants of mumacro/contact.py, measured anew
 """
 
-import argparse
+from benchmarks.measuring import main, markdown, sections  # isort: split
+
 import functools
 import timeit
 from collections.abc import Iterator
@@ -19,9 +20,9 @@ from tests.cases import TOLERANCES, Array, opened
 KINDS = {"spring": None, "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
 
 
-def costs() -> None:
+def costs() -> str:
     """Beside one spring, per kind and table: v~ from 1e-6 to 1e4, y~ from 1e-4 to 1e4."""
-    rng = np.random.default_rng(1)
+    rng, rows = np.random.default_rng(1), []
     v, y = 10.0 ** rng.uniform(-6, 4, 400), 10.0 ** rng.uniform(-4, 4, 400)
     for tolerance in TOLERANCES:
         s = Surrogate.open(tolerance, threads=1)
@@ -32,7 +33,8 @@ def costs() -> None:
             ask = functools.partial(batch.values, 0, s._data, v, amplitude, threads=1, kind=kind)
             each = min(timeit.repeat(ask, number=1, repeat=7)) / v.size
             spring = spring or each
-            print(f"{tolerance:g} {name:10} {1e9 * each:7.0f} ns, {each / spring:6.1f} springs")
+            rows.append((name, f"{tolerance:g}", f"{1e9 * each:.0f}", f"{each / spring:.1f}"))
+    return markdown(("contact", "table", "ns", "springs"), rows)
 
 
 RULES, MANY, HUGE = 5, 160, 1e6  # pieces; nodes of what counts as exact; a constant beside which rounding is nothing
@@ -87,7 +89,7 @@ def largest(error: Array, scale: Array) -> float:
     return float(np.nanmax(np.where(np.isfinite(share), share, 0.0)))
 
 
-def errors(count: int = 15_000) -> None:
+def errors(count: int = 15_000) -> str:
     """Every rule against one with :data:`MANY` nodes, alone in the kernel: what ``mumacro.contact._RULES`` states.
 
     The kernel's own scales: the bound of a rule whose constant is huge.  Tables without errors leave the bounds that
@@ -117,8 +119,9 @@ def errors(count: int = 15_000) -> None:
             error = np.maximum(np.abs(true[0] - rule[0]) - true[1] - rule[1] - rounding, 0.0)
             yield error, *((bound[1] - rule[1]) / HUGE for bound in high)
 
+    said = list[str]()
     for tolerance, pieces in contact._RULES.items():
-        print(f"    {tolerance!r}: (")
+        said.append(f"    {tolerance!r}: (")
         for piece, (nodes, *_) in enumerate(pieces):
             constants = np.array([[largest(error, scale) for scale in both]
                                   for error, *both in compared("across", piece, nodes)]).T.tolist()  # fmt: skip
@@ -131,11 +134,10 @@ def errors(count: int = 15_000) -> None:
                 constants[0] += [largest(mu, of_mu[0]), left, largest(stick, of_stick)]
                 constants[1] += [largest(mu, of_mu[1]), relative, 0.0]
             rows = ("(" + ", ".join(f"{1.5 * x:.2g}" for x in row) + ")" for row in constants)
-            print(f"        ({nodes}, {', '.join(rows)}),")
-        print("    ),")
+            said.append(f"        ({nodes}, {', '.join(rows)}),")
+        said.append("    ),")
+    return "\n".join(said)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--errors", action="store_true")
-    errors() if parser.parse_args().errors else costs()
+    main(__doc__, sections(costs, errors))

@@ -1,6 +1,6 @@
 """Time of mu~ inside other programs: one point, arrays, a loop of 1,000 steps; scipy's ellipk beside it.
 
-PyTorch is measured where it is installed.  Times in brackets are of the release that called Python back.
+PyTorch is measured where it is installed.
 """
 
 from benchmarks.measuring import best_of, main, markdown, quantity  # isort: split
@@ -24,7 +24,6 @@ import mumacro
 from mumacro.jax import Friction as InJax
 
 STEPS = 1000
-BEFORE = {("JAX", 0): "278", ("JAX", 3): "254", ("PyTorch", 0): "157"}
 GLUE = """#include "mumacro.h"
 int ratio(const double **in, double **out, long long *iw, double *w, int mem) {
     return out[0][0] = mumacro_mu_ratio(in[0][0], in[1][0]), 0;
@@ -86,15 +85,14 @@ def interop(quick: bool) -> str:
         "scipy.special.ellipk": (lambda v, _: ellipk(v), lambda x: x, lambda c: loop(ellipk, c)),
     }
     rows = {name: [name] for name in ways}
-    for i, (points, number, unit) in enumerate([(0, 2000, 1e6), (1000, 200, 1e6), (n, 1, 1e9 / n), (None, 1, 1e3)]):
+    for points, number, unit in ((0, 2000, 1e6), (1000, 200, 1e6), (n, 1, 1e9 / n), (None, 1, 1e3)):
         work = {}
         for name, (call, made, steps) in ways.items():
             given = [0.1] if points is None else [made(x[:points] if points else float(x[0])) for x in (v, y)]
             once = functools.partial(steps if points is None else call, *given)
             work[name] = functools.partial(timeit.timeit, once, number=number)
         for name, seconds in best_of(15, work).items():
-            before = BEFORE.get((name, i))
-            rows[name].append(quantity(seconds / number * unit) + (f" ({before})" if before else ""))
+            rows[name].append(quantity(seconds / number * unit))
     head = ["mu~", "one point [us]", "1,000 [us]", f"{n:,} [ns each]", f"{STEPS:,} steps [ms]"]
     return markdown(head, list(rows.values()))
 

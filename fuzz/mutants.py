@@ -83,7 +83,7 @@ FAULTS = [Fault(*row) for row in (
     ("mumacro/surrogate.py", "self.border.max_rel_error + 4.0 * charts.ROUNDING", "0.5 * self.border.max_rel_error + 4.0 * charts.ROUNDING", f"{TIGHT} -k regime"),
     ("mumacro/settling.py", "2.0 * periods, time", "periods, time", "tests/test_settling.py"),
     ("mumacro/inverse/solve.py", "_Y_CLOSEST = 1.290791", "_Y_CLOSEST = 2.290791", "tests/test_inverse.py"),
-    ("mumacro/inverse/rootfinding.py", "2.0 * np.abs(step) <= np.abs(last[i])", "True", "tests/test_inverse.py tests/test_rootfinding.py"),
+    ("mumacro/inverse/rootfinding.py", "2.0 * np.abs(step) <= np.abs(last[i])", "True", "tests/test_inverse.py"),
     ("mumacro/law.py", "_CORNER_REACH, _CORNER_TOP = 0.5, 0.7", "_CORNER_REACH, _CORNER_TOP = 0.9, 0.7", "tests/test_law.py tests/test_closed_forms.py"),
     ("mumacro/closed_forms.py", "1 - q / 20", "1 - q / 21", "tests/test_closed_forms.py -m ''"),
     ("mumacro/jax.py", "return sum(slope * tangent for", "return -sum(slope * tangent for", "tests/test_derivatives.py -k jax -m ''"),
@@ -148,16 +148,10 @@ def mutants(only: str, jobs: int) -> str:
     return f"{markdown(('file', 'fault', 'result'), rows, 3)}\n\n{killed} of {len(rows)} killed."
 
 
-def main() -> int:
-    """The command line; exit code 1 unless all are killed."""
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="faults whose file or text holds this")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    text = mutants(**vars(parser.parse_args()))
-    print(text)
-    found = text.split()[-4:]
-    return found[0] != found[2]
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    print(text := mutants(**vars(parser.parse_args())))
+    killed, _, tried, _ = text.split()[-4:]
+    raise SystemExit(killed != tried)

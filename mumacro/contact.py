@@ -132,7 +132,7 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
 _POWERS = ((1, 2), (2, 4), (2, 1), (2, 2), (1, 2))
 #: tolerance of a table -> for each piece of the integral (kernel/contact.c) the number of nodes; the largest errors at
 #: any legal v~ and y~, absolute and relative, see mumacro_rule in kernel/data.h, and half of them added.
-#: ``python benchmarks/contacts.py --errors`` prints these rows.
+#: ``python benchmarks/contacts.py --only errors`` prints these rows.
 _RULES: dict[float, tuple[tuple[int, tuple[float, ...], tuple[float, ...]], ...]] = {
     0.0001: (
         (8, (1.3e-06, 1.6e-07, 0, 2.4e-06, 3.4e-06), (0.54, 1.5, 0, 0.26, 1.5)),

@@ -60,7 +60,7 @@ def test_the_page_of_the_tables_is_what_its_script_prints() -> None:
     assert tables_readme.tables(build=False, workers=2).strip() in section
 
 
-SLOW = {"model", "angles", "stiffness", "layer", "cusp", "creep"}
+SLOW = {"model", "angles", "stiffness", "cusp", "creep"}
 SECTIONS = [
     pytest.param(section, id=f"{script}-{name}", marks=[pytest.mark.slow] if name in SLOW else [])
     for script in ("validation", "validity", "model_facts", "hard_cases")
@@ -80,7 +80,7 @@ def test_a_section_is_a_table_of_finite_numbers(section: Any) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "cold_start --quick", "solver --quick"])
+@pytest.mark.parametrize("script", ["calls --quick", "c_header --quick", "solver --quick"])
 def test_a_script_prints_tables_of_finite_numbers(script: str) -> None:
     check(run(*script.split()))
 

@@ -21,9 +21,8 @@ from tests.comparing import close
 
 pytestmark = pytest.mark.slow
 Shown = dict[str, list[Panel]]  # by figure
-AMPLITUDES: dict[
-    str, tuple[Any, Callable[..., Any]]
-] = {  # of the figures whose lines are mu~ at these y~, over v~ times the scale
+#: of the figures whose lines are mu~ at these y~, over v~ times the scale
+AMPLITUDES: dict[str, tuple[Any, Callable[..., Any]]] = {
     "fig08_cuts": (np.arange(21) * 0.1, lambda _: 1.0),
     "fig10_large_amplitude": (np.arange(1, 101) * 0.8, lambda y: y),
 }

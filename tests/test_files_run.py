@@ -165,7 +165,7 @@ def test_the_command_given_again_finds_all_done(tmp_path: Path, cases: Any, caps
 def test_a_killed_run_goes_on_with_the_same_bytes(tmp_path: Path, repository: Path, cases: Any, kind: Any) -> None:
     source, out, log = tmp_path / "cases.csv", tmp_path / f"out.{kind}", tmp_path / f"out.{kind}.parts" / "log"
     header, *rows = (cases / "cases.csv").read_text().splitlines(keepends=True)
-    source.write_text("".join([header, *(200 * rows)]))
+    source.write_text("".join([header, *(100 * rows)]))
     command, kills = [sys.executable, "-m", "mumacro", "eval", str(source), "-o"], 0
     for pause in (0.0, 0.01, 0.05, 0.2):
         process = subprocess.Popen([*command, str(out)], cwd=repository, stdout=-3, stderr=-3)

@@ -23,8 +23,6 @@ CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5}
 CASES = [CASE, {**CASE, "y0": 3e-6}, {**CASE, "y0": 9e-6}, {**CASE, "y0": 0.0}, {**CASE, "omega": 0.0},
          {**CASE, "k": math.inf}, {**CASE, "omega": 1e9}, {**CASE, "omega": 1.0}]  # fmt: skip
 NUMBER, WHOLE, ARRAY = ctypes.c_double, ctypes.c_int, ctypes.POINTER(ctypes.c_double)
-
-
 table = tables(1e-4)
 
 

@@ -1,8 +1,6 @@
 """Labels are kept: pandas, xarray and Dask objects in, the same types out; Dask stays lazy until compute()."""
 
 import math
-import os
-import signal
 from typing import Any
 
 import numpy as np
@@ -17,8 +15,6 @@ from tests.cases import CASE, Case, tables
 N = 60
 VALUES = ("mu_macro", "mu_ratio", "error_bound", "source_code", "v_tilde", "y_tilde", "length_scale")
 ALL = (*VALUES, "regime", "source", "regime_code", "regime_certain")
-
-
 table = tables(1e-7)
 
 
@@ -42,10 +38,6 @@ def same(found: Any, expected: Any) -> None:
     for name in ("gradient", "gradient_bound"):
         for field in FIELDS:
             np.testing.assert_array_equal(np.asarray(getattr(found, name)[field]), getattr(expected, name)[field])
-
-
-def names_of(values: Any) -> list[str]:
-    return ["" if isinstance(x, float) or x is None else str(x) for x in np.asarray(values, dtype=object)]
 
 
 # --- pandas -------------------------------------------------------------------------------------------
@@ -73,7 +65,7 @@ def test_regime_and_source_of_pandas_are_categories_without_one_for_illegal_case
     for name, kinds in (("regime", REGIMES), ("source", SOURCES)):
         assert isinstance(found[name].dtype, pd.CategoricalDtype)
         assert list(found[name].cat.categories) == list(kinds)
-        assert names_of(found[name]) == getattr(expected, name).tolist()
+        assert found[name].astype(object).fillna("").tolist() == getattr(expected, name).tolist()
         assert found[name].isna().tolist() == (expected.source_code == -1).tolist()
     np.testing.assert_array_equal(found["mu_macro"], expected.mu_macro)
     assert found.groupby("regime", observed=True)["mu_ratio"].count().sum() == N - 2
@@ -111,13 +103,10 @@ def test_numbers_and_arrays_go_beside_series(table: Surrogate) -> None:
 
 
 def test_integers_and_missing_values_of_pandas(table: Surrogate) -> None:
-    v0 = pd.Series([1, None, 3], dtype="Int64")
-    found = table.evaluate(**{**CASE, "v0": v0})
-    assert found.source_code.tolist()[1] == -1
-    assert found.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
-    assert table.evaluate(**{**CASE, "v0": pd.Series([0.01, None, 0.02])}).mu_macro.isna().tolist() == [
-        False, True, False,
-    ]  # fmt: skip
+    for v0 in (pd.Series([1, None, 3], dtype="Int64"), pd.Series([1.0, None, 3.0])):
+        found = table.evaluate(**{**CASE, "v0": v0})
+        assert found.mu_macro.isna().tolist() == (found.source_code == -1).tolist() == [False, True, False]
+        assert found.mu_macro[0] == table.evaluate(**{**CASE, "v0": 1.0}).mu_macro
 
 
 def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
@@ -139,8 +128,6 @@ def test_policies_hold_for_labels_too(table: Surrogate) -> None:
         table.evaluate(frame.drop(columns="Fz"))
     with pytest.raises(InputError, match=r"^v0 must be given once"):
         table.evaluate(frame, v0=1.0)
-    with pytest.raises(InputError, match=r"^k must be given"):
-        table.evaluate(frame.drop(columns="k"))
     with pytest.raises(InputError, match=r"^v0 must be a real number"):
         table.evaluate(frame.assign(v0="fast"))
     with pytest.raises(InputError, match="objects of one library"):
@@ -252,30 +239,6 @@ def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surr
     assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [False, True, False]
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_loses_a_worker_gives_the_same_bits(table: Surrogate) -> None:
-    dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
-    v0 = xr.DataArray(np.geomspace(1e-4, 1.0, 40_000), dims="case")
-    whole = table.evaluate(**{**CASE, "v0": v0})
-    lazy = table.evaluate(**{**CASE, "v0": v0.chunk(case=1000)}).mu_macro
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
-    start = "fork" if hasattr(os, "fork") else "spawn"  # forked workers need not load everything again
-    with (
-        dask.config.set({"distributed.worker.multiprocessing-method": start}),
-        distributed.LocalCluster(processes=True, **options) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        numbers = client.run(os.getpid)
-        chunks = distributed.futures_of(begun := client.persist(lazy))
-        distributed.wait(chunks, timeout=300, return_when="FIRST_COMPLETED")
-        (keeper, *_), *_ = (places for places in client.who_has(chunks).values() if places)
-        assert not all(chunk.done() for chunk in chunks)
-        os.kill(numbers[keeper], signal.SIGKILL)  # what it has computed so far is lost
-        np.testing.assert_array_equal(begun.compute().values, whole.mu_macro.values)
-        assert keeper not in client.run(os.getpid)
-
-
 # --- names and units; other tables --------------------------------------------------------------------
 
 
@@ -353,10 +316,3 @@ def test_a_query_of_duckdb_gives_arrays(table: Surrogate) -> None:
     )
     v0 = query.fetchnumpy()["v0"]
     np.testing.assert_array_equal(table.evaluate(query).mu_macro, table.evaluate({**CASE, "v0": v0}).mu_macro)
-
-
-def test_what_has_no_columns_by_name_is_refused_with_its_type_and_a_remedy(table: Surrogate) -> None:
-    for cases, kind in (([1.0], "builtins.list"), ("cases", "builtins.str")):
-        with pytest.raises(InputError, match=r"Arrow table.*\{name: array\}.*read_all\(\)") as caught:
-            table.evaluate(cases)
-        assert kind in str(caught.value)

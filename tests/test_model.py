@@ -5,13 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.polynomial import polynomial
 from scipy.integrate import solve_ivp
 
-from builder.model import ANGLE, CHART, FALL, MIN_SPEED, NO_STICK, OK, PATH, SIGMA, STEPS, SUM_UX, TURNED, WORK, slip
+from builder.model import ANGLE, CHART, NO_STICK, OK, PATH, SIGMA, STEPS, SUM_UX, TURNED, WORK, slip
 from builder.radau import RADAU_DIFF, RADAU_NODES, RADAU_WEIGHTS
-from builder.series import COS_TAU, ORDER, SPEED, X, series
-from builder.steady import border, continuous, workspace
+from builder.steady import workspace
 from builder.stick import stick_excess
 from tests.cases import Array
 from tests.comparing import close
@@ -99,22 +97,6 @@ def test_time_may_count_from_either_turn(turn: int, sigma: float) -> None:
     assert counted[: WORK + 1] == close(out[: WORK + 1], abs=2e-14)
 
 
-@pytest.mark.parametrize("chart", [-1, 0, 1])
-def test_series_satisfies_the_equations_of_motion(chart: int) -> None:
-    v, y, sigma, x = 0.7, 1.9, 0.4, 0.3
-    w = workspace()[0]
-    series(v, y, -math.sin(sigma), -math.cos(sigma), x, chart, w)
-    for t in (0.0, 0.02, 0.05):
-        th = chart * HALF + polynomial.polyval(t, w[X][: ORDER + 1])
-        c = -math.sin(sigma + t)
-        assert polynomial.polyval(t, w[COS_TAU][: ORDER + 1]) == close(c, abs=1e-15)
-        rate = polynomial.polyval(t, np.polynomial.polynomial.polyder(w[X][: ORDER + 1]))
-        assert rate == close(y * c * math.cos(th) - v * math.sin(th), abs=4e-15)
-        assert polynomial.polyval(t, w[SPEED][: ORDER + 1]) == close(
-            v * math.cos(th) + y * c * math.sin(th), abs=4e-15
-        )  # fmt: skip
-
-
 # --- stick --------------------------------------------------------------------------------------------
 
 
@@ -154,19 +136,6 @@ def test_slip_ends_where_the_slip_speed_vanishes_first(v: float, y: float) -> No
 def test_slip_without_an_end_has_its_own_status() -> None:
     w, out, _, _ = workspace()
     assert slip(3.0, 0.5, -HALF, 0, 0.1, 0, HALF, True, w, out) == NO_STICK
-
-
-@pytest.mark.parametrize("y", [0.05, 0.5, 1.0, 3.0, 50.0, 1e4])
-def test_a_dip_below_zero_between_two_positive_samples_is_found(y: float) -> None:
-    """1e-9 below the border lam is negative for less than 1e-4 of the period and by 1e-9 of itself."""
-    crit, _ = border(y)
-    w, out, _, _ = workspace()
-    assert continuous(crit * (1.0 - 1e-9), y, w, out) == OK
-    assert -1e-8 * crit < out[MIN_SPEED] < 0.0
-    assert math.isfinite(out[FALL])  # the angle where it falls below zero
-    assert continuous(crit * (1.0 + 1e-9), y, w, out) == OK
-    assert 0.0 < out[MIN_SPEED] < 1e-8 * crit
-    assert math.isnan(out[FALL])
 
 
 # --- collocation --------------------------------------------------------------------------------------

@@ -103,8 +103,5 @@ def test_digits_are_those_that_the_uncertainty_leaves() -> None:
 def test_bad_cases_are_named(surrogate: Surrogate, changed: Any, said: Any) -> None:
     with pytest.raises((InputError, TypeError), match=said):
         model_rows(surrogate, {**CASE, **changed})
-
-
-def test_the_uncertainty_of_k_is_positive(surrogate: Surrogate) -> None:
     with pytest.raises(InputError, match="known must be finite and > 0"):
         k_effect(surrogate, CASE, known=0.0)

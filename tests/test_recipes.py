@@ -61,8 +61,3 @@ def test_files_over_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, e
         pq.write_table(table.slice(0, 1 + i % 2), tmp_path / "runs" / f"{i}.parquet")
     assert run("Files over a cluster", "distributed")["rows"] == [1, 2, 1]
     assert pq.read_table(tmp_path / "runs" / "1.out.parquet")["mu_macro"].to_pylist() == list(expected)
-
-
-def test_every_recipe_has_a_test() -> None:
-    recipes = {line.removeprefix("### ") for line in PAGE.splitlines() if line.startswith("### ")}
-    assert recipes == {"DuckDB", "Files over a cluster"}

@@ -22,7 +22,7 @@ from tests.cases import Case
 pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 from fuzz import answers, faults, tables
-from fuzz.hostile_tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
+from fuzz.tables import ANOTHER, HARMLESS, HOSTILE, SMALLEST
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +131,11 @@ def test_a_fault_loses_no_data(name: str) -> None:
     if what == "not tried":
         pytest.skip(seen)
     assert what == "held", seen
+
+
+@pytest.mark.slow
+def test_a_killed_build_resumes_to_the_same_data(tmp_path: Path) -> None:
+    assert "1 kills, 1 starts from finished parts" in faults.killed_builds(tmp_path, kills=1)
 
 
 def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Path) -> None:

@@ -26,7 +26,6 @@ pytestmark = pytest.mark.slow
 
 TABLES = sorted((Path(__file__).parent.parent / "tables").glob("*.nc"))
 N = 200_000
-forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 
 
 @pytest.fixture(scope="module")
@@ -98,17 +97,11 @@ def workers() -> Iterator[Any]:
         parallel = pytest.importorskip("joblib")
         return parallel.Parallel(2, backend="loky")([parallel.delayed(function)(argument)] * 2)[0]
 
-    def distributed(function: Any, argument: Any) -> Any:
-        library = pytest.importorskip("distributed")
-        with library.Client(processes=False, n_workers=1, dashboard_address=None) as client:
-            return client.submit(function, argument).result()
-
     yield pytest.param(executor(lambda: ThreadPoolExecutor(1)), id="threads")
     for method in ("fork", "spawn") if hasattr(os, "fork") else ("spawn",):
         context = multiprocessing.get_context(method)
         yield pytest.param(executor(lambda c=context: ProcessPoolExecutor(1, mp_context=c)), id=method)
     yield pytest.param(joblib, id="joblib")
-    yield pytest.param(distributed, id="dask distributed")
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -174,52 +167,15 @@ def _ask(seed: int) -> bytes:
     return everything(_here, N, seed)
 
 
-@pytest.fixture
-def inherited(table: Surrogate) -> Surrogate:
-    """The table after a large call, stored for a forked child."""
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*")
+def test_forked_workers_give_the_same_bits_and_so_does_the_parent_afterwards(table: Surrogate) -> None:
     global _here
-    table.mu_ratio(*points(N))
-    _here = table
-    return table
-
-
-def child(work: Callable[[], bytes]) -> bytes:
-    """The result of ``work`` in a forked child, within a minute."""
-    read, write = os.pipe()
-    number = os.fork()
-    if number == 0:
-        try:
-            os.close(read)
-            with os.fdopen(write, "wb") as out:
-                out.write(work())
-            os._exit(0)
-        finally:
-            os._exit(1)
-    os.close(write)
-    timer = threading.Timer(60.0, os.kill, (number, 9))
-    timer.start()
-    with os.fdopen(read, "rb") as stream:
-        found = stream.read()
-    _, status = os.waitpid(number, 0)
-    timer.cancel()
-    assert status == 0
-    return found
-
-
-@forks
-@pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_a_forked_child_gives_the_same_bits(inherited: Surrogate) -> None:
-    assert child(lambda: _ask(1)) == everything(inherited)
-    # a child of the child, and the parent afterwards
-    assert child(lambda: child(lambda: _ask(2))) == everything(inherited, N, 2)
-
-
-@forks
-@pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_forked_workers_give_the_same_bits(inherited: Surrogate) -> None:
-    expected, context = [everything(inherited, N, seed) for seed in range(4)], multiprocessing.get_context("fork")
+    _here, context = table, multiprocessing.get_context("fork")
+    expected = [everything(table, N, seed) for seed in range(4)]  # large calls before the fork
     with ProcessPoolExecutor(2, mp_context=context) as executor:
         assert list(executor.map(_ask, range(4), timeout=120)) == expected
+    assert everything(table) == expected[1]
 
 
 @pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))

@@ -17,10 +17,7 @@ from mumacro.closed_forms import outer
 from tests.cases import CASE, Array, Case, log_uniform, tables
 from tests.comparing import close
 
-table = tables()
-
-
-fine = tables(1e-7)
+table, fine = tables(), tables(1e-7)
 
 
 # --- answers at the edges -----------------------------------------------------------------------------
@@ -110,9 +107,7 @@ def test_bounds_of_the_companions_are_finite_and_small_at_random_points(table: S
     rng = np.random.default_rng(8)
     v, y = log_uniform(rng, 1e-100, 1e100, 50_000), log_uniform(rng, 1e-100, 1e100, 50_000)
     power, of_power = table.power_with_bound(v, y)
-    stick, of_stick = table.stick_fraction_with_bound(v, y)
-    assert np.array_equal(power, table.power(v, y))
-    assert np.array_equal(stick, table.stick_fraction(v, y))
+    _, of_stick = table.stick_fraction_with_bound(v, y)
     assert np.all(np.isfinite(of_power) & (of_power > 0.0))
     assert np.all((of_stick >= 0.0) & (of_stick <= math.sqrt(table.border.max_rel_error) + 20.0 * table.tolerance))
     # the bound is small relative to the power, except for denormal numbers

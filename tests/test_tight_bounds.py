@@ -25,8 +25,6 @@ from tests.comparing import close
 
 KINDS = [kind for kind, _, _ in CASES]
 Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds
-
-
 table = tables(1e-7)
 
 
