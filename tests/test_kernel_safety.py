@@ -18,7 +18,7 @@ DRIVER = Path(__file__).parent / "c" / "sanitized.c"
 CHECKS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 #: instructions that the compiler may use, and by how many doubles at a time the kernel then computes
 NATIVE = {"base": 2, "avx2": 4, "avx512": 8}[library.kernels[-1].level]
-RANDOM, NASTY, TABLES = 30_000, 172_800, 300
+RANDOM, NASTY, TABLES = 100_000, 172_800, 300
 
 
 @pytest.mark.parametrize(("option", "lanes"), [("-march=native", NATIVE), ("-DMUMACRO_ONE_LANE", 1), ("-O1", 2)])

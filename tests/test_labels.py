@@ -1,6 +1,8 @@
 """Labels are kept: pandas, xarray and Dask objects in, the same types out; Dask stays lazy until compute()."""
 
 import math
+import os
+import signal
 from typing import Any
 
 import numpy as np
@@ -237,6 +239,30 @@ def test_an_illegal_value_of_a_chunk_is_reported_when_it_is_computed(table: Surr
     with pytest.raises(InputError, match="v0 at index 1"):
         found.mu_macro.compute(scheduler="threads")
     assert np.isnan(table.evaluate(**{**CASE, "v0": v0}).mu_macro.compute()).tolist() == [False, True, False]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_loses_a_worker_gives_the_same_bits(table: Surrogate) -> None:
+    dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
+    v0 = xr.DataArray(np.geomspace(1e-4, 1.0, 40_000), dims="case")
+    whole = table.evaluate(**{**CASE, "v0": v0})
+    lazy = table.evaluate(**{**CASE, "v0": v0.chunk(case=1000)}).mu_macro
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    start = "fork" if hasattr(os, "fork") else "spawn"  # forked workers need not load everything again
+    with (
+        dask.config.set({"distributed.worker.multiprocessing-method": start}),
+        distributed.LocalCluster(processes=True, **options) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        numbers = client.run(os.getpid)
+        chunks = distributed.futures_of(begun := client.persist(lazy))
+        distributed.wait(chunks, timeout=300, return_when="FIRST_COMPLETED")
+        (keeper, *_), *_ = (places for places in client.who_has(chunks).values() if places)
+        assert not all(chunk.done() for chunk in chunks)
+        os.kill(numbers[keeper], signal.SIGKILL)  # what it has computed so far is lost
+        np.testing.assert_array_equal(begun.compute().values, whole.mu_macro.values)
+        assert keeper not in client.run(os.getpid)
 
 
 # --- names and units; other tables --------------------------------------------------------------------
