@@ -21,8 +21,6 @@ except ModuleNotFoundError as error:
         "(in a checkout: pip install -e '.[service]')"
     ) from None
 
-__all__ = ["main"]
-
 _OPTIONS = ("host", "port", "tables", "workers", "log_level")
 
 

@@ -23,11 +23,6 @@ from mumacro.interval import middle
 
 from .case import PLAIN, Asked
 
-__all__ = [
-    "DEFAULT", "INTERVAL", "QUANTITIES", "REGIME_NAMES", "SOURCES", "Cases", "Part", "Quantity", "Wanted",
-    "answer_case", "answer_columns", "nested", "of_amplitude", "register", "said", "where",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 #: name of the regime of every source code

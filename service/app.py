@@ -30,8 +30,6 @@ from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 from .wire.json import dump
 
-__all__ = ["Application", "create_app"]
-
 ENDPOINTS = [
     endpoint for module in (case, batch, questions, contact, table, health, docs, page) for endpoint in module.ENDPOINTS
 ]

@@ -34,11 +34,6 @@ from mumacro.interval import BOUND, ENDS
 
 from .problems import FieldFault, Kind, RequestError, refuse
 
-__all__ = [
-    "INPUTS", "LEAST", "LIKE", "MAX_ERRORS", "PLAIN", "Asked", "Columns", "Reason", "asked_of", "bound_of", "checked",
-    "columns_of", "faults_in", "joined", "names_of", "not_finite", "number", "stranger", "too_large",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 #: the bad field, or None for the case as a whole, and why
 Reason = tuple[str | None, str]

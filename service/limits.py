@@ -22,8 +22,6 @@ from mumacro.processors import processors
 from .problems import Kind, RequestError
 from .settings import Settings
 
-__all__ = ["AT_ONCE", "SMALL_BODY", "Slots", "Work", "check_head", "drained", "holder_of", "media_type_of", "read_body"]
-
 T = TypeVar("T")
 SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
 AT_ONCE = 4000.0  # largest cost without a thread, in times of a plain case: under half a millisecond

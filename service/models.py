@@ -9,11 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 from .answers import DEFAULT, INTERVAL, QUANTITIES, Part, nested, of_amplitude
 from .quantities import INCLUDES
 
-__all__ = [
-    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "Strict",
-    "TableAnswer", "TableLabel", "default", "grouped", "included", "many", "model", "optional", "told",
-]  # fmt: skip
-
 _create: Any = create_model
 
 

@@ -28,16 +28,15 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
+from mumacro.charts import SOURCES
 from mumacro.errors import MumacroError
 
-from .answers import REGIME_NAMES, SOURCES
+from .answers import REGIME_NAMES
 from .limits import check_head, drained, holder_of
 from .problems import Kind, RequestError, problem_of
 from .routes import Routes, path_of
 from .settings import Settings
 from .tables import LoadedTable, Tables
-
-__all__ = ["LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
 
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})

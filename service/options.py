@@ -25,12 +25,6 @@ from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
 
-__all__ = [
-    "MODEL", "NAMES", "OPTIONS", "Case", "CaseColumns", "CaseRequest", "Choice", "Five", "Name", "NotNegative",
-    "Options", "Positive", "bounded", "example", "includes", "input_fields", "kind_in", "options_of", "query_of",
-    "read_form", "relation",
-]  # fmt: skip
-
 _TEXTS = {
     "mu0": "Coulomb friction coefficient of the contact",
     "Fz": "Normal force",

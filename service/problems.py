@@ -23,8 +23,6 @@ from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs import BOUNDS, number_hint, unknown_name
 from mumacro.inputs import NAMES as INPUTS
 
-__all__ = ["FieldFault", "Kind", "RequestError", "document_of", "faults_of", "problem_of", "refuse"]
-
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()

@@ -13,8 +13,6 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from .problems import Kind, RequestError, problem_of
 
-__all__ = ["Connection"]
-
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
 _PIECE = 2048  # bytes of a head that are read before its fields are counted

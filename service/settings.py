@@ -13,8 +13,6 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-__all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
-
 PREFIX = "MUMACRO_"
 _MAX_AGE_S = 3600
 

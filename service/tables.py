@@ -11,8 +11,6 @@ from mumacro import Surrogate, TableError
 from . import API_VERSION
 from .problems import FieldFault, Kind, RequestError, refuse
 
-__all__ = ["LoadedTable", "Tables", "table_files"]
-
 _log = logging.getLogger("mumacro.tables")
 
 

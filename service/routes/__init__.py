@@ -26,10 +26,6 @@ from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import decode
 
-__all__ = [
-    "Asking", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "in_thread", "path_of", "reply",
-]  # fmt: skip
-
 _JSON = "application/json"
 _AS_JSON = _JSON.encode()
 _WHY = {

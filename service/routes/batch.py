@@ -23,8 +23,6 @@ from ..wire import Batch, Form, forms
 from ..wire.json import decode, dump
 from . import Endpoint, given_in_query
 
-__all__ = ["ENDPOINTS"]
-
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case

@@ -14,8 +14,6 @@ from ..problems import FieldFault, refuse
 from ..wire.json import dump
 from . import Asking, Endpoint, reply
 
-__all__ = ["ENDPOINTS"]
-
 PATH = "/v1/mu-macro"
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
 

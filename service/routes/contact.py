@@ -16,19 +16,18 @@ from mumacro.contact import AMPLITUDE, ContactName, DirectionName
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
 from mumacro.geometries import ARGUMENTS, GEOMETRIES, contact_of
+from mumacro.inputs import NAMES as INPUTS
 from mumacro.inputs import RIGID, is_rigid
 from mumacro.measured import STD, UNKNOWNS
 
 from .. import API_VERSION
-from ..case import INPUTS, Asked, not_finite, stranger
+from ..case import Asked, not_finite, stranger
 from ..models import Answered, Strict, many, model, optional, told
 from ..options import NAMES, Choice, Positive, bounded, input_fields, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
 from . import Endpoint, given_in_body, in_thread, reply
-
-__all__ = ["ENDPOINTS"]
 
 _MODULI = ("E", "E2")  # which the word rigid may stand for
 _Poisson = Annotated[float, Field(gt=-1.0, le=0.5)]

@@ -8,8 +8,6 @@ from starlette.responses import Response
 from . import Endpoint, file_answer, in_thread, reply
 from .page import asset
 
-__all__ = ["ASSETS", "ENDPOINTS"]
-
 _FOLDER = Path(__file__).resolve().parent.parent / "static" / "swagger-ui"
 ASSETS = {
     "swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css", "start.js": "text/javascript",

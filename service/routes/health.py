@@ -9,8 +9,6 @@ from ..models import Health
 from ..wire.json import dump
 from . import Endpoint, reply
 
-__all__ = ["ENDPOINTS"]
-
 _NO_STORE = {"Cache-Control": "no-store"}
 _VERSIONS = {"api_version": API_VERSION, "service_version": __version__}
 

@@ -12,8 +12,6 @@ from ..options import CaseRequest
 from ..wire.json import dump
 from . import Endpoint, file_answer, in_thread, reply
 
-__all__ = ["ASSETS", "ENDPOINTS", "FOLDER", "POLICY"]
-
 FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(FOLDER.iterdir()) if path.suffix in _TYPES}

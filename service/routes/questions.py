@@ -20,8 +20,6 @@ from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded
 from ..wire.json import dump
 from . import Asking, Endpoint, in_thread, reply
 
-__all__ = ["ENDPOINTS"]
-
 # --- friction law --------------------------------------------------------------------------------------
 
 MAX_POINTS = 10_001

@@ -16,9 +16,6 @@ from ..tables import LoadedTable
 from ..wire.json import dump
 from . import Endpoint, file_answer, given_in_query, reply
 
-__all__ = ["ENDPOINTS"]
-
-
 _tolerance = bounded("finite and > 0", "Wanted error of mu_macro/mu0 [-]", None)
 Table = model("Table", "Choice of a table; the tightest by default.", Strict, tolerance=(Positive | None, _tolerance))
 

@@ -18,8 +18,6 @@ from ..case import MAX_ERRORS, Columns, asked_of, faults_in, names_of, stranger
 from ..problems import FieldFault, refuse
 from ..tables import LoadedTable
 
-__all__ = ["Batch", "Form", "check_names", "forms", "text_form"]
-
 
 def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]) -> None:
     """Refuse columns that such cases lack, do not have, or have twice; ``more`` are other reasons, by name."""

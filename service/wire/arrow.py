@@ -17,8 +17,6 @@ from ..problems import Kind, RequestError
 from . import Batch, Form, check_names, text_form
 from .json import dump
 
-__all__ = ["FORM"]
-
 _SLICE = 32768  # cases of a record batch of the answer
 
 

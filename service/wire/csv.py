@@ -17,8 +17,6 @@ from ..options import kind_in
 from ..problems import Kind, RequestError
 from . import Batch, Form, check_names, text_form
 
-__all__ = ["FORM"]
-
 _LONGEST_LINE = 64 * 1024  # characters
 _SLICE = 4096  # lines that are read or written at a time
 _DIGITS = b"0123456789.eE+-"

@@ -24,16 +24,15 @@ import simdjson
 
 from mumacro.contact import SPRING
 from mumacro.contact import Kind as ContactKind
-from mumacro.inputs import RAD_PER_CYCLE
+from mumacro.inputs import LIKE, RAD_PER_CYCLE
+from mumacro.inputs import NAMES as INPUTS
 
 from ..answers import Part, nested
-from ..case import INPUTS, LIKE, MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, names_of, too_large
+from ..case import MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, names_of, too_large
 from ..options import OPTIONS, example, kind_in, options_of
 from ..options import Options as OptionsModel
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
-
-__all__ = ["FORMS", "decode", "dump", "read"]
 
 NAMES = (*INPUTS, *LIKE, "k_range", *OPTIONS)
 _MEMBERS = 18  # of one object: the inputs and the options
