@@ -43,7 +43,7 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
         }
         for name, known in UNITS_OF.items()
     }  # fmt: skip
-    inputs[AMPLITUDE] = {**inputs["Fz"], "bound": BOUNDS["y0"], "positive": False}
+    inputs[AMPLITUDE] = {**inputs["Fz"], "bound": BOUNDS[AMPLITUDE], "positive": False}
     geometries = {
         name: {"meaning": one.meaning, "arguments": [*one.arguments, *BODIES]} for name, one in GEOMETRIES.items()
     }

@@ -20,7 +20,7 @@ from mumacro.inputs import NAMES as INPUTS
 from mumacro.interval import BOUND, ENDS
 
 from .answers import QUANTITIES, Wanted, said
-from .case import LEAST, PLAIN, Asked, asked_of, bound_of, checked
+from .case import LEAST, PLAIN, Asked, asked_of, checked
 from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
@@ -170,7 +170,7 @@ def options_of(
     model: type[Model], given: Mapping[str, Any], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
     """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
-    fields, own, rest = _names(model)[0], {}, given
+    fields, own, rest = names_in(model)[0], {}, given
     if not fields.isdisjoint(given):
         rest = dict(given)
         own = {name: rest.pop(name) for name in given if name in fields}
@@ -193,7 +193,7 @@ _valid: dict[tuple[Any, str], Any] = {}  # most requests have the options of ano
 
 
 @cache
-def _names(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
+def names_in(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
     """The names of the options, and of all that a request may have."""
     return frozenset(model.model_fields), (*NAMES, "k_range", *ENDS, *model.model_fields)
 
@@ -216,7 +216,7 @@ def read_form(
         with suppress(InputError):  # which is among the faults
             kind = kind_in(given)
     asked = asked_of(rest, kind)
-    values, more = checked(rest, left_out, null_is_rigid, _names(model)[1], asked)  # type: ignore[arg-type]
+    values, more = checked(rest, left_out, null_is_rigid, names_in(model)[1], asked)  # type: ignore[arg-type]
     if form is None or more:
         refuse([*faults, *more])
     return form, values, form.wanted(asked, one)
@@ -236,10 +236,9 @@ def input_fields(
         entry: Any = float | Literal["rigid"] if name == "k" else float
         kind = kind | Literal["rigid"] if name == "k" else kind
         kind = kind | None if name in ("omega", "f") or (name == "k" and null) else kind
-        bound = BOUNDS.get(name, bound_of(name))
         more = {"examples": [example[name]]} if name in shown else {}
         default = None if name in optional or name in LIKE else ...
-        info = bounded(bound, f"{text} [{unit_of(name)}]", default, **more)
+        info = bounded(BOUNDS[name], f"{text} [{unit_of(name)}]", default, **more)
         fields[name] = (kind | list[entry] if listed else kind, info)
     fields["k_range"] = (list[Positive] | None, bounded(BOUND, "In place of k: [low, high] [N/m]", None))
     return fields

@@ -58,9 +58,8 @@ class FieldFault:
         if self.value is not _NO_VALUE:
             entry["value"] = _shown(self.value)
         entry["reason"] = self.reason
-        if self.path and self.path[-1] in INPUTS:
-            name = "omega" if self.path[-1] == "f" else str(self.path[-1])
-            entry["bound"] = "finite and >= 0" if self.path[0] == "std" else BOUNDS[name]
+        if self.path and self.path[-1] in BOUNDS:
+            entry["bound"] = BOUNDS["v0" if self.path[0] == "std" else str(self.path[-1])]
         return entry
 
 

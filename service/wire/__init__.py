@@ -14,21 +14,16 @@ import numpy as np
 from mumacro.contact import Kind as ContactKind
 
 from ..answers import Codes, Part, Wanted, answer_columns
-from ..case import MAX_ERRORS, Columns, asked_of, faults_in, names_of, stranger
-from ..problems import FieldFault, refuse
+from ..case import MAX_ERRORS, Columns, columns_of
+from ..problems import FieldFault
 from ..tables import LoadedTable
 
 
 def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]) -> None:
     """Refuse columns that such cases lack, do not have, or have twice; ``more`` are other reasons, by name."""
-    asked = asked_of(names, kind)
-    known = names_of(asked)
-    faults = [FieldFault.of(name, stranger(name, asked, known)) for name in dict.fromkeys(names) if name not in known]
-    faults += [FieldFault.of(name, "is given more than once") for name in known if names.count(name) > 1]
-    faults += [FieldFault.of(name, reason) for name, reason in more.items() if name in known]
-    faults += faults_in(names, asked=asked)
-    if faults:
-        refuse(faults)
+    twice = {name: "is given more than once" for name in names if names.count(name) > 1}
+    faults = [FieldFault.of(name, reason) for name, reason in {**more, **twice}.items()]
+    columns_of({name: [] for name in names}, 0, faults=faults, kind=kind)
 
 
 @dataclass
