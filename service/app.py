@@ -25,14 +25,12 @@ from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .observe import Metrics, Observe
 from .options import Case, CaseColumns
 from .problems import problem_of
-from .routes import Routes, batch, case, contact, docs, health, page, questions, table
+from .routes import Routes, batch, case, contact, page, questions, table
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 from .wire.json import dump
 
-ENDPOINTS = [
-    endpoint for module in (case, batch, questions, contact, table, health, docs, page) for endpoint in module.ENDPOINTS
-]
+ENDPOINTS = [endpoint for module in (case, batch, questions, contact, table, page) for endpoint in module.ENDPOINTS]
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and oscillates across the "
     "sliding direction. Inputs in SI units; answers come from a table verified against the full model. "

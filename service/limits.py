@@ -6,6 +6,7 @@ A request that may take longer than one case needs a slot and runs in a thread. 
 
 import asyncio
 import os
+import re
 import secrets
 import sys
 import threading
@@ -29,6 +30,7 @@ QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
+_OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
 _ONCE = (b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
 
 
@@ -62,12 +64,9 @@ def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
 def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
     """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first."""
     given = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(known))
-    found = known.get(given)
-    if found is None:
-        media, _, parameters = given.partition(";")
-        charset = parameters.partition("charset=")[2].partition(";")[0].strip('" ')
-        found = known.get(media.strip()) if charset in ("", "utf-8", "utf8", "us-ascii") else None
-    if found is None:
+    media, _, parameters = given.partition(";")
+    found = known.get(media.strip())
+    if found is None or (parameters and _OTHER_CHARSET.search(parameters)):
         offer = ", ".join(dict.fromkeys(known.values()))
         told = f"send {offer}, not {given[:80]}"
         raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Post": offer})

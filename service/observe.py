@@ -34,7 +34,7 @@ from mumacro.errors import MumacroError
 from .answers import REGIME_NAMES
 from .limits import check_head, drained, holder_of
 from .problems import Kind, RequestError, problem_of
-from .routes import Routes, path_of
+from .routes import Routes
 from .settings import Settings
 from .tables import LoadedTable, Tables
 
@@ -219,7 +219,7 @@ class Observe:
         scope["request_id"] = identity
         if b"x-forwarded-for" in headers or b"x-forwarded-proto" in headers:
             await self._proxies(scope, receive, send)
-        path, status, holder = path_of(scope), 0, None
+        path, status, holder = str(scope["path"]).removeprefix(scope.get("root_path", "")), 0, None
 
         async def send_marked(message: Message) -> None:
             nonlocal status
@@ -234,7 +234,7 @@ class Observe:
             check_head(scope, headers)
             if self._keys and path not in self._open_paths and not path.startswith("/guide/"):
                 holder = holder_of(headers, self._keys)
-            answer = self._routes(path, scope["method"])
+            answer = self._routes.find(path, scope["method"])
             response = self._others if answer is None else await answer(Request(scope, receive))
             await response(scope, receive, send_marked)
         except ClientDisconnect:

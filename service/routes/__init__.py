@@ -27,7 +27,6 @@ from ..tables import LoadedTable
 from ..wire.json import decode
 
 _JSON = "application/json"
-_AS_JSON = _JSON.encode()
 _WHY = {
     400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
     401: "The service needs an API key, and none or a wrong one was sent",
@@ -96,31 +95,23 @@ class Endpoint:
         )  # fmt: skip
 
 
-class Routes:
-    """Finds the endpoint of a path, which has no parameters, and of a method."""
+class Routes(dict[str, dict[str, Answer]]):
+    """The functions that answer, by path, which has no parameters, and by method."""
 
     def __init__(self, endpoints: Iterable[Endpoint]) -> None:
-        self._found: dict[str, dict[str, Answer]] = {}
         for endpoint in endpoints:
-            methods = self._found.setdefault(endpoint.path, {})
-            for method in ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,):
-                methods[method] = endpoint.answer
+            methods = ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,)
+            self.setdefault(endpoint.path, {}).update(dict.fromkeys(methods, endpoint.answer))
 
-    def __call__(self, path: str, method: str) -> Answer | None:
+    def find(self, path: str, method: str) -> Answer | None:
         """The function that answers; None for a path of no endpoint."""
-        methods = self._found.get(path)
+        methods = self.get(path)
         if methods is None:
             return None
         if method in methods:
             return methods[method]
         allowed = ", ".join(sorted(methods))
-        told = f"{method[:20]} is not allowed here; allowed: {allowed}"
-        raise HTTPException(405, told, {"Allow": allowed})
-
-
-def path_of(scope: Scope) -> str:
-    """The path within this application: without the prefix of a proxy."""
-    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
+        raise HTTPException(405, f"{method[:20]} is not allowed here; allowed: {allowed}", {"Allow": allowed})
 
 
 # --- requests -------------------------------------------------------------------------------------------
@@ -146,8 +137,7 @@ class Asking(NamedTuple):
 async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
-    if headers.get(b"content-type") != _AS_JSON or b"content-encoding" in headers:
-        media_type_of(headers, {_JSON: _JSON})
+    media_type_of(headers, {_JSON: _JSON})
     limit = min(SMALL_BODY, request.app.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):
@@ -209,22 +199,14 @@ def _number(text: str) -> Any:
 class Reply(Response):
     """A complete answer; Starlette's own looks for what the headers may lack, which takes as long as a case."""
 
-    background = None
-
-    def __init__(self, content: bytes, headers: Mapping[str, str], media_type: str) -> None:
-        self.status_code, self.body = 200, content
+    def __init__(self, content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> None:
+        self.status_code, self.body, self.background = 200, content, None
         self.raw_headers = [(b"content-length", b"%d" % len(content)), (b"content-type", media_type.encode())]
-        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in (headers or {}).items()]
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        del scope, receive
+    async def __call__(self, _scope: Scope, _receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
         await send({"type": "http.response.body", "body": self.body})
-
-
-def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> Response:
-    """A complete answer."""
-    return Reply(content, headers or {}, media_type)
 
 
 async def in_thread(request: Request, work: Callable[[], Response]) -> Response:

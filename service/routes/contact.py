@@ -27,7 +27,7 @@ from ..options import NAMES, Choice, Positive, bounded, input_fields, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, in_thread, reply
+from . import Endpoint, Reply, given_in_body, in_thread
 
 _MODULI = ("E", "E2")  # which the word rigid may stand for
 _Poisson = Annotated[float, Field(gt=-1.0, le=0.5)]
@@ -45,7 +45,7 @@ async def post_stiffness(request: Request) -> Response:
     if faults:
         refuse(faults)
     found = asdict(contact_of(str(geometry), **{**given, **rigid}))
-    return reply(dump({"geometry": geometry, **found, "api_version": API_VERSION}))
+    return Reply(dump({"geometry": geometry, **found, "api_version": API_VERSION}))
 
 
 def _member(name: str) -> Any:
@@ -102,7 +102,7 @@ async def post_fit(request: Request) -> Response:
     if form is None or faults:
         refuse(faults)
     table = request.app.tables.pick(form.tolerance)
-    return await in_thread(request, lambda: reply(dump(_answer(table, form, columns))))
+    return await in_thread(request, lambda: Reply(dump(_answer(table, form, columns))))
 
 
 def _column(name: str, value: Any, faults: list[FieldFault]) -> Any:

@@ -18,7 +18,7 @@ from ..answers import REGIME_NAMES, Part, answer_columns, nested
 from ..models import Answered, default, grouped, included, many, model, optional, told
 from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes, relation
 from ..wire.json import dump
-from . import Asking, Endpoint, in_thread, reply
+from . import Asking, Endpoint, Reply, in_thread
 
 # --- friction law --------------------------------------------------------------------------------------
 
@@ -59,7 +59,7 @@ class LawOptions(_more, Options):  # type: ignore[misc]
 async def post_law(request: Request) -> Response:
     """Return the law in columns, with its static limit and its border."""
     found = await Asking.of(request, LawOptions, "along")
-    return await in_thread(request, lambda: reply(_as_json(found)))
+    return await in_thread(request, lambda: Reply(_as_json(found)))
 
 
 async def get_law_csv(request: Request) -> Response:
@@ -68,7 +68,7 @@ async def get_law_csv(request: Request) -> Response:
     name = f'attachment; filename="friction-law-{found.form.along}.csv"'
     headers = {"Content-Disposition": name, "Cache-Control": "no-cache"}
     kind = "text/csv; charset=utf-8; header=present"
-    return await in_thread(request, lambda: reply(_as_csv(found), headers, kind))
+    return await in_thread(request, lambda: Reply(_as_csv(found), headers, kind))
 
 
 def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
@@ -145,7 +145,7 @@ class SolveForOptions(Options):
 async def post_solve_for(request: Request) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
     found = await Asking.of(request, SolveForOptions, "unknown")
-    return await in_thread(request, lambda: reply(dump(_solved(found))))
+    return await in_thread(request, lambda: Reply(dump(_solved(found))))
 
 
 def _solved(found: Asking) -> dict[str, Any]:
