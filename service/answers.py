@@ -34,7 +34,7 @@ class Part:
     """One column of an answer.
 
     ``path`` is its name in flat formats; in JSON the dot makes an object.  A column of names holds codes, and ``names``
-    has the names by code.
+    has the names by code; -1 is none.
     """
 
     path: str
@@ -49,7 +49,7 @@ class Part:
 
     def values(self, column: Any) -> list[Any]:
         """The column as JSON has it; NaN is written as null."""
-        found = np.array(self.names, dtype=object)[column] if self.names else column
+        found = np.array((*self.names, None))[column] if self.names else column
         return list(found.tolist())
 
 

@@ -61,13 +61,13 @@ def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
         raise RequestError(Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade")
 
 
-def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
-    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first."""
+def form_of(headers: Mapping[bytes, bytes], known: Mapping[str, T]) -> T:
+    """What is known by the media type of a body; without a Content-Type it is the first."""
     given = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(known))
     media, _, parameters = given.partition(";")
     found = known.get(media.strip())
     if found is None or (parameters and _OTHER_CHARSET.search(parameters)):
-        offer = ", ".join(dict.fromkeys(known.values()))
+        offer = ", ".join(known)
         told = f"send {offer}, not {given[:80]}"
         raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Post": offer})
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.json_schema import SkipJsonSchema
-from pydantic_core import PydanticCustomError
 
 from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, ContactName, DirectionName, Kind, kind_of
 from mumacro.errors import InputError
@@ -58,11 +57,6 @@ Model = TypeVar("Model", bound="Choice")
 Asking = TypeVar("Asking", bound="Options")
 
 
-def relation(name: str, reason: str) -> PydanticCustomError:
-    """A fault in the relation of several fields, and the field to change."""
-    return PydanticCustomError("relation", "{field}: {reason}", {"field": name, "reason": reason})
-
-
 # --- options ------------------------------------------------------------------------------------------
 
 
@@ -79,10 +73,7 @@ class Choice(Strict):
 
     @model_validator(mode="after")
     def _together(self) -> Self:
-        try:
-            kind_of(self.contact, self.direction)
-        except InputError as error:
-            raise relation(error.field, f"must be {error.bound}") from None
+        kind_of(self.contact, self.direction)
         return self
 
     @cached_property
@@ -109,7 +100,7 @@ class InputStd(model("_InputStd", "", Strict, **_std)):  # type: ignore[misc]
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
         if self.omega and self.f:
-            raise relation("f", "give the standard deviation of omega or of f, not of both")
+            raise InputError("f", self.f, "left out beside omega: give the deviation of one of them, not of both")
         return self
 
 
@@ -124,29 +115,18 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
     @model_validator(mode="after")
     def _std_where_asked(self) -> Self:
         """Refuse standard deviations without ``std`` in ``include``, and the reverse."""
-        if self.std is None:
-            if "std" in (self.include or ()):
-                raise relation("std", "is required if include has std")
-            return self
-        if "std" not in (self.include or ()):
-            raise relation("std", "has no effect unless include has std")
+        if (self.std is None) == ("std" in (self.include or ())):
+            bound = "given if include has std" if self.std is None else "left out: no effect unless include has std"
+            raise InputError("std", self.std, bound)
         wrong = "y0" if self.kind.normal else AMPLITUDE
-        if getattr(self.std, wrong):
-            raise relation("std", f"has {wrong}, which direction {self.direction} does not have")
+        if self.std and getattr(self.std, wrong):
+            raise InputError("std", wrong, f"without {wrong}, which direction {self.direction} does not have")
         return self
 
     def wanted(self, asked: Asked, one: bool = False) -> Wanted:
         """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one`` case."""
-        found = self._wanted.get((asked, one))
-        if found is None:
-            found = self._wanted[asked, one] = self._checked(asked, one)
-        return found
-
-    @cached_property
-    def _wanted(self) -> dict[tuple[Asked, bool], Wanted]:
-        return {}
-
-    def _checked(self, asked: Asked, one: bool) -> Wanted:
+        if (asked, one) in self._wanted:
+            return self._wanted[asked, one]
         faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))  # once each, in order
         if not one and MODEL in (self.include or ()):
             faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))
@@ -160,7 +140,11 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
         std: dict[str, float] = {} if self.std is None else self.std.model_dump()
         if std:
             std["omega"] += RAD_PER_CYCLE * std.pop("f")
-        return Wanted(asked, include, std)
+        return self._wanted.setdefault((asked, one), Wanted(asked, include, std))
+
+    @cached_property
+    def _wanted(self) -> dict[tuple[Asked, bool], Wanted]:
+        return {}
 
 
 OPTIONS = tuple(Options.model_fields)

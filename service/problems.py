@@ -99,8 +99,9 @@ def faults_of(
             value, reason = _NO_VALUE, "is required"
         elif kind == "extra_forbidden":
             reason = unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS)
-        elif kind == "relation":  # between fields: the model names the one to change
-            path, value, reason = (*path, entry["ctx"]["field"]), _NO_VALUE, entry["ctx"]["reason"]
+        elif kind == "value_error":  # in the relation of several fields: InputError names the one to change
+            fault: InputError = entry["ctx"]["error"]
+            path, value, reason = (*path, fault.field), _NO_VALUE, f"must be {fault.bound}"
         elif kind == "float_type":
             reason = number_hint(str(path[0]), value)
         elif kind in ("greater_than_equal", "finite_number") and len(path) > 1:  # one of several numbers

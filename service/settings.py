@@ -6,7 +6,7 @@ names the variable, the value and what it must be; the value of the API key is n
 
 import os
 import re
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,22 +21,14 @@ class SettingsError(ValueError):
     """One or more settings cannot be used; the text says which, and what they must be."""
 
 
-def _split(separator: str) -> BeforeValidator:
+def _split(value: Any, separator: str = ",") -> Any:
     """``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
-
-    def split(value: object) -> object:
-        if not isinstance(value, str):
-            return value
-        return [part.strip() for part in value.split(separator) if part.strip()]
-
-    return BeforeValidator(split)
+    return [part.strip() for part in value.split(separator) if part.strip()] if isinstance(value, str) else value
 
 
-def _pairs(value: object) -> object:
-    """[``a=1``, ``b=2``] -> {``a``: ``1``, ``b``: ``2``}."""
-    if not isinstance(value, list):
-        return value
-    return {name.strip(): key for name, _, key in (part.partition("=") for part in value)}
+def _pairs(value: Any) -> Any:
+    """``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is."""
+    return dict(part.partition("=")[::2] for part in _split(value)) if isinstance(value, str) else value
 
 
 def _default_tables() -> tuple[Path, ...]:
@@ -77,7 +69,7 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
-    tables: Annotated[tuple[Path, ...], NoDecode, _split(os.pathsep)] = Field(
+    tables: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(partial(_split, separator=os.pathsep))] = Field(
         default_factory=_default_tables,
         min_length=1,
         description=f"a table file or a directory of *.nc files, or several joined by {os.pathsep!r}",
@@ -93,10 +85,10 @@ class Settings(BaseSettings):
     client_timeout_s: int = _whole(30, 1, 3600)
     time_limit_s: int = _whole(300, 1, 86400)
     api_key: Key | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
-    api_keys: Annotated[
-        dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), _split(","), AfterValidator(_one_name_each)
-    ] = Field(default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -")
-    cors_origins: Annotated[tuple[str, ...], NoDecode, _split(",")] = Field(
+    api_keys: Annotated[dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), AfterValidator(_one_name_each)] = Field(
+        default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -"
+    )
+    cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)] = Field(
         (), description="origins such as https://tool.example joined by commas, or *"
     )
     root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")

@@ -8,6 +8,7 @@ import inspect
 import string
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 from urllib.parse import parse_qsl
@@ -20,24 +21,14 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from ..answers import Wanted
-from ..limits import SMALL_BODY, media_type_of, read_body
+from ..limits import SMALL_BODY, form_of, read_body
 from ..options import NAMES, Options, query_of, read_form
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import decode
 
 _JSON = "application/json"
-_WHY = {
-    400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
-    401: "The service needs an API key, and none or a wrong one was sent",
-    408: "The request was not complete in time",
-    413: "The body or the batch is too large",
-    415: "The body has another media type",
-    416: "The file has no such part",
-    422: "Invalid, missing or unknown fields",
-    501: "The service was installed without a package that this needs",
-    503: "Not ready or overloaded; see Retry-After",
-}
+_TITLES = {code: "; ".join(kind.title for kind in Kind if kind.status == code) for code in {k.status for k in Kind}}
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()  # of a query that needs no decoding
 _PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
 _ID = {"X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}}
@@ -75,7 +66,7 @@ class Endpoint:
         statuses = {*self.statuses, *(() if self.open else (401, 503)), *((400, 422) if self.form else ())}
         statuses |= {408, 413, 415} if post else set()
         responses: dict[int | str, dict[str, Any]] = {200: {}, **self.content}
-        responses |= {code: {"description": _WHY[code], "content": _PROBLEM} for code in sorted(statuses)}
+        responses |= {code: {"description": _TITLES[code], "content": _PROBLEM} for code in sorted(statuses)}
         for code, response in responses.items():
             headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if code == 503 else {})}
             responses[code] = {**response, "headers": headers}
@@ -130,14 +121,14 @@ class Asking(NamedTuple):
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
         given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
         name = wanted and given.get(wanted, model.model_fields[wanted].default)
-        found = read_form(model, given, [name] if name and name in NAMES else [], one=one)
+        found = read_form(model, given, [name] if name in NAMES else [], one=one)
         return cls(request.app.tables.pick(found[0].tolerance), *found)
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
-    media_type_of(headers, {_JSON: _JSON})
+    form_of(headers, {_JSON: _JSON})
     limit = min(SMALL_BODY, request.app.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):
@@ -213,6 +204,20 @@ async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
     """The answer to the question of a person, made in a thread."""
     answer: Response = await request.app.work.question(work)
     return answer
+
+
+def question(model: type[Options], wanted: str) -> Callable[[Callable[[Asking], Response]], Answer]:
+    """Makes the function of a question about the input that the option ``wanted`` names an endpoint's."""
+
+    def made(work: Callable[[Asking], Response]) -> Answer:
+        @wraps(work)
+        async def answer(request: Request) -> Response:
+            found = await Asking.of(request, model, wanted)
+            return await in_thread(request, lambda: work(found))
+
+        return answer
+
+    return made
 
 
 class _File(FileResponse):

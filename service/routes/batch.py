@@ -6,6 +6,7 @@ line.  Computing and reading happen in threads.
 """
 
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
@@ -16,16 +17,22 @@ from mumacro.errors import MumacroError
 
 from ..answers import answer_case
 from ..case import Columns
-from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
+from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body
 from ..options import Options, options_of, read_form
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
-from ..wire import Batch, Form, forms
+from ..wire import Batch, Form, csv, json
 from ..wire.json import decode, dump
 from . import Endpoint, given_in_query
 
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
+_FORMS = [*json.FORMS, csv.FORM]
+if find_spec("pyarrow"):
+    from ..wire import arrow
+
+    _FORMS.append(arrow.FORM)
+FORMS = {name: form for form in _FORMS for name in (form.media_type, *form.aliases)}
 
 
 class _Answer(Response):
@@ -51,9 +58,7 @@ class _Answer(Response):
                 told = "is no option; inputs belong in the body"
                 if faults := [*faults, *(FieldFault((name,), told, parameter=True) for name in rest)]:
                     refuse(faults)
-                found = forms()
-                known = {name: form.media_type for form in found.values() for name in (form.media_type, *form.aliases)}
-                form = found[media_type_of(self._given, known)]
+                form = form_of(self._given, FORMS)
                 await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
             if self._placed:
@@ -204,7 +209,7 @@ async def post_mu_macro_batch(request: Request) -> Response:
     return _Answer(request)
 
 
-_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in forms().values()} for part in ("body", "answer"))
+_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in _FORMS} for part in ("body", "answer"))
 ENDPOINTS = [
     Endpoint(
         "/v1/mu-macro/batch", "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,

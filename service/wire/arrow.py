@@ -95,7 +95,7 @@ def _write(batch: Batch) -> Iterator[bytes]:
 def _record(batch: Batch, found: dict[str, Any], source: Any, faults: list[str | None]) -> Any:
     """One record batch.  Regime and source are dictionaries: one byte per case."""
     arrays = {}
-    for part in batch.parts:
+    for part in batch.wanted.parts:
         column = found[part.path]
         if part.names:
             names = list(dict.fromkeys(part.names))

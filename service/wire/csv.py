@@ -98,16 +98,10 @@ def _value(scale: Scale, text: str) -> Any:
 def _write(batch: Batch) -> Iterator[bytes]:
     text = io.StringIO()
     writer = csv.writer(text)
-    writer.writerow([*(part.path for part in batch.parts), "error"])
-    for found, source, faults in batch.slices(_SLICE):
-        bad = (source < 0).tolist()
-        columns = (
-            [
-                None if no or value != value else value
-                for no, value in zip(bad, part.values(found[part.path]), strict=True)
-            ]
-            for part in batch.parts
-        )
+    writer.writerow([*(part.path for part in batch.wanted.parts), "error"])
+    for found, _, faults in batch.slices(_SLICE):
+        shown = (part.values(found[part.path]) for part in batch.wanted.parts)
+        columns = ([None if value != value else value for value in column] for column in shown)
         writer.writerows(zip(*columns, faults, strict=True))
         yield text.getvalue().encode()
         text.seek(0)

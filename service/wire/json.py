@@ -208,19 +208,19 @@ def write(batch: Batch) -> Iterator[bytes]:
 
 def _write_columns(batch: Batch) -> Iterator[bytes]:
     slices = [found for found, _, _ in batch.slices(_ROWS)]
-    form = _form(batch.parts, b"[\0]")
-    for opening, part in zip(form, batch.parts, strict=False):
+    form = _form(batch.wanted.parts, b"[\0]")
+    for opening, part in zip(form, batch.wanted.parts, strict=False):
         for found in slices:
-            yield opening + _texts(part, found[part.path])
+            yield opening + _values(part, found[part.path])
             opening = b","
     yield form[-1][:-1] + b"," + dump(batch.end)[1:]
 
 
 def _write_rows(batch: Batch) -> Iterator[bytes]:
-    row = b"%b".join(text.replace(b"%", b"%%") for text in _form(batch.parts, b"\0"))
+    row = b"%b".join(text.replace(b"%", b"%%") for text in _form(batch.wanted.parts, b"\0"))
     opening = b'{"results":['
     for found, source, _ in batch.slices(_ROWS):
-        columns = [_texts(part, found[part.path]).split(b",") for part in batch.parts]
+        columns = [_values(part, found[part.path]).split(b",") for part in batch.wanted.parts]
         made = [row % cells for cells in zip(*columns, strict=True)] if source.size else []
         for i in np.flatnonzero(source < 0).tolist():
             made[i] = b"null"
@@ -235,13 +235,9 @@ def _form(parts: list[Part], place: bytes) -> list[bytes]:
     return text.replace(b'"\\u0000"', place).split(b"\0")
 
 
-def _texts(part: Part, column: Any) -> bytes:
+def _values(part: Part, column: Any) -> bytes:
     """The values of a column, separated by commas."""
-    if part.names:
-        # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
-        texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)])
-        return bytes(texts.take(column).tobytes().translate(None, b"\0")[:-1])
-    return dump(column)[1:-1]
+    return dump(part.values(column) if part.names else column)[1:-1]
 
 
 def _any_of(*names: str, **more: Any) -> dict[str, Any]:
