@@ -36,13 +36,10 @@ _DESCRIPTION = (
     "sliding direction. Inputs in SI units; answers come from a table verified against the full model. "
     "Errors are problem details (RFC 9457)."
 )
-# models that are described by name only
-_MORE: Any = [(Case, "validation"), (CaseColumns, "validation")]
-_MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
-_KEYS = {
-    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
-    "bearer": {"type": "http", "scheme": "bearer"},
-}
+#: models that are described by name only
+_MORE: Any = [(Case, "validation"), (CaseColumns, "validation"), (CaseAnswer, "serialization")]
+_MORE += [(model, "serialization") for model in (ColumnsAnswer, RowsAnswer, Problem)]
+_KEYS = {"key": {"type": "apiKey", "in": "header", "name": "X-API-Key"}, "bearer": {"type": "http", "scheme": "bearer"}}
 _log = logging.getLogger("mumacro.app")
 
 
@@ -73,7 +70,8 @@ class Application(FastAPI):
     def __init__(self, settings: Settings) -> None:
         super().__init__(
             title="mumacro", version=__version__, description=_DESCRIPTION, docs_url=None, redoc_url=None,
-            openapi_url=None, redirect_slashes=False, lifespan=_lifespan, exception_handlers={HTTPException: _problem},
+            openapi_url=None, redirect_slashes=False, lifespan=_lifespan,
+            exception_handlers={HTTPException: _problem},
             servers=[{"url": settings.root_path}] if settings.root_path else None,
         )  # fmt: skip
         self.settings, self.tables, self.work = settings, Tables(settings.tables), Work(settings)
@@ -114,16 +112,5 @@ class Application(FastAPI):
 
 
 def create_app(settings: Settings | None = None) -> Application:
-    """Return the application; its tables are loaded when it starts.
-
-    Parameters
-    ----------
-    settings : Settings, optional
-        Left out: read from the environment.
-
-    Raises
-    ------
-    SettingsError
-        The environment holds a bad setting.
-    """
+    """The application, whose tables are loaded when it starts; settings are read from the environment if left out."""
     return Application(load_settings() if settings is None else settings)

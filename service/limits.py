@@ -9,10 +9,10 @@ import os
 import re
 import secrets
 import sys
-import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from functools import partial
 from typing import TypeVar
 
 from starlette.requests import ClientDisconnect
@@ -86,10 +86,9 @@ async def read_body(
     while True:
         if size > limit:
             told = (
-                f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
-                "Content-Length if they are more, and read the answer while you send"
+                "send many cases to /v1/mu-macro/batch, more as NDJSON without a Content-Length, reading while you send"
             )
-            raise RequestError(Kind.BODY_TOO_LARGE, told, max_bytes=limit)
+            raise RequestError(Kind.BODY_TOO_LARGE, f"a body may have up to {limit} bytes: {told}", max_bytes=limit)
         if size > SMALL_BODY:
             large()
         if not more:
@@ -113,21 +112,13 @@ async def drained(receive: Receive) -> None:
                 more = message.get("more_body", False)
 
 
-def _stand_back() -> None:
-    """Lower the priority of this thread.  Linux only."""
-    if sys.platform == "linux":
-        with suppress(OSError):
-            thread = threading.get_native_id()
-            own = os.getpriority(os.PRIO_PROCESS, thread)
-            os.setpriority(os.PRIO_PROCESS, thread, min(19, own + _NICENESS))
-
-
 class Slots:
     """The right to run a large request: so many at the same time, and the threads that run them."""
 
-    def __init__(self, number: int, name: str, initializer: Callable[[], None] | None = None) -> None:
+    def __init__(self, number: int, name: str, niceness: int = 0) -> None:
         self.number, self.used, self._name = number, 0, name
-        self.threads = ThreadPoolExecutor(processors(), name, initializer=initializer)
+        stand_back = partial(os.nice, niceness) if sys.platform == "linux" else None  # where that is of the thread
+        self.threads = ThreadPoolExecutor(processors(), name, initializer=stand_back)
 
     def take(self) -> None:
         """Take a slot; the code that called this gives it back."""
@@ -139,17 +130,13 @@ class Slots:
         """Give a slot back."""
         self.used -= 1
 
-    async def run(self, work: Callable[[], T], cost: float) -> T:
-        """Do the work at once if it is small, else in a thread, so that it delays no other request."""
-        return work() if cost <= AT_ONCE else await asyncio.wrap_future(self.threads.submit(work))
-
 
 class Work:
     """The slots of one process, and the time limits."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self.batches = Slots(settings.max_batches, "batches", _stand_back)
+        self.batches = Slots(settings.max_batches, "batches", _NICENESS)
         self.questions = Slots(QUESTIONS, "questions")
 
     def close(self) -> None:

@@ -85,7 +85,7 @@ def grouped(parts: Iterable[Part], listed: bool, text: str) -> dict[str, Any]:
         if isinstance(found, dict):
             title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
             found = model(title, f"{text}.", **found), Field()
-        fields[name] = optional(found[0], found[1].description or "")
+        fields[name] = optional(found[0], found[1].description or "Only if requested")
     return fields
 
 
