@@ -149,11 +149,6 @@ class Wanted:
     std: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
-    def plain(self) -> bool:
-        """Whether it is nothing but the default outputs of one spring, across, at one k."""
-        return self.asked == PLAIN and not self.include
-
-    @cached_property
     def parts(self) -> list[Part]:
         """The columns of an answer, in order."""
         more = [part for name in self.include for part in QUANTITIES[name].parts]
@@ -164,11 +159,6 @@ class Wanted:
     def more(self) -> list[str]:
         """The paths of the columns beside the default ones."""
         return [part.path for part in self.parts[len(DEFAULT) :]]
-
-    @cached_property
-    def slopes(self) -> bool:
-        """Whether a quantity needs the gradient."""
-        return any(QUANTITIES[name].slopes for name in self.include)
 
     @cached_property
     def cost(self) -> float:
@@ -187,8 +177,8 @@ def of_amplitude(part: Part) -> Part:
 
 def said(asked: Asked) -> list[str]:
     """What is asked beside one spring, across, at one k."""
-    words = [word for word in asked.kind.names.values() if word in _COSTS]
-    return [*words, "k_range"] if asked.interval else words
+    words = (*asked.kind.names.values(), *(["k_range"] if asked.interval else []))
+    return [word for word in words if word in _COSTS]
 
 
 def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -208,7 +198,7 @@ def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
 
 def answer_case(surrogate: Surrogate, case: Mapping[str, Any], wanted: Wanted) -> tuple[dict[str, Any], int]:
     """The answer to one case as plain Python values, and the code of its source; InputError where it is not legal."""
-    if wanted.plain:
+    if wanted.asked is PLAIN and not wanted.include:
         macro, ratio, bound, code = surrogate.evaluate_case(*_six(case))
         return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)), code
     found, more = _evaluated(surrogate, case, wanted)
@@ -237,7 +227,8 @@ def _evaluated(surrogate: Surrogate, cases: Mapping[str, Any], wanted: Wanted) -
     """The library's answer, and the columns beside the default ones."""
     asked, include = wanted.asked, wanted.include
     words: dict[str, Any] = asked.kind.names
-    found = surrogate.evaluate(**cases, **words, gradient=wanted.slopes, groups=bool(include))
+    slopes = any(QUANTITIES[name].slopes for name in include)
+    found = surrogate.evaluate(**cases, **words, gradient=slopes, groups=bool(include))
     more = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
     if include:
         if asked.interval:

@@ -4,7 +4,6 @@ What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) i
 """
 
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from functools import cache, cached_property
 from types import NoneType
 from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
@@ -19,7 +18,7 @@ from mumacro.inputs import NAMES as INPUTS
 from mumacro.interval import BOUND, ENDS
 
 from .answers import QUANTITIES, Wanted, said
-from .case import LEAST, PLAIN, Asked, asked_of, checked
+from .case import LEAST, Asked, asked_of, checked
 from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
@@ -130,11 +129,10 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
         faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))  # once each, in order
         if not one and MODEL in (self.include or ()):
             faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))
-        for word in said(asked) if asked != PLAIN else ():
-            for name in include:
-                if word in QUANTITIES[name].lacks:
-                    told = f"{name} is not computed for {word}: {QUANTITIES[name].lacks[word]}"
-                    faults.append(FieldFault.of("include", told, name))
+        lacks = [(name, word, QUANTITIES[name].lacks.get(word)) for word in said(asked) for name in include]
+        for name, word, why in lacks:
+            if why is not None:
+                faults.append(FieldFault.of("include", f"{name} is not computed for {word}: {why}", name))
         if faults:
             refuse(faults)
         std: dict[str, float] = {} if self.std is None else self.std.model_dump()
@@ -183,8 +181,11 @@ def names_in(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
 
 
 def kind_in(given: Mapping[str, Any]) -> Kind:
-    """Contact and direction among checked options; raises InputError where they do not go together."""
-    return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
+    """Contact and direction; one spring across where they are bad, which is a fault of the options."""
+    try:
+        return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
+    except InputError:
+        return SPRING
 
 
 def read_form(
@@ -195,11 +196,7 @@ def read_form(
     form, rest, faults = options_of(model, given)
     if left_out:  # a null says the same
         rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
-    kind = form.kind if form is not None else SPRING
-    if form is None:
-        with suppress(InputError):  # which is among the faults
-            kind = kind_in(given)
-    asked = asked_of(rest, kind)
+    asked = asked_of(rest, form.kind if form is not None else kind_in(given))
     values, more = checked(rest, left_out, null_is_rigid, names_in(model)[1], asked)  # type: ignore[arg-type]
     if form is None or more:
         refuse([*faults, *more])

@@ -21,7 +21,6 @@ import orjson
 import simdjson
 from msgspec.structs import astuple
 
-from mumacro.contact import SPRING
 from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import RAD_PER_CYCLE
 
@@ -84,8 +83,7 @@ def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Col
         refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
     _, rest, faults = options_of(Options, given)
     options = {name: given[name] for name in OPTIONS if given.get(name) is not None}
-    kind = kind_in({**query, **options}) if not faults else SPRING
-    return columns_of(rest, max_batch, NAMES, faults, kind), options
+    return columns_of(rest, max_batch, NAMES, faults, kind_in({**query, **options})), options
 
 
 def _limit_values(text: bytearray, max_batch: int) -> None:
