@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.openapi.constants import REF_TEMPLATE
 from pydantic.json_schema import models_json_schema
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
@@ -78,7 +79,12 @@ class Application(FastAPI):
         self.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
         for endpoint in ENDPOINTS:
             endpoint.describe_to(self)
-        self.described = dump(self.openapi())
+        described = self.openapi()  # which FastAPI keeps
+        described["components"]["schemas"] |= models_json_schema(_MORE, ref_template=REF_TEMPLATE)[1]["$defs"]
+        if settings.keys():
+            described |= {"security": [{name: []} for name in _KEYS]}
+            described["components"]["securitySchemes"] = _KEYS
+        self.described = dump(described)
         # The pages are the same for everyone and hold no number.  They ask for the key and send it with every request.
         opened = {endpoint.path for endpoint in ENDPOINTS if endpoint.open}
         if settings.guide is not None:
@@ -98,17 +104,6 @@ class Application(FastAPI):
         """Answer a request; the events of start and end are FastAPI's."""
         scope["app"] = self
         await (self._front if scope["type"] == "http" else super().__call__)(scope, receive, send)
-
-    def openapi(self) -> dict[str, Any]:
-        """The description of the interface."""
-        if self.openapi_schema is None:
-            described = super().openapi()
-            _, more = models_json_schema(_MORE, ref_template="#/components/schemas/{model}")
-            described["components"]["schemas"] |= more["$defs"]
-            if self.settings.keys():
-                described["components"]["securitySchemes"] = _KEYS
-                described["security"] = [{name: []} for name in _KEYS]
-        return super().openapi()
 
 
 def create_app(settings: Settings | None = None) -> Application:

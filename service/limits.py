@@ -11,7 +11,7 @@ import secrets
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from typing import TypeVar
 
@@ -144,29 +144,26 @@ class Work:
         for slots in (self.batches, self.questions):
             slots.threads.shutdown(wait=False, cancel_futures=True)
 
-    def deadline(self) -> AbstractAsyncContextManager[None]:
-        """One time limit for a whole answer: reading, computing and sending."""
-        return _within(self.settings.time_limit_s, Kind.TOOK_TOO_LONG, "a request")
-
     async def question(self, work: Callable[[], T]) -> T:
         """Do the work of a question in a thread; its slot is held until it is done, even without a client."""
         self.questions.take()
         loop = asyncio.get_running_loop()
         task = self.questions.threads.submit(work)
         task.add_done_callback(lambda _: loop.call_soon_threadsafe(self.questions.give_back))
-        async with self.deadline():
+        async with within(self.settings.time_limit_s):
             return await asyncio.wrap_future(task)
 
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
-        async with _within(self.settings.client_timeout_s, Kind.SLOW_CLIENT, "a client"):
+        async with within(self.settings.client_timeout_s, Kind.SLOW_CLIENT):
             return await move
 
 
 @asynccontextmanager
-async def _within(limit: int, late: Kind, who: str) -> AsyncIterator[None]:
+async def within(limit: int, late: Kind = Kind.TOOK_TOO_LONG) -> AsyncIterator[None]:
+    """A time limit: of a whole answer, its reading, computing and sending, or of a client's next move."""
     try:
         async with asyncio.timeout(limit):
             yield
     except TimeoutError:
-        raise RequestError(late, f"{who} may take up to {limit} s") from None
+        raise RequestError(late, f"this may take up to {limit} s") from None

@@ -18,7 +18,7 @@ from mumacro.errors import MumacroError
 
 from ..answers import answer_case
 from ..case import Columns
-from ..limits import AT_ONCE, SMALL_BODY, Work, form_of, read_body
+from ..limits import AT_ONCE, SMALL_BODY, form_of, read_body, within
 from ..options import Options, options_of, read_form
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..wire import Batch, Form, csv, json
@@ -42,18 +42,16 @@ class _Answer(Response):
     background = None
 
     def __init__(self, request: Request) -> None:
-        self._request, self._app = request, request.app
+        self._request, self._app, self._work = request, request.app, request.app.work
         self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
-        self._work: Work = request.app.work
-        self._limit: int = self._app.settings.max_body_bytes
-        self._most: int = self._app.settings.max_batch
+        self._limit, self._most = self._app.settings.max_body_bytes, self._app.settings.max_batch
         self._placed = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, and give the slot back if one was taken."""
         del scope
         try:
-            async with self._work.deadline():
+            async with within(self._app.settings.time_limit_s):
                 self._query = given_in_query(self._request)
                 _, rest, faults = options_of(Options, self._query, parameter=True)
                 told = "is no option; inputs belong in the body"
