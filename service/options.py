@@ -18,7 +18,7 @@ from mumacro.inputs import NAMES as INPUTS
 from mumacro.interval import BOUND, ENDS
 
 from .answers import QUANTITIES, Wanted, said
-from .case import LEAST, Asked, asked_of, checked
+from .case import LEAST, Asked
 from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
@@ -53,7 +53,6 @@ _NUMBER = r"[0-9]{1,9}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?"
 _Range = Annotated[str, Field(pattern=rf"^{_NUMBER}\.\.{_NUMBER}$")]
 _NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
 Model = TypeVar("Model", bound="Choice")
-Asking = TypeVar("Asking", bound="Options")
 
 
 # --- options ------------------------------------------------------------------------------------------
@@ -186,21 +185,6 @@ def kind_in(given: Mapping[str, Any]) -> Kind:
         return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
     except InputError:
         return SPRING
-
-
-def read_form(
-    model: type[Asking], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True,
-    one: bool = False,
-) -> tuple[Asking, dict[str, Any], Wanted]:  # fmt: skip
-    """The options and the case of a request, and what is asked of it; ``left_out`` are the inputs that it asks for."""
-    form, rest, faults = options_of(model, given)
-    if left_out:  # a null says the same
-        rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
-    asked = asked_of(rest, form.kind if form is not None else kind_in(given))
-    values, more = checked(rest, left_out, null_is_rigid, names_in(model)[1], asked)  # type: ignore[arg-type]
-    if form is None or more:
-        refuse([*faults, *more])
-    return form, values, form.wanted(asked, one)
 
 
 # --- models of cases ----------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ answer.  What is refused is raised, see :mod:`service.problems`.
 
 import inspect
 import string
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -21,10 +21,11 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from ..answers import Wanted
+from ..case import asked_of, checked
 from ..limits import SMALL_BODY, form_of, read_body
-from ..options import NAMES, Options, query_of, read_form
+from ..options import NAMES, Options, kind_in, names_in, options_of, query_of
 from ..problems import FieldFault, Kind, RequestError, refuse
-from ..tables import LoadedTable
+from ..tables import LoadedTable, Tables
 from ..wire.json import decode
 
 _JSON = "application/json"
@@ -121,8 +122,22 @@ class Asking(NamedTuple):
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
         given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
         name = wanted and given.get(wanted, model.model_fields[wanted].default)
-        found = read_form(model, given, [name] if name in NAMES else [], one=one)
-        return cls(request.app.tables.pick(found[0].tolerance), *found)
+        return cls.made(request.app.tables, model, given, [name] if name in NAMES else [], one=one)
+
+    @classmethod
+    def made(
+        cls, tables: Tables, model: Any, given: Mapping[str, Any], left_out: Sequence[str] = (),
+        null_is_rigid: bool = True, one: bool = False,
+    ) -> "Asking":  # fmt: skip
+        """Check what is given; ``left_out`` are the inputs that are asked for, of which a null says the same."""
+        form, rest, faults = options_of(model, given)
+        if left_out:
+            rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
+        asked = asked_of(rest, form.kind if form is not None else kind_in(given))
+        values, more = checked(rest, left_out, null_is_rigid, names_in(model)[1], asked)
+        if form is None or more:
+            refuse([*faults, *more])
+        return cls(tables.pick(form.tolerance), form, values, form.wanted(asked, one))
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:

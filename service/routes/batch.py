@@ -19,11 +19,11 @@ from mumacro.errors import MumacroError
 from ..answers import answer_case
 from ..case import Columns
 from ..limits import AT_ONCE, SMALL_BODY, form_of, read_body, within
-from ..options import Options, options_of, read_form
+from ..options import Options, options_of
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
 from ..wire import Batch, Form, csv, json
 from ..wire.json import decode, dump
-from . import Endpoint, given_in_query
+from . import Asking, Endpoint, given_in_query
 
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
@@ -169,8 +169,7 @@ class _Answer(Response):
         """The answer to one case of a stream, where a null is a gap."""
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
-        options, case, wanted = read_form(Options, self._both(given), null_is_rigid=False)
-        table = self._app.tables.pick(options.tolerance)
+        table, _, case, wanted = Asking.made(self._app.tables, Options, self._both(given), null_is_rigid=False)
         values, source = answer_case(table.surrogate, case, wanted)
         self._app.metrics.case(table, source)
         return dump({**values, **table.signature})
