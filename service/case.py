@@ -61,6 +61,11 @@ class Asked(NamedTuple):
         found = self.kind.fields
         return tuple(end for name in found for end in (ENDS if name == "k" else (name,))) if self.interval else found
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that a case may have."""
+        return (*self.fields[:-1], "f", self.fields[-1])
+
 
 PLAIN = Asked()
 
@@ -69,11 +74,6 @@ def asked_of(given: Iterable[str], kind: ContactKind = SPRING) -> Asked:
     """What cases with these names are."""
     interval = not _INTERVAL.isdisjoint(given)
     return Asked(kind, interval) if interval or kind != SPRING else PLAIN
-
-
-def names_of(asked: Asked) -> tuple[str, ...]:
-    """All names that a case may have, for columns."""
-    return INPUTS if asked == PLAIN else (*asked.fields[:-1], "f", asked.fields[-1])
 
 
 # --- one value, one case ------------------------------------------------------------------------------
@@ -109,7 +109,7 @@ def faults_in(given: Iterable[str], left_out: Iterable[str] = (), asked: Asked =
     names, out = set(given), set(left_out)
     if out & _FREQUENCIES:
         out |= _FREQUENCIES
-    faults = [FieldFault.of(name, LEFT_OUT) for name in names_of(asked) if name in names & out]
+    faults = [FieldFault.of(name, LEFT_OUT) for name in asked.names if name in names & out]
     there = names | out | ({"omega"} if "f" in names else set())
     faults += [FieldFault.of(name, _STATE.get(name, "is required")) for name in asked.fields if name not in there]
     if names - out >= _FREQUENCIES:
@@ -130,7 +130,7 @@ def checked(
     faults: list[FieldFault] = []
     names = _NAMES
     if asked is not PLAIN:
-        names, (given, faults) = frozenset(names_of(asked)), _with_ends(given)
+        names, (given, faults) = frozenset(asked.names), _with_ends(given)
     for name, value in given.items():
         if name not in names:
             told = stranger(name, asked, known) if len(faults) < 100 else "unknown"
@@ -220,7 +220,7 @@ def columns_of(
     together with the ``faults`` that were found before.
     """
     asked = asked_of(given, kind)
-    names = names_of(asked)
+    names = asked.names
     lists = {name: given[name] for name in names if isinstance(given.get(name), (list, np.ndarray))}
     if any(len(value) > max_batch for value in lists.values()):
         raise too_large(max_batch)

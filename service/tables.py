@@ -84,12 +84,15 @@ class Tables:
 
     def check(self) -> None:
         """Check every table again; TableError, or RequestError where none is loaded."""
-        for table in self._ready():
+        self.pick()
+        for table in self.loaded:
             table.check()
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
         """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-])."""
-        tables = self._ready()
+        if self.fault is not None:
+            raise RequestError(Kind.NOT_READY, self.fault)
+        tables = self.loaded
         if tolerance is None:
             return tables[0]
         fit = [table for table in tables if table.surrogate.tolerance <= tolerance]
@@ -98,8 +101,3 @@ class Tables:
             reason = f"must be >= {tightest:g}: no loaded table is tighter"
             refuse([FieldFault(("tolerance",), reason, tolerance, parameter)], tightest_available=tightest)
         return min(fit, key=lambda table: (table.stamp[0], -table.surrogate.tolerance))
-
-    def _ready(self) -> tuple[LoadedTable, ...]:
-        if self.fault is not None:
-            raise RequestError(Kind.NOT_READY, self.fault)
-        return self.loaded

@@ -25,7 +25,7 @@ from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import RAD_PER_CYCLE
 
 from ..answers import Part, nested
-from ..case import MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, names_of, too_large
+from ..case import MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, too_large
 from ..options import OPTIONS, Options, example, kind_in, names_in, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
@@ -176,7 +176,7 @@ def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
     if len(found) > max_batch:
         raise too_large(max_batch)
     asked = asked_of(found[0] if found and isinstance(found[0], dict) else (), kind)
-    fields, names = asked.fields, names_of(asked)
+    fields, names = asked.fields, asked.names
     six = np.full((len(fields), len(found)), np.nan)
     reasons: dict[int, Reason] = {}
     for i, row in enumerate(found):
