@@ -105,7 +105,6 @@ class Quantity:
     #: to one column (n,) per part, in their order; NaN where there is no value
     compute: Callable[[Cases], Sequence[Any]]
     cost: float  # time of a case, in times of a plain answer
-    slopes: bool = False  # whether it needs the gradient
     #: contact, direction or k_range that it cannot be computed for -> why
     lacks: Mapping[str, str] = field(default_factory=dict)
 
@@ -127,6 +126,7 @@ _NAMES = tuple(part.path for part in DEFAULT)
 _six = itemgetter(*FIELDS)
 _COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}  # in times of one spring, across, at one k
 QUANTITIES: dict[str, Quantity] = {}
+_SLOPED = set[str]()  # those that need the gradient
 
 
 def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
@@ -134,7 +134,8 @@ def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> C
 
     def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
         name, text = compute.__name__, (compute.__doc__ or "").removesuffix(".")
-        QUANTITIES[name] = Quantity(name, text, parts, compute, cost, slopes, lacks)
+        QUANTITIES[name] = Quantity(name, text, parts, compute, cost, lacks)
+        _SLOPED.update([name] if slopes else [])
         return compute
 
     return add
@@ -227,8 +228,7 @@ def _evaluated(surrogate: Surrogate, cases: Mapping[str, Any], wanted: Wanted) -
     """The library's answer, and the columns beside the default ones."""
     asked, include = wanted.asked, wanted.include
     words: dict[str, Any] = asked.kind.names
-    slopes = any(QUANTITIES[name].slopes for name in include)
-    found = surrogate.evaluate(**cases, **words, gradient=slopes, groups=bool(include))
+    found = surrogate.evaluate(**cases, **words, gradient=not _SLOPED.isdisjoint(include), groups=bool(include))
     more = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
     if include:
         if asked.interval:

@@ -123,8 +123,8 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
 
     def wanted(self, asked: Asked, one: bool = False) -> Wanted:
         """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one`` case."""
-        if (asked, one) in self._wanted:
-            return self._wanted[asked, one]
+        if found := self._wanted.get((asked, one)):
+            return found
         faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))  # once each, in order
         if not one and MODEL in (self.include or ()):
             faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))

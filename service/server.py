@@ -5,7 +5,6 @@ promise of stability: pyproject.toml bounds the version, and the tests try every
 """
 
 import math
-from contextlib import suppress
 from itertools import chain
 from typing import Any, ClassVar
 
@@ -37,11 +36,10 @@ class _Transport:
             self.flush(data)
 
     def flush(self, data: bytes = b"") -> None:
-        """Send what is kept, and this."""
+        """Send what is kept, and this, unless the client has left meanwhile."""
         kept, self._kept = self._kept, b""
-        if kept:
-            with suppress(RuntimeError):  # the client has left meanwhile
-                self._transport.write(kept + data)
+        if kept and not self.is_closing():
+            self._transport.write(kept + data)
 
     def close(self) -> None:
         """Close when all is sent."""
