@@ -99,7 +99,6 @@ def where(condition: Any, one: Any, other: Any) -> Any:
 class Quantity:
     """One name that ``include`` may hold."""
 
-    name: str
     text: str  # its meaning, in one sentence
     parts: tuple[Part, ...]  # the columns that it adds
     #: to one column (n,) per part, in their order; NaN where there is no value
@@ -134,7 +133,7 @@ def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> C
 
     def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
         name, text = compute.__name__, (compute.__doc__ or "").removesuffix(".")
-        QUANTITIES[name] = Quantity(name, text, parts, compute, cost, lacks)
+        QUANTITIES[name] = Quantity(text, parts, compute, cost, lacks)
         _SLOPED.update([name] if slopes else [])
         return compute
 
