@@ -47,8 +47,8 @@ NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}
 PER_UNIT = {"mu0": "-", "Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}  # of a slope along each
-POSITIVE = ("mu0", "Fz", "k")
-BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in FIELDS}
+POSITIVE = ("mu0", "Fz", "k", "k_low", "k_high")
+BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for name in (*NAMES, *LIKE)}
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
@@ -138,7 +138,7 @@ def refusal(name: str, value: float) -> str:
         return GAP if math.isnan(value) else "must be finite and > 0, or rigid"
     if name == "f":
         return f"must be {BOUNDS['omega']}, and so must be omega = 2 pi f"
-    return f"must be {BOUNDS[LIKE.get(name, name)]}"
+    return f"must be {BOUNDS[name]}"
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
@@ -235,7 +235,7 @@ def number_hint(name: str, value: object) -> str:
     found = _WITH_UNIT.fullmatch(text)
     if found is None:
         return "must be a number, or rigid" if name == "k" else "must be a number"
-    like = name if name in SI else "mu0"  # another number is a plain one, too
+    like = LIKE.get(name, name if name in SI else "mu0")  # another number is a plain one, too
     words, scale = SI[like][1], scale_of(like, found[2])
     if scale is None:
         return f"must be a number without a unit: give {words}"

@@ -142,7 +142,8 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
         raise InputError("points", points, ">= 2")
     positive = along in POSITIVE or scale == "log"
     if not (math.isfinite(start) and (start > 0.0 or (start == 0.0 and not positive))):
-        raise InputError("start", start, "finite and > 0" if positive else "finite and >= 0")
+        told = " on a logarithmic scale" if scale == "log" else ""
+        raise InputError("start", start, f"finite and > 0{told}" if positive else "finite and >= 0")
     if not (math.isfinite(stop) and stop > start):
         raise InputError("stop", stop, "finite and > start")
     if scale == "linear":

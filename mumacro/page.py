@@ -58,7 +58,7 @@ def names(knows: Iterable[str] = ()) -> dict[str, Any]:
         name: {
             "label": label, "symbol": symbol, "offered": offered, "range": slider, "start": start,
             "unit": unit_of(name), "units": _scales(UNITS_OF[LIKE.get(name, name)]),
-            "bound": BOUNDS["y0" if name == AMPLITUDE else name], "positive": name in POSITIVE,
+            "bound": BOUNDS[name], "positive": name in POSITIVE,
         }
         for name, (label, symbol, offered, slider, start) in _INPUTS.items()
     }  # fmt: skip

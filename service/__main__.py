@@ -21,8 +21,6 @@ except ModuleNotFoundError as error:
         "(in a checkout: pip install -e '.[service]')"
     ) from None
 
-__all__ = ["main"]
-
 _OPTIONS = ("host", "port", "tables", "workers", "log_level")
 
 
@@ -73,23 +71,13 @@ def _serve(settings: Settings) -> int:
 
     try:
         with shared_counters() if settings.workers > 1 else nullcontext():
+            # By name, so that only worker processes import it, and not their parent.  It reads the headers of proxies.
             uvicorn.run(
-                # By name, so that only worker processes import it, and not their parent.
-                f"{__package__}.app:create_app",
-                factory=True,
-                http=f"{__package__}.server:Connection",
-                host=settings.host,
-                port=settings.port,
-                workers=settings.workers,
-                log_config=log_config(settings.log_level),
-                log_level=settings.log_level,
-                access_log=False,
-                server_header=False,
-                ws="none",
-                root_path=settings.root_path,
-                proxy_headers=False,  # the application reads them
-                timeout_graceful_shutdown=settings.shutdown_grace_s,
-            )
+                f"{__package__}.app:create_app", factory=True, http=f"{__package__}.server:Connection", ws="none",
+                host=settings.host, port=settings.port, workers=settings.workers, root_path=settings.root_path,
+                log_config=log_config(settings.log_level), log_level=settings.log_level, access_log=False,
+                server_header=False, proxy_headers=False, timeout_graceful_shutdown=settings.shutdown_grace_s,
+            )  # fmt: skip
     except SystemExit as stop:
         return 1 if stop.code else 0
     return 0

@@ -23,11 +23,6 @@ from mumacro.interval import middle
 
 from .case import PLAIN, Asked
 
-__all__ = [
-    "DEFAULT", "INTERVAL", "QUANTITIES", "REGIME_NAMES", "SOURCES", "Cases", "Part", "Quantity", "Wanted",
-    "answer_case", "answer_columns", "nested", "of_amplitude", "register", "said", "where",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 #: name of the regime of every source code
@@ -39,7 +34,7 @@ class Part:
     """One column of an answer.
 
     ``path`` is its name in flat formats; in JSON the dot makes an object.  A column of names holds codes, and ``names``
-    has the names by code.
+    has the names by code; -1 is none.
     """
 
     path: str
@@ -54,7 +49,7 @@ class Part:
 
     def values(self, column: Any) -> list[Any]:
         """The column as JSON has it; NaN is written as null."""
-        found = np.array(self.names, dtype=object)[column] if self.names else column
+        found = np.array((*self.names, None))[column] if self.names else column
         return list(found.tolist())
 
 
@@ -104,13 +99,11 @@ def where(condition: Any, one: Any, other: Any) -> Any:
 class Quantity:
     """One name that ``include`` may hold."""
 
-    name: str
     text: str  # its meaning, in one sentence
     parts: tuple[Part, ...]  # the columns that it adds
     #: to one column (n,) per part, in their order; NaN where there is no value
     compute: Callable[[Cases], Sequence[Any]]
     cost: float  # time of a case, in times of a plain answer
-    slopes: bool = False  # whether it needs the gradient
     #: contact, direction or k_range that it cannot be computed for -> why
     lacks: Mapping[str, str] = field(default_factory=dict)
 
@@ -132,6 +125,7 @@ _NAMES = tuple(part.path for part in DEFAULT)
 _six = itemgetter(*FIELDS)
 _COSTS = {"ball": 100.0, "along": 10.0, "normal": 10.0, "k_range": 200.0}  # in times of one spring, across, at one k
 QUANTITIES: dict[str, Quantity] = {}
+_SLOPED = set[str]()  # those that need the gradient
 
 
 def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> Callable[[Any], Any]:
@@ -139,7 +133,8 @@ def register(cost: float, *parts: Part, slopes: bool = False, **lacks: str) -> C
 
     def add(compute: Callable[[Cases], Sequence[Any]]) -> Callable[[Cases], Sequence[Any]]:
         name, text = compute.__name__, (compute.__doc__ or "").removesuffix(".")
-        QUANTITIES[name] = Quantity(name, text, parts, compute, cost, slopes, lacks)
+        QUANTITIES[name] = Quantity(text, parts, compute, cost, lacks)
+        _SLOPED.update([name] if slopes else [])
         return compute
 
     return add
@@ -154,11 +149,6 @@ class Wanted:
     std: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
-    def plain(self) -> bool:
-        """Whether it is nothing but the default outputs of one spring, across, at one k."""
-        return self.asked == PLAIN and not self.include
-
-    @cached_property
     def parts(self) -> list[Part]:
         """The columns of an answer, in order."""
         more = [part for name in self.include for part in QUANTITIES[name].parts]
@@ -169,11 +159,6 @@ class Wanted:
     def more(self) -> list[str]:
         """The paths of the columns beside the default ones."""
         return [part.path for part in self.parts[len(DEFAULT) :]]
-
-    @cached_property
-    def slopes(self) -> bool:
-        """Whether a quantity needs the gradient."""
-        return any(QUANTITIES[name].slopes for name in self.include)
 
     @cached_property
     def cost(self) -> float:
@@ -192,8 +177,8 @@ def of_amplitude(part: Part) -> Part:
 
 def said(asked: Asked) -> list[str]:
     """What is asked beside one spring, across, at one k."""
-    words = [word for word in asked.kind.names.values() if word in _COSTS]
-    return [*words, "k_range"] if asked.interval else words
+    words = (*asked.kind.names.values(), *(["k_range"] if asked.interval else []))
+    return [word for word in words if word in _COSTS]
 
 
 def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -213,7 +198,7 @@ def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
 
 def answer_case(surrogate: Surrogate, case: Mapping[str, Any], wanted: Wanted) -> tuple[dict[str, Any], int]:
     """The answer to one case as plain Python values, and the code of its source; InputError where it is not legal."""
-    if wanted.plain:
+    if wanted.asked is PLAIN and not wanted.include:
         macro, ratio, bound, code = surrogate.evaluate_case(*_six(case))
         return dict(zip(_NAMES, (macro, ratio, REGIME_NAMES[code], bound, SOURCES[code]), strict=True)), code
     found, more = _evaluated(surrogate, case, wanted)
@@ -242,7 +227,7 @@ def _evaluated(surrogate: Surrogate, cases: Mapping[str, Any], wanted: Wanted) -
     """The library's answer, and the columns beside the default ones."""
     asked, include = wanted.asked, wanted.include
     words: dict[str, Any] = asked.kind.names
-    found = surrogate.evaluate(**cases, **words, gradient=wanted.slopes, groups=bool(include))
+    found = surrogate.evaluate(**cases, **words, gradient=not _SLOPED.isdisjoint(include), groups=bool(include))
     more = [getattr(found, part.path) for part in INTERVAL] if asked.interval else []
     if include:
         if asked.interval:

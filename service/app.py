@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.openapi.constants import REF_TEMPLATE
 from pydantic.json_schema import models_json_schema
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
@@ -25,28 +26,21 @@ from .models import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .observe import Metrics, Observe
 from .options import Case, CaseColumns
 from .problems import problem_of
-from .routes import Routes, batch, case, contact, docs, health, page, questions, table
+from .routes import Routes, batch, case, contact, page, questions, table
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 from .wire.json import dump
 
-__all__ = ["Application", "create_app"]
-
-ENDPOINTS = [
-    endpoint for module in (case, batch, questions, contact, table, health, docs, page) for endpoint in module.ENDPOINTS
-]
+ENDPOINTS = [endpoint for module in (case, batch, questions, contact, table, page) for endpoint in module.ENDPOINTS]
 _DESCRIPTION = (
     "Macroscopic coefficient of friction of a spring-loaded contact. A body slides at v0 and oscillates across the "
     "sliding direction. Inputs in SI units; answers come from a table verified against the full model. "
     "Errors are problem details (RFC 9457)."
 )
-# models that are described by name only
-_MORE: Any = [(Case, "validation"), (CaseColumns, "validation")]
-_MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
-_KEYS = {
-    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
-    "bearer": {"type": "http", "scheme": "bearer"},
-}
+#: models that are described by name only
+_MORE: Any = [(Case, "validation"), (CaseColumns, "validation"), (CaseAnswer, "serialization")]
+_MORE += [(model, "serialization") for model in (ColumnsAnswer, RowsAnswer, Problem)]
+_KEYS = {"key": {"type": "apiKey", "in": "header", "name": "X-API-Key"}, "bearer": {"type": "http", "scheme": "bearer"}}
 _log = logging.getLogger("mumacro.app")
 
 
@@ -77,14 +71,20 @@ class Application(FastAPI):
     def __init__(self, settings: Settings) -> None:
         super().__init__(
             title="mumacro", version=__version__, description=_DESCRIPTION, docs_url=None, redoc_url=None,
-            openapi_url=None, redirect_slashes=False, lifespan=_lifespan, exception_handlers={HTTPException: _problem},
+            openapi_url=None, redirect_slashes=False, lifespan=_lifespan,
+            exception_handlers={HTTPException: _problem},
             servers=[{"url": settings.root_path}] if settings.root_path else None,
         )  # fmt: skip
         self.settings, self.tables, self.work = settings, Tables(settings.tables), Work(settings)
         self.metrics = Metrics(frozenset(endpoint.path for endpoint in ENDPOINTS))
         for endpoint in ENDPOINTS:
             endpoint.describe_to(self)
-        self.described = dump(self.openapi())
+        described = self.openapi()  # which FastAPI keeps
+        described["components"]["schemas"] |= models_json_schema(_MORE, ref_template=REF_TEMPLATE)[1]["$defs"]
+        if settings.keys():
+            described |= {"security": [{name: []} for name in _KEYS]}
+            described["components"]["securitySchemes"] = _KEYS
+        self.described = dump(described)
         # The pages are the same for everyone and hold no number.  They ask for the key and send it with every request.
         opened = {endpoint.path for endpoint in ENDPOINTS if endpoint.open}
         if settings.guide is not None:
@@ -105,29 +105,7 @@ class Application(FastAPI):
         scope["app"] = self
         await (self._front if scope["type"] == "http" else super().__call__)(scope, receive, send)
 
-    def openapi(self) -> dict[str, Any]:
-        """The description of the interface."""
-        if self.openapi_schema is None:
-            described = super().openapi()
-            _, more = models_json_schema(_MORE, ref_template="#/components/schemas/{model}")
-            described["components"]["schemas"] |= more["$defs"]
-            if self.settings.keys():
-                described["components"]["securitySchemes"] = _KEYS
-                described["security"] = [{name: []} for name in _KEYS]
-        return super().openapi()
-
 
 def create_app(settings: Settings | None = None) -> Application:
-    """Return the application; its tables are loaded when it starts.
-
-    Parameters
-    ----------
-    settings : Settings, optional
-        Left out: read from the environment.
-
-    Raises
-    ------
-    SettingsError
-        The environment holds a bad setting.
-    """
+    """The application, whose tables are loaded when it starts; settings are read from the environment if left out."""
     return Application(load_settings() if settings is None else settings)

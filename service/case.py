@@ -7,9 +7,8 @@ Every form of asking decodes to ``{name: number | list | array}``.  :func:`check
 
 import math
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +17,8 @@ from numpy.typing import NDArray
 from mumacro.contact import AMPLITUDE, SPRING
 from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import (
+    BOUNDS,
     GAP,
-    LIKE,
     MOST_HZ,
     POSITIVE,
     RAD_PER_CYCLE,
@@ -34,11 +33,6 @@ from mumacro.interval import BOUND, ENDS
 
 from .problems import FieldFault, Kind, RequestError, refuse
 
-__all__ = [
-    "INPUTS", "LEAST", "LIKE", "MAX_ERRORS", "PLAIN", "Asked", "Columns", "Reason", "asked_of", "bound_of", "checked",
-    "columns_of", "faults_in", "joined", "names_of", "not_finite", "number", "stranger", "too_large",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 #: the bad field, or None for the case as a whole, and why
 Reason = tuple[str | None, str]
@@ -51,7 +45,7 @@ LEFT_OUT = "must be left out: it is the unknown or swept input"
 _INTERVAL = frozenset(("k_range", *ENDS))
 _NAMES, _FREQUENCIES = frozenset(INPUTS), {"omega", "f"}
 #: smallest and largest value of each input
-LEAST = {name: 5e-324 if LIKE.get(name, name) in POSITIVE else 0.0 for name in (*INPUTS, *LIKE)} | {AMPLITUDE: 0.0}
+LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
 _MOST = dict.fromkeys(LEAST, sys.float_info.max) | {"f": MOST_HZ}
 
 
@@ -67,6 +61,11 @@ class Asked(NamedTuple):
         found = self.kind.fields
         return tuple(end for name in found for end in (ENDS if name == "k" else (name,))) if self.interval else found
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that a case may have."""
+        return (*self.fields[:-1], "f", self.fields[-1])
+
 
 PLAIN = Asked()
 
@@ -75,11 +74,6 @@ def asked_of(given: Iterable[str], kind: ContactKind = SPRING) -> Asked:
     """What cases with these names are."""
     interval = not _INTERVAL.isdisjoint(given)
     return Asked(kind, interval) if interval or kind != SPRING else PLAIN
-
-
-def names_of(asked: Asked) -> tuple[str, ...]:
-    """All names that a case may have, for columns."""
-    return INPUTS if asked == PLAIN else (*asked.fields[:-1], "f", asked.fields[-1])
 
 
 # --- one value, one case ------------------------------------------------------------------------------
@@ -94,23 +88,12 @@ def number(name: str, value: object, null_is_rigid: bool = True) -> tuple[float,
             found = math.inf
         if LEAST[name] <= found <= _MOST[name]:
             return found, None
-        return math.nan, _refusal(name, found)
+        return math.nan, refusal(name, found)
     if name == "k" and ((isinstance(value, str) and is_rigid(value)) or (value is None and null_is_rigid)):
         return math.inf, None
     if value is None:
         return math.nan, GAP if name == "k" else "is required"
-    return math.nan, number_hint("Fz" if name == AMPLITUDE else name, value)
-
-
-def bound_of(name: str) -> str:
-    """What a value of an input must be."""
-    return f"finite and {'>' if LEAST[name] else '>='} 0"
-
-
-def _refusal(name: str, value: float) -> str:
-    if name in _NAMES:
-        return refusal(name, value)
-    return "is missing" if math.isnan(value) else f"must be {bound_of(name)}"
+    return math.nan, number_hint(name, value)
 
 
 def not_finite(name: str, value: Any, *place: int) -> FieldFault | None:
@@ -126,7 +109,7 @@ def faults_in(given: Iterable[str], left_out: Iterable[str] = (), asked: Asked =
     names, out = set(given), set(left_out)
     if out & _FREQUENCIES:
         out |= _FREQUENCIES
-    faults = [FieldFault.of(name, LEFT_OUT) for name in names_of(asked) if name in names & out]
+    faults = [FieldFault.of(name, LEFT_OUT) for name in asked.names if name in names & out]
     there = names | out | ({"omega"} if "f" in names else set())
     faults += [FieldFault.of(name, _STATE.get(name, "is required")) for name in asked.fields if name not in there]
     if names - out >= _FREQUENCIES:
@@ -147,7 +130,7 @@ def checked(
     faults: list[FieldFault] = []
     names = _NAMES
     if asked is not PLAIN:
-        names, (given, faults) = frozenset(names_of(asked)), _with_ends(given)
+        names, (given, faults) = frozenset(asked.names), _with_ends(given)
     for name, value in given.items():
         if name not in names:
             told = stranger(name, asked, known) if len(faults) < 100 else "unknown"
@@ -213,7 +196,7 @@ class Columns:
             case[name] = value = column[index if column.size > 1 else 0].item()
             if not LEAST[name] <= value <= (math.inf if name == "k" else _MOST[name]):
                 shown = "f" if name == "omega" and self.hertz else name
-                return shown, _refusal(shown, value)
+                return shown, refusal(shown, value)
         if self.asked.interval and case["k_low"] > case["k_high"]:
             return "k_low", f"must be <= k_high, which is {case['k_high']!r}"
         if AMPLITUDE in case and not case[AMPLITUDE] < case["Fz"]:
@@ -237,8 +220,7 @@ def columns_of(
     together with the ``faults`` that were found before.
     """
     asked = asked_of(given, kind)
-    given, of_ends = _with_ends(given)
-    names = names_of(asked)
+    names = asked.names
     lists = {name: given[name] for name in names if isinstance(given.get(name), (list, np.ndarray))}
     if any(len(value) > max_batch for value in lists.values()):
         raise too_large(max_batch)
@@ -247,35 +229,25 @@ def columns_of(
     size = len(next(iter(lists.values()), "1"))
     told = "lists must have one length; given " + ", ".join(f"{name}: {len(value)}" for name, value in lists.items())
     of_lengths = [FieldFault.of(name, told) for name, value in lists.items() if len(value) != size]
-    if found := [*faults, *of_ends, *of_values, *of_lengths]:
+    if found := [*faults, *of_values, *of_lengths]:
         refuse(found)
     reasons: dict[int, Reason] = {}
     columns = {name: np.array([value]) for name, value in plain.items()}
     # in the order of the names, so that the first bad field of a case is told
-    columns |= {name: _column(name, value, reasons) for name, value in lists.items()}
+    for name, value in lists.items():
+        columns[name] = value if isinstance(value, np.ndarray) else numbers(name, value, reasons)
     if "f" in lists:
         with np.errstate(over="ignore"):  # infinite, which is refused
             columns["omega"] = columns["f"] * RAD_PER_CYCLE
     return Columns(size, [columns[name] for name in asked.fields], reasons, "f" in lists, bool(lists), asked=asked)
 
 
-def joined(name: str, parts: list[Any]) -> list[Any] | Array:
-    """The parts of a column, arrays and lists, as one array, or as a list if one is a list."""
-    if not any(isinstance(part, list) for part in parts):
-        return parts[1] if len(parts) == 2 else np.concatenate(parts)
-    words = {math.inf: RIGID} if name == "k" else {}
-    lists = (part if isinstance(part, list) else [words.get(x, x) for x in part.tolist()] for part in parts)
-    return list(chain.from_iterable(lists))
-
-
-def _column(name: str, values: list[Any] | Array, reasons: dict[int, Reason]) -> Array:
-    if isinstance(values, np.ndarray):
-        return values
-    column = np.empty(len(values))
-    told = 0
+def numbers(name: str, values: Sequence[Any], reasons: dict[int, Reason], first: int = 0) -> Array:
+    """A column, NaN where there is no number; why, for the first MAX_ERRORS of them, by its place from ``first`` on."""
+    column, told = np.empty(len(values)), 0
     for i, value in enumerate(values):
         column[i], reason = number(name, value, null_is_rigid=False)
         if reason is not None and told < MAX_ERRORS:
             told += 1
-            reasons.setdefault(i, (name, reason))
+            reasons.setdefault(first + i, (name, reason))
     return column

@@ -6,12 +6,13 @@ A request that may take longer than one case needs a slot and runs in a thread. 
 
 import asyncio
 import os
+import re
 import secrets
 import sys
-import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from contextlib import asynccontextmanager, suppress
+from functools import partial
 from typing import TypeVar
 
 from starlette.requests import ClientDisconnect
@@ -22,8 +23,6 @@ from mumacro.processors import processors
 from .problems import Kind, RequestError
 from .settings import Settings
 
-__all__ = ["AT_ONCE", "SMALL_BODY", "Slots", "Work", "check_head", "drained", "holder_of", "media_type_of", "read_body"]
-
 T = TypeVar("T")
 SMALL_BODY = 64 * 1024  # bytes of a body that needs no slot
 AT_ONCE = 4000.0  # largest cost without a thread, in times of a plain case: under half a millisecond
@@ -31,6 +30,7 @@ QUESTIONS = 8  # questions that are answered at the same time
 _NICENESS = 5  # that is added to the threads of batches, so that short requests are answered first
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
+_OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
 _ONCE = (b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
 
 
@@ -61,16 +61,13 @@ def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
         raise RequestError(Kind.MALFORMED_HTTP, "this service does not upgrade connections: send no Upgrade")
 
 
-def media_type_of(headers: Mapping[bytes, bytes], known: Mapping[str, str]) -> str:
-    """The media type of a body, out of the known ones (alias -> type); without a Content-Type it is the first."""
+def form_of(headers: Mapping[bytes, bytes], known: Mapping[str, T]) -> T:
+    """What is known by the media type of a body; without a Content-Type it is the first."""
     given = headers.get(b"content-type", b"").decode("latin-1").lower() or next(iter(known))
-    found = known.get(given)
-    if found is None:
-        media, _, parameters = given.partition(";")
-        charset = parameters.partition("charset=")[2].partition(";")[0].strip('" ')
-        found = known.get(media.strip()) if charset in ("", "utf-8", "utf8", "us-ascii") else None
-    if found is None:
-        offer = ", ".join(dict.fromkeys(known.values()))
+    media, _, parameters = given.partition(";")
+    found = known.get(media.strip())
+    if found is None or (parameters and _OTHER_CHARSET.search(parameters)):
+        offer = ", ".join(known)
         told = f"send {offer}, not {given[:80]}"
         raise RequestError(Kind.UNSUPPORTED_BODY, told, headers={"Accept-Post": offer})
     if headers.get(b"content-encoding", b"identity").lower() != b"identity":
@@ -89,10 +86,9 @@ async def read_body(
     while True:
         if size > limit:
             told = (
-                f"the body may have up to {limit} bytes: send many cases to /v1/mu-macro/batch, as NDJSON without a "
-                "Content-Length if they are more, and read the answer while you send"
+                "send many cases to /v1/mu-macro/batch, more as NDJSON without a Content-Length, reading while you send"
             )
-            raise RequestError(Kind.BODY_TOO_LARGE, told, max_bytes=limit)
+            raise RequestError(Kind.BODY_TOO_LARGE, f"a body may have up to {limit} bytes: {told}", max_bytes=limit)
         if size > SMALL_BODY:
             large()
         if not more:
@@ -116,21 +112,13 @@ async def drained(receive: Receive) -> None:
                 more = message.get("more_body", False)
 
 
-def _stand_back() -> None:
-    """Lower the priority of this thread.  Linux only."""
-    if sys.platform == "linux":
-        with suppress(OSError):
-            thread = threading.get_native_id()
-            own = os.getpriority(os.PRIO_PROCESS, thread)
-            os.setpriority(os.PRIO_PROCESS, thread, min(19, own + _NICENESS))
-
-
 class Slots:
     """The right to run a large request: so many at the same time, and the threads that run them."""
 
-    def __init__(self, number: int, name: str, initializer: Callable[[], None] | None = None) -> None:
+    def __init__(self, number: int, name: str, niceness: int = 0) -> None:
         self.number, self.used, self._name = number, 0, name
-        self.threads = ThreadPoolExecutor(processors(), name, initializer=initializer)
+        stand_back = partial(os.nice, niceness) if sys.platform == "linux" else None  # where that is of the thread
+        self.threads = ThreadPoolExecutor(processors(), name, initializer=stand_back)
 
     def take(self) -> None:
         """Take a slot; the code that called this gives it back."""
@@ -142,17 +130,13 @@ class Slots:
         """Give a slot back."""
         self.used -= 1
 
-    async def run(self, work: Callable[[], T], cost: float) -> T:
-        """Do the work at once if it is small, else in a thread, so that it delays no other request."""
-        return work() if cost <= AT_ONCE else await asyncio.wrap_future(self.threads.submit(work))
-
 
 class Work:
     """The slots of one process, and the time limits."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self.batches = Slots(settings.max_batches, "batches", _stand_back)
+        self.batches = Slots(settings.max_batches, "batches", _NICENESS)
         self.questions = Slots(QUESTIONS, "questions")
 
     def close(self) -> None:
@@ -160,29 +144,26 @@ class Work:
         for slots in (self.batches, self.questions):
             slots.threads.shutdown(wait=False, cancel_futures=True)
 
-    def deadline(self) -> AbstractAsyncContextManager[None]:
-        """One time limit for a whole answer: reading, computing and sending."""
-        return _within(self.settings.time_limit_s, Kind.TOOK_TOO_LONG, "a request")
-
     async def question(self, work: Callable[[], T]) -> T:
         """Do the work of a question in a thread; its slot is held until it is done, even without a client."""
         self.questions.take()
         loop = asyncio.get_running_loop()
         task = self.questions.threads.submit(work)
         task.add_done_callback(lambda _: loop.call_soon_threadsafe(self.questions.give_back))
-        async with self.deadline():
+        async with within(self.settings.time_limit_s):
             return await asyncio.wrap_future(task)
 
     async def client(self, move: Awaitable[T]) -> T:
         """Wait for the client to send or to read."""
-        async with _within(self.settings.client_timeout_s, Kind.SLOW_CLIENT, "a client"):
+        async with within(self.settings.client_timeout_s, Kind.SLOW_CLIENT):
             return await move
 
 
 @asynccontextmanager
-async def _within(limit: int, late: Kind, who: str) -> AsyncIterator[None]:
+async def within(limit: int, late: Kind = Kind.TOOK_TOO_LONG) -> AsyncIterator[None]:
+    """A time limit: of a whole answer, its reading, computing and sending, or of a client's next move."""
     try:
         async with asyncio.timeout(limit):
             yield
     except TimeoutError:
-        raise RequestError(late, f"{who} may take up to {limit} s") from None
+        raise RequestError(late, f"this may take up to {limit} s") from None

@@ -1,6 +1,6 @@
 """Models for OpenAPI, and those of answers: the columns come from the registry of :mod:`service.answers`."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, Literal
 
@@ -8,11 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from .answers import DEFAULT, INTERVAL, QUANTITIES, Part, nested, of_amplitude
 from .quantities import INCLUDES
-
-__all__ = [
-    "Answered", "BatchFault", "CaseAnswer", "ColumnsAnswer", "Health", "Problem", "RowsAnswer", "Strict",
-    "TableAnswer", "TableLabel", "default", "grouped", "included", "many", "model", "optional", "told",
-]  # fmt: skip
 
 _create: Any = create_model
 
@@ -38,7 +33,7 @@ def told(kind: Any, text: str) -> tuple[Any, Any]:
 
 
 def optional(kind: Any, text: str = "") -> tuple[Any, Any]:
-    """A member that may be left out."""
+    """A member that is there only where it was requested, or does not apply everywhere."""
     return kind | None, Field(None, description=text or None)
 
 
@@ -66,39 +61,34 @@ _BatchEnd = model(
 # --- columns ------------------------------------------------------------------------------------------
 
 
-def _kind(part: Part, listed: bool, null: bool = True) -> Any:
+def _member(part: Part, listed: bool, make: Callable[..., Any] = optional) -> Any:
     kind: Any = Literal[tuple(dict.fromkeys(part.names))] if part.path == "regime" else str if part.names else float
-    kind = kind | None if null else kind
-    return many(kind) if listed else kind
+    kind = kind if part in DEFAULT and part.path != "error_bound" and not listed else kind | None
+    return make(many(kind) if listed else kind, part.described)
 
 
 def default(listed: bool) -> dict[str, Any]:
     """The default outputs as members of a model."""
-    members = {
-        part.path: told(_kind(part, listed, listed or part.path == "error_bound"), part.described) for part in DEFAULT
-    }
-    ends = {part.path: optional(_kind(part, listed), f"Only for an interval. {part.described}") for part in INTERVAL}
-    return members | ends
+    members = {part.path: _member(part, listed, told) for part in DEFAULT}
+    return members | {part.path: _member(part, listed) for part in INTERVAL}
 
 
+@cache
 def grouped(parts: Iterable[Part], listed: bool, text: str) -> dict[str, Any]:
     """Columns that are there if requested as members of a model, those with a dot in their path in models of theirs."""
     members: dict[str, Any] = {}
     for part in parts:
-        either = {one.path: one for one in (part, of_amplitude(part))}
-        make = told if len(either) == 1 else optional  # else there is one of the two
-        members |= {path: make(_kind(one, listed), one.described) for path, one in either.items()}
-    fields: dict[str, Any] = {}
-    for name, found in nested(members).items():
+        either = dict.fromkeys((part, of_amplitude(part)))  # of which there is one
+        members |= {one.path: _member(one, listed, told if len(either) == 1 else optional) for one in either}
+    fields = nested(members)
+    for name, found in fields.items():
         if isinstance(found, dict):
             title = "".join(word.capitalize() for word in name.split("_")) + ("Columns" if listed else "")
-            fields[name] = optional(model(title, f"{text}.", **found), "Only if requested")
-        else:
-            fields[name] = optional(found[0], f"Only if requested. {found[1].description}")
+            found = model(title, f"{text}.", **found), Field()
+        fields[name] = optional(found[0], found[1].description or "Only if requested")
     return fields
 
 
-@cache
 def included(listed: bool) -> dict[str, Any]:
     """Members that ``include`` adds to a model of an answer."""
     found = (grouped(QUANTITIES[name].parts, listed, QUANTITIES[name].text) for name in INCLUDES)

@@ -4,6 +4,7 @@ Logs are JSON lines on standard output, written by a thread.  Counters are those
 share them through its multiprocess mode, in a private folder that is made at the start.
 """
 
+import asyncio
 import itertools
 import logging
 import os
@@ -28,16 +29,15 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
+from mumacro.charts import SOURCES
 from mumacro.errors import MumacroError
 
-from .answers import REGIME_NAMES, SOURCES
+from .answers import REGIME_NAMES
 from .limits import check_head, drained, holder_of
 from .problems import Kind, RequestError, problem_of
-from .routes import Routes, path_of
+from .routes import Routes
 from .settings import Settings
 from .tables import LoadedTable, Tables
-
-__all__ = ["LogLines", "Metrics", "Observe", "log_config", "shared_counters"]
 
 HEALTH_PATHS = frozenset({"/livez", "/readyz", "/healthz"})
 _METHODS = frozenset({"GET", "HEAD", "POST"})
@@ -57,8 +57,8 @@ _errors = logging.getLogger("mumacro.error")
 class LogLines(logging.Handler):
     """Keeps lines for a thread that writes them twenty times a second: a stalled reader delays no request.
 
-    ``logging.handlers.QueueListener`` would wake its thread for every record.  Lines of requests come from
-    :class:`Observe` at once: a record of ``logging`` takes a tenth of the time of a request.
+    ``logging.handlers.QueueListener`` would wake its thread for every record; a record takes a tenth of the time of a
+    request, so :class:`Observe` puts its lines here itself.
     """
 
     #: the one of this process; without it, under another server, that server says what it answered
@@ -192,10 +192,6 @@ class Metrics:
         return generate_latest(registry)
 
 
-async def _nothing(*_: object) -> None:
-    """Behind uvicorn's middleware, which changes the scope."""
-
-
 class Observe:
     """Around every answer: id, key, log line, counters, and problem details for every exception.
 
@@ -208,7 +204,7 @@ class Observe:
     ) -> None:
         self._routes, self._others, self._metrics = routes, others, metrics
         self._keys, self._open_paths = settings.keys(), open_paths
-        self._proxies: Any = ProxyHeadersMiddleware(_nothing, settings.trusted_proxies)
+        self._proxies: Any = ProxyHeadersMiddleware(lambda *_: asyncio.sleep(0), settings.trusted_proxies)  # in scope
         self._stem, self._numbers = os.urandom(8).hex(), itertools.count(int.from_bytes(os.urandom(6)))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -220,7 +216,7 @@ class Observe:
         scope["request_id"] = identity
         if b"x-forwarded-for" in headers or b"x-forwarded-proto" in headers:
             await self._proxies(scope, receive, send)
-        path, status, holder = path_of(scope), 0, None
+        path, status, holder = str(scope["path"]).removeprefix(scope.get("root_path", "")), 0, None
 
         async def send_marked(message: Message) -> None:
             nonlocal status
@@ -235,7 +231,7 @@ class Observe:
             check_head(scope, headers)
             if self._keys and path not in self._open_paths and not path.startswith("/guide/"):
                 holder = holder_of(headers, self._keys)
-            answer = self._routes(path, scope["method"])
+            answer = self._routes.find(path, scope["method"])
             response = self._others if answer is None else await answer(Request(scope, receive))
             await response(scope, receive, send_marked)
         except ClientDisconnect:
@@ -258,12 +254,9 @@ class Observe:
             quiet, lines = status == 200 and path in HEALTH_PATHS, LogLines.running
             if lines is not None and _access.isEnabledFor(logging.DEBUG if quiet else logging.INFO):
                 client = scope.get("client")
-                line = {
+                lines.put({
                     "time": datetime.now(UTC), "level": "debug" if quiet else "info", "logger": "mumacro.access",
                     "message": "request", "request_id": identity, "method": scope["method"], "path": path,
                     "status": status, "duration_ms": round(1e3 * seconds, 3),
-                    "client": client[0][:_MOST_SHOWN] if client else None,
-                }  # fmt: skip
-                if holder is not None:
-                    line["key"] = holder
-                lines.put(line)
+                    "client": client[0][:_MOST_SHOWN] if client else None, **({"key": holder} if holder else {}),
+                })  # fmt: skip

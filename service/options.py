@@ -4,14 +4,12 @@ What every endpoint asks beside its case (``include``, ``tolerance``, ``std``) i
 """
 
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from functools import cache, cached_property
 from types import NoneType
 from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.json_schema import SkipJsonSchema
-from pydantic_core import PydanticCustomError
 
 from mumacro.contact import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, ContactName, DirectionName, Kind, kind_of
 from mumacro.errors import InputError
@@ -20,16 +18,10 @@ from mumacro.inputs import NAMES as INPUTS
 from mumacro.interval import BOUND, ENDS
 
 from .answers import QUANTITIES, Wanted, said
-from .case import LEAST, PLAIN, Asked, asked_of, bound_of, checked
+from .case import LEAST, Asked
 from .models import Strict, model
 from .problems import FieldFault, faults_of, refuse
 from .quantities import INCLUDES
-
-__all__ = [
-    "MODEL", "NAMES", "OPTIONS", "Case", "CaseColumns", "CaseRequest", "Choice", "Five", "Name", "NotNegative",
-    "Options", "Positive", "bounded", "example", "includes", "input_fields", "kind_in", "options_of", "query_of",
-    "read_form", "relation",
-]  # fmt: skip
 
 _TEXTS = {
     "mu0": "Coulomb friction coefficient of the contact",
@@ -61,12 +53,6 @@ _NUMBER = r"[0-9]{1,9}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?"
 _Range = Annotated[str, Field(pattern=rf"^{_NUMBER}\.\.{_NUMBER}$")]
 _NO_NULL: Any = Annotated[None, SkipJsonSchema()]  # type: ignore[type-arg]  # not described: a query has none
 Model = TypeVar("Model", bound="Choice")
-Asking = TypeVar("Asking", bound="Options")
-
-
-def relation(name: str, reason: str) -> PydanticCustomError:
-    """A fault in the relation of several fields, and the field to change."""
-    return PydanticCustomError("relation", "{field}: {reason}", {"field": name, "reason": reason})
 
 
 # --- options ------------------------------------------------------------------------------------------
@@ -85,10 +71,7 @@ class Choice(Strict):
 
     @model_validator(mode="after")
     def _together(self) -> Self:
-        try:
-            kind_of(self.contact, self.direction)
-        except InputError as error:
-            raise relation(error.field, f"must be {error.bound}") from None
+        kind_of(self.contact, self.direction)
         return self
 
     @cached_property
@@ -115,7 +98,7 @@ class InputStd(model("_InputStd", "", Strict, **_std)):  # type: ignore[misc]
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
         if self.omega and self.f:
-            raise relation("f", "give the standard deviation of omega or of f, not of both")
+            raise InputError("f", self.f, "left out beside omega: give the deviation of one of them, not of both")
         return self
 
 
@@ -130,43 +113,35 @@ class Options(model("_Including", "", Choice, include=_include)):  # type: ignor
     @model_validator(mode="after")
     def _std_where_asked(self) -> Self:
         """Refuse standard deviations without ``std`` in ``include``, and the reverse."""
-        if self.std is None:
-            if "std" in (self.include or ()):
-                raise relation("std", "is required if include has std")
-            return self
-        if "std" not in (self.include or ()):
-            raise relation("std", "has no effect unless include has std")
+        if (self.std is None) == ("std" in (self.include or ())):
+            bound = "given if include has std" if self.std is None else "left out: no effect unless include has std"
+            raise InputError("std", self.std, bound)
         wrong = "y0" if self.kind.normal else AMPLITUDE
-        if getattr(self.std, wrong):
-            raise relation("std", f"has {wrong}, which direction {self.direction} does not have")
+        if self.std and getattr(self.std, wrong):
+            raise InputError("std", wrong, f"without {wrong}, which direction {self.direction} does not have")
         return self
 
     def wanted(self, asked: Asked, one: bool = False) -> Wanted:
         """What is asked of such cases; refused where they do not have it.  ``model`` is for ``one`` case."""
-        found = self._wanted.get((asked, one))
-        if found is None:
-            found = self._wanted[asked, one] = self._checked(asked, one)
-        return found
-
-    @cached_property
-    def _wanted(self) -> dict[tuple[Asked, bool], Wanted]:
-        return {}
-
-    def _checked(self, asked: Asked, one: bool) -> Wanted:
+        if found := self._wanted.get((asked, one)):
+            return found
         faults, include = [], tuple(name for name in INCLUDES if name in (self.include or ()))  # once each, in order
         if not one and MODEL in (self.include or ()):
             faults.append(FieldFault.of("include", f"{MODEL} is for one case: ask /v1/mu-macro", MODEL))
-        for word in said(asked) if asked != PLAIN else ():
-            for name in include:
-                if word in QUANTITIES[name].lacks:
-                    told = f"{name} is not computed for {word}: {QUANTITIES[name].lacks[word]}"
-                    faults.append(FieldFault.of("include", told, name))
+        lacks = [(name, word, QUANTITIES[name].lacks.get(word)) for word in said(asked) for name in include]
+        for name, word, why in lacks:
+            if why is not None:
+                faults.append(FieldFault.of("include", f"{name} is not computed for {word}: {why}", name))
         if faults:
             refuse(faults)
         std: dict[str, float] = {} if self.std is None else self.std.model_dump()
         if std:
             std["omega"] += RAD_PER_CYCLE * std.pop("f")
-        return Wanted(asked, include, std)
+        return self._wanted.setdefault((asked, one), Wanted(asked, include, std))
+
+    @cached_property
+    def _wanted(self) -> dict[tuple[Asked, bool], Wanted]:
+        return {}
 
 
 OPTIONS = tuple(Options.model_fields)
@@ -176,7 +151,7 @@ def options_of(
     model: type[Model], given: Mapping[str, Any], parameter: bool | None = None
 ) -> tuple[Model | None, Mapping[str, Any], list[FieldFault]]:
     """The options of a request, checked by their model; the rest of it, which is its case; and faults."""
-    fields, own, rest = _names(model)[0], {}, given
+    fields, own, rest = names_in(model)[0], {}, given
     if not fields.isdisjoint(given):
         rest = dict(given)
         own = {name: rest.pop(name) for name in given if name in fields}
@@ -199,33 +174,17 @@ _valid: dict[tuple[Any, str], Any] = {}  # most requests have the options of ano
 
 
 @cache
-def _names(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
+def names_in(model: Any) -> tuple[frozenset[str], tuple[str, ...]]:
     """The names of the options, and of all that a request may have."""
     return frozenset(model.model_fields), (*NAMES, "k_range", *ENDS, *model.model_fields)
 
 
 def kind_in(given: Mapping[str, Any]) -> Kind:
-    """Contact and direction among checked options; raises InputError where they do not go together."""
-    return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
-
-
-def read_form(
-    model: type[Asking], given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True,
-    one: bool = False,
-) -> tuple[Asking, dict[str, Any], Wanted]:  # fmt: skip
-    """The options and the case of a request, and what is asked of it; ``left_out`` are the inputs that it asks for."""
-    form, rest, faults = options_of(model, given)
-    if left_out:  # a null says the same
-        rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
-    kind = form.kind if form is not None else SPRING
-    if form is None:
-        with suppress(InputError):  # which is among the faults
-            kind = kind_in(given)
-    asked = asked_of(rest, kind)
-    values, more = checked(rest, left_out, null_is_rigid, _names(model)[1], asked)  # type: ignore[arg-type]
-    if form is None or more:
-        refuse([*faults, *more])
-    return form, values, form.wanted(asked, one)
+    """Contact and direction; one spring across where they are bad, which is a fault of the options."""
+    try:
+        return kind_of(given.get("contact", "spring"), given.get("direction", "across"))
+    except InputError:
+        return SPRING
 
 
 # --- models of cases ----------------------------------------------------------------------------------
@@ -242,10 +201,9 @@ def input_fields(
         entry: Any = float | Literal["rigid"] if name == "k" else float
         kind = kind | Literal["rigid"] if name == "k" else kind
         kind = kind | None if name in ("omega", "f") or (name == "k" and null) else kind
-        bound = BOUNDS.get(name, bound_of(name))
         more = {"examples": [example[name]]} if name in shown else {}
         default = None if name in optional or name in LIKE else ...
-        info = bounded(bound, f"{text} [{unit_of(name)}]", default, **more)
+        info = bounded(BOUNDS[name], f"{text} [{unit_of(name)}]", default, **more)
         fields[name] = (kind | list[entry] if listed else kind, info)
     fields["k_range"] = (list[Positive] | None, bounded(BOUND, "In place of k: [low, high] [N/m]", None))
     return fields

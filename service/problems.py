@@ -10,11 +10,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, NoReturn, get_args
+from typing import Any, NoReturn
 
 import orjson
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import Scope
@@ -23,11 +22,10 @@ from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs import BOUNDS, number_hint, unknown_name
 from mumacro.inputs import NAMES as INPUTS
 
-__all__ = ["FieldFault", "Kind", "RequestError", "document_of", "faults_of", "problem_of", "refuse"]
-
 MAX_FIELD_FAULTS = 100
 _MAX_TEXT = 80
 _NO_VALUE = object()
+CLOSE = {"Connection": "close"}
 
 
 @dataclass(frozen=True)
@@ -60,9 +58,8 @@ class FieldFault:
         if self.value is not _NO_VALUE:
             entry["value"] = _shown(self.value)
         entry["reason"] = self.reason
-        if self.path and self.path[-1] in INPUTS:
-            name = "omega" if self.path[-1] == "f" else str(self.path[-1])
-            entry["bound"] = "finite and >= 0" if self.path[0] == "std" else BOUNDS[name]
+        if self.path and self.path[-1] in BOUNDS:
+            entry["bound"] = BOUNDS["v0" if self.path[0] == "std" else str(self.path[-1])]
         return entry
 
 
@@ -71,11 +68,13 @@ def _shown(value: object) -> object:
     if isinstance(value, str):
         short = value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
         return short.encode("utf-8", "replace").decode()  # half of a surrogate pair is no text
-    if isinstance(value, float):
-        return value if math.isfinite(value) else json.dumps(value)
-    if value is None or isinstance(value, int):
-        return value if value is None or -(2**63) <= value < 2**64 else "an integer beyond double range"
-    return "an object" if isinstance(value, Mapping) else "a list" if isinstance(value, Sequence) else "a value"
+    if isinstance(value, float) and not math.isfinite(value):
+        return json.dumps(value)
+    if isinstance(value, int) and not -(2**63) <= value < 2**64:
+        return "an integer beyond double range"
+    if value is None or isinstance(value, (int, float)):
+        return value
+    return "an object" if isinstance(value, Mapping) else "a list"
 
 
 def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
@@ -100,53 +99,44 @@ def faults_of(
             value, reason = _NO_VALUE, "is required"
         elif kind == "extra_forbidden":
             reason = unknown_name(str(path[-1]), known if len(path) == 1 else INPUTS)
-        elif kind == "relation":  # between fields: the model names the one to change
-            path, value, reason = (*path, entry["ctx"]["field"]), _NO_VALUE, entry["ctx"]["reason"]
+        elif kind == "value_error":  # in the relation of several fields: InputError names the one to change
+            fault: InputError = entry["ctx"]["error"]
+            path, value, reason = (*path, fault.field), _NO_VALUE, f"must be {fault.bound}"
         elif kind == "float_type":
             reason = number_hint(str(path[0]), value)
+        elif kind in ("greater_than_equal", "finite_number") and len(path) > 1:  # one of several numbers
+            reason = f"must be {BOUNDS['v0']}"
         else:
-            extra: Any = _field(model, path).json_schema_extra
+            extra: Any = model.model_fields[str(path[0])].json_schema_extra
             reason = f"must be {extra['bound']}"
         found.setdefault(path, FieldFault(path, reason, value, parameter))
     return list(found.values())
 
 
-def _field(model: type[BaseModel], path: tuple[str | int, ...]) -> FieldInfo:
-    """The field at ``path``, or the last one on the way that is a field."""
-    field = model.model_fields[str(path[0])]
-    for inner in get_args(field.annotation):
-        if len(path) > 1 and isinstance(inner, type) and issubclass(inner, BaseModel) and path[1] in inner.model_fields:
-            return inner.model_fields[str(path[1])]
-    return field
-
-
 class Kind(Enum):
-    """A type of problem: status, title, whether the connection closes, and seconds after which to ask again.
+    """A type of problem: status, title, and headers.  The connection closes where the rest of a request is not read."""
 
-    It closes where the rest of the request is not read.
-    """
-
-    MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", True
+    MALFORMED_HTTP = 400, "The request is no HTTP that this service reads", CLOSE
     MALFORMED_BODY = 400, "The request cannot be read"
-    UNAUTHORIZED = 401, "An API key is needed", True
+    UNAUTHORIZED = 401, "An API key is needed", CLOSE
     NOT_FOUND = 404, "Not Found"
     METHOD_NOT_ALLOWED = 405, "Method Not Allowed"
-    SLOW_CLIENT = 408, "The request did not come in time", True
-    BODY_TOO_LARGE = 413, "The body is too large", True
+    SLOW_CLIENT = 408, "The request did not come in time", CLOSE
+    BODY_TOO_LARGE = 413, "The body is too large", CLOSE
     BATCH_TOO_LARGE = 413, "The batch is too large"
-    UNSUPPORTED_BODY = 415, "The body's media type is not supported", True
+    UNSUPPORTED_BODY = 415, "The body's media type is not supported", CLOSE
     RANGE_NOT_SATISFIABLE = 416, "The file has no such part"
     INVALID_VALUE = 422, "The request holds invalid values"
-    HEAD_TOO_LARGE = 431, "The head is too large", True
+    HEAD_TOO_LARGE = 431, "The head is too large", CLOSE
     UNEXPECTED = 500, "An unexpected error"
     NOT_INSTALLED = 501, "This service lacks a package"
-    NOT_READY = 503, "The service is not ready", False, 5
-    OVERLOADED = 503, "The service is overloaded", True, 1
-    OUT_OF_MEMORY = 503, "The service has too little memory", False, 1
-    TOOK_TOO_LONG = 503, "The request took too long", True, 1
+    NOT_READY = 503, "The service is not ready", {"Retry-After": "5"}
+    OVERLOADED = 503, "The service is overloaded", {**CLOSE, "Retry-After": "1"}
+    OUT_OF_MEMORY = 503, "The service has too little memory", {"Retry-After": "1"}
+    TOOK_TOO_LONG = 503, "The request took too long", {**CLOSE, "Retry-After": "1"}
 
-    def __init__(self, status: int, title: str, closes: bool = False, retry_after_s: int | None = None) -> None:
-        self.status, self.title, self.closes, self.retry_after_s = status, title, closes, retry_after_s
+    def __init__(self, status: int, title: str, headers: Mapping[str, str] | None = None) -> None:
+        self.status, self.title, self.headers = status, title, headers or {}
 
 
 class RequestError(MumacroError):
@@ -161,7 +151,7 @@ class RequestError(MumacroError):
         super().__init__(detail)
 
 
-def request_error(error: Exception) -> RequestError:
+def _request_error(error: Exception) -> RequestError:
     """What an exception means for its request; nothing of an unknown one is told."""
     if isinstance(error, RequestError):
         return error
@@ -182,7 +172,7 @@ def request_error(error: Exception) -> RequestError:
 
 def document_of(error: Exception, scope: Scope) -> dict[str, Any]:
     """The problem document of an exception."""
-    found = request_error(error)
+    found = _request_error(error)
     slug = found.kind.name.lower().replace("_", "-")
     body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": found.kind.title}
     body |= {"status": found.kind.status, "detail": found.detail, "instance": scope["path"]}
@@ -197,11 +187,7 @@ def document_of(error: Exception, scope: Scope) -> dict[str, Any]:
 
 def problem_of(error: Exception, scope: Scope) -> Response:
     """The response to an exception."""
-    found = request_error(error)
-    headers = {"Cache-Control": "no-store", **found.headers}
-    if found.kind.closes:
-        headers["Connection"] = "close"
-    if found.kind.retry_after_s is not None:
-        headers["Retry-After"] = str(found.kind.retry_after_s)
+    found = _request_error(error)
+    headers = {"Cache-Control": "no-store", **found.kind.headers, **found.headers}
     content = orjson.dumps(document_of(found, scope))
     return Response(content, found.kind.status, headers=headers, media_type="application/problem+json")

@@ -15,8 +15,6 @@ from mumacro.settling import settling as decay
 
 from .answers import QUANTITIES, Array, Cases, Part, register, where
 
-__all__ = ["INCLUDES"]
-
 
 @register(
     2,

@@ -5,15 +5,12 @@ promise of stability: pyproject.toml bounds the version, and the tests try every
 """
 
 import math
-from contextlib import suppress
 from itertools import chain
 from typing import Any, ClassVar
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from .problems import Kind, RequestError, problem_of
-
-__all__ = ["Connection"]
 
 MAX_HEAD = 64 * 1024  # bytes of a request's head
 MAX_FIELDS = 100  # fields of a head
@@ -32,19 +29,17 @@ class _Transport:
 
     def write(self, data: bytes) -> None:
         """Keep the first piece until the next one, or until the loop goes on."""
-        if self._kept:
-            self._transport.write(self._kept + data)
-            self._kept = b""
-        else:
-            self._kept = data
+        if not self._kept:
             self._loop.call_soon(self.flush)
+            self._kept = data
+        else:
+            self.flush(data)
 
-    def flush(self) -> None:
-        """Send what is kept."""
-        if self._kept:
-            with suppress(RuntimeError):  # the client has left meanwhile
-                self._transport.write(self._kept)
-            self._kept = b""
+    def flush(self, data: bytes = b"") -> None:
+        """Send what is kept, and this, unless the client has left meanwhile."""
+        kept, self._kept = self._kept, b""
+        if kept and not self.is_closing():
+            self._transport.write(kept + data)
 
     def close(self) -> None:
         """Close when all is sent."""
@@ -80,10 +75,6 @@ class Connection(HttpToolsProtocol):
 
     def _watch(self) -> None:
         self._due = min(self._due, self.loop.time() + self._settings.client_timeout_s)
-
-    def _in_batch(self) -> bool:
-        """Whether the application limits every wait."""
-        return self.url.partition(b"?")[0].endswith(b"/batch")
 
     def _look(self) -> None:
         """End the connection if its time is over: with 408 where a request has begun and its answer has not."""
@@ -141,7 +132,8 @@ class Connection(HttpToolsProtocol):
             super().data_received(piece)
             if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):  # also behind a body
                 self._refuse(_TOO_LARGE)
-        if self._in_head or not self._busy or (self.cycle.more_body and not self._in_batch()):
+        in_batch = self._busy and self.scope["path"].endswith("/batch")  # where the application limits every wait
+        if self._in_head or not self._busy or (self.cycle.more_body and not in_batch):
             self._watch()
 
     def send_400_response(self, msg: str) -> None:

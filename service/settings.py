@@ -5,15 +5,12 @@ names the variable, the value and what it must be; the value of the API key is n
 """
 
 import os
-import re
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, SecretStr, ValidationError
+from pydantic import AfterValidator, BeforeValidator, DirectoryPath, Field, Secret, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
-
-__all__ = ["PREFIX", "Settings", "SettingsError", "load_settings", "unknown_variables"]
 
 PREFIX = "MUMACRO_"
 _MAX_AGE_S = 3600
@@ -23,29 +20,18 @@ class SettingsError(ValueError):
     """One or more settings cannot be used; the text says which, and what they must be."""
 
 
-def _split(separator: str) -> BeforeValidator:
+def _split(value: Any, separator: str = ",") -> Any:
     """``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
-
-    def split(value: object) -> object:
-        if not isinstance(value, str):
-            return value
-        return [part.strip() for part in value.split(separator) if part.strip()]
-
-    return BeforeValidator(split)
+    return [part.strip() for part in value.split(separator) if part.strip()] if isinstance(value, str) else value
 
 
-def _pairs(value: object) -> object:
-    """[``a=1``, ``b=2``] -> {``a``: ``1``, ``b``: ``2``}."""
-    if not isinstance(value, list):
-        return value
-    return {name.strip(): key for name, _, key in (part.partition("=") for part in value)}
+def _pairs(value: Any) -> Any:
+    """``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is."""
+    return dict(part.partition("=")[::2] for part in _split(value)) if isinstance(value, str) else value
 
 
-def _default_tables() -> tuple[Path, ...]:
-    # An installed package has site-packages as its parent, where PyTables owns a folder of this name:
-    # only a folder that really holds tables counts.
-    beside = Path(__file__).resolve().parent.parent / "tables"
-    return (beside,) if any(beside.glob("*.nc")) else (Path("tables"),)
+_BESIDE = Path(__file__).resolve().parent.parent / "tables"  # in site-packages PyTables may own it, without a table
+_TABLES = _BESIDE if any(_BESIDE.glob("*.nc")) else Path("tables")
 
 
 def _default_guide() -> Path | None:
@@ -53,15 +39,8 @@ def _default_guide() -> Path | None:
     return beside if (beside / "index.html").is_file() else None
 
 
-def _usable(key: SecretStr) -> SecretStr:
-    # An empty variable must not count as "no key": a variable that is set shows that a key was intended.
-    if not re.fullmatch(r"[!-~]{1,512}", key.get_secret_value()):
-        raise ValueError("unusable key")
-    return key
-
-
-def _one_name_each(keys: dict[str, SecretStr]) -> dict[str, SecretStr]:
-    if len({key.get_secret_value() for key in keys.values()}) != len(keys):
+def _one_name_each(keys: dict[str, Secret[str]]) -> dict[str, Secret[str]]:
+    if len(set(keys.values())) != len(keys):
         raise ValueError("two names for one key")
     return keys
 
@@ -70,7 +49,8 @@ def _whole(default: int, least: int, most: int, more: str = "") -> Any:
     return Field(default, ge=least, le=most, description=f"an integer from {least}{more} to {most}")
 
 
-Key = Annotated[SecretStr, AfterValidator(_usable)]
+# An empty variable must not count as "no key": a variable that is set shows that a key was intended.
+Key = Secret[Annotated[str, Field(pattern=r"^[!-~]{1,512}$")]]
 KeyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")]
 
 
@@ -79,8 +59,8 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
-    tables: Annotated[tuple[Path, ...], NoDecode, _split(os.pathsep)] = Field(
-        default_factory=_default_tables,
+    tables: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(partial(_split, separator=os.pathsep))] = Field(
+        default_factory=lambda: (_TABLES,),
         min_length=1,
         description=f"a table file or a directory of *.nc files, or several joined by {os.pathsep!r}",
     )
@@ -95,10 +75,10 @@ class Settings(BaseSettings):
     client_timeout_s: int = _whole(30, 1, 3600)
     time_limit_s: int = _whole(300, 1, 86400)
     api_key: Key | None = Field(None, description="1 to 512 printable ASCII characters without spaces")
-    api_keys: Annotated[
-        dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), _split(","), AfterValidator(_one_name_each)
-    ] = Field(default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -")
-    cors_origins: Annotated[tuple[str, ...], NoDecode, _split(",")] = Field(
+    api_keys: Annotated[dict[KeyName, Key], NoDecode, BeforeValidator(_pairs), AfterValidator(_one_name_each)] = Field(
+        default_factory=dict, description="name=key pairs joined by commas; names of letters, digits and . _ -"
+    )
+    cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)] = Field(
         (), description="origins such as https://tool.example joined by commas, or *"
     )
     root_path: str = Field("", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="a path such as /friction, or nothing")
@@ -127,13 +107,7 @@ class Settings(BaseSettings):
 
 
 def load_settings(**chosen: Any) -> Settings:
-    """Read the settings from the environment; ``chosen`` wins over it.
-
-    Raises
-    ------
-    SettingsError
-        Names every bad variable, its value and its bound, in one line.
-    """
+    """The settings of the environment; ``chosen`` wins.  SettingsError names all that is bad, in one line."""
     try:
         return Settings(**chosen)
     except ValidationError as error:

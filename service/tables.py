@@ -2,21 +2,18 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from mumacro import Surrogate, TableError
 
 from . import API_VERSION
 from .problems import FieldFault, Kind, RequestError, refuse
 
-__all__ = ["LoadedTable", "Tables", "table_files"]
-
 _log = logging.getLogger("mumacro.tables")
 
 
-def table_files(paths: Sequence[Path]) -> list[Path]:
+def _files(paths: Sequence[Path]) -> list[Path]:
     """Files among ``paths``, and the ``*.nc`` files of the directories among them, in order of name.
 
     TableError where a path is missing, or a directory holds no table.
@@ -31,7 +28,7 @@ def table_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _stamp(path: Path) -> tuple[int, int, int]:
-    """The state of a file; TableError where there is none."""
+    """Size, time and place of a file; TableError where there is none."""
     try:
         status = path.stat()
     except OSError as error:
@@ -39,31 +36,20 @@ def _stamp(path: Path) -> tuple[int, int, int]:
     return status.st_size, status.st_mtime_ns, status.st_ino
 
 
-@dataclass
 class LoadedTable:
-    """A table in memory, and the state of its file when it was read."""
+    """A table in memory, and the state of its file when it was read; TableError where it is damaged."""
 
-    surrogate: Surrogate
-    stamp: tuple[int, int, int]
-
-    @classmethod
-    def open(cls, path: Path) -> Self:
-        """Read and check one table; TableError where it is damaged, or its known answer is wrong."""
-        stamp = _stamp(path)
-        surrogate = Surrogate.open(path, threads=1)
-        surrogate.self_check()
-        return cls(surrogate, stamp)
-
-    def __post_init__(self) -> None:
+    def __init__(self, path: Path) -> None:
+        self.stamp, self.surrogate = _stamp(path), Surrogate.open(path, threads=1)
         self.id = self.surrogate.id
         #: the table's label in every answer
         self.label = {"id": self.id, "tolerance": self.surrogate.tolerance}
         #: fields of every answer: the table and the version of the interface
         self.signature: dict[str, Any] = {"table": self.label, "api_version": API_VERSION}
-        self.size_bytes = self.stamp[0]
+        self.check()
 
     def check(self) -> None:
-        """Check the known answer again, and that the file is as it was; else TableError."""
+        """Check the known answer, and that the file is as it was; else TableError."""
         self.surrogate.self_check()
         if _stamp(self.surrogate.path) != self.stamp:
             raise TableError(self.surrogate.path, "the file was changed after it was loaded; restart the service")
@@ -80,7 +66,7 @@ class Tables:
     def load(self) -> None:
         """Load all tables.  A refused table makes the service not ready; it never stops the process."""
         try:
-            tables = [LoadedTable.open(path) for path in table_files(self.paths)]
+            tables = [LoadedTable(path) for path in _files(self.paths)]
             names = [table.id for table in tables]
             for table in tables:
                 if names.count(table.id) > 1:
@@ -98,12 +84,15 @@ class Tables:
 
     def check(self) -> None:
         """Check every table again; TableError, or RequestError where none is loaded."""
-        for table in self._ready():
+        self.pick()
+        for table in self.loaded:
             table.check()
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
         """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0 [-])."""
-        tables = self._ready()
+        if self.fault is not None:
+            raise RequestError(Kind.NOT_READY, self.fault)
+        tables = self.loaded
         if tolerance is None:
             return tables[0]
         fit = [table for table in tables if table.surrogate.tolerance <= tolerance]
@@ -111,9 +100,4 @@ class Tables:
             tightest = tables[0].surrogate.tolerance
             reason = f"must be >= {tightest:g}: no loaded table is tighter"
             refuse([FieldFault(("tolerance",), reason, tolerance, parameter)], tightest_available=tightest)
-        return min(fit, key=lambda table: (table.size_bytes, -table.surrogate.tolerance))
-
-    def _ready(self) -> tuple[LoadedTable, ...]:
-        if self.fault is not None:
-            raise RequestError(Kind.NOT_READY, self.fault)
-        return self.loaded
+        return min(fit, key=lambda table: (table.stamp[0], -table.surrogate.tolerance))

@@ -16,8 +16,6 @@ from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-__all__ = ["CASE", "Server", "asking", "chunk", "connect", "head", "running", "serving", "to_end"]
-
 ROOT = Path(__file__).resolve().parent.parent
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
 START_S = 180.0

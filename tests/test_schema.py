@@ -24,17 +24,17 @@ from service.settings import Settings  # noqa: E402
 EXAMPLES = 25
 ARROW, NDJSON = "application/vnd.apache.arrow.stream", "application/x-ndjson"
 RELATIONS = (
-    r"has no effect unless include has std", r"is required if include has std",
+    r"must be (left out: no effect unless|given if) include has std",
     r"must be left out: it is the unknown or swept input", r"must be >= 1e-12: no loaded table is tighter",
     r"is given in the query and in the body",
     r"is given more than once",  # k=low..high beside k_range
     r"must be two (ascending, finite )?numbers", r"must be (finite and )?> start", r"lists must have one length",
     r"is required: (omega|the tangential stiffness)", r"omega is given, too",
-    r"give the standard deviation of omega or of f, not of both", r"must be > 0 on a logarithmic scale",
+    r"must be left out beside omega", r"must be finite and > 0 on a logarithmic scale",
     r"must be mu_macro where mu0 is the unknown", r".* is the swept input", r"(mu0|Fz|k) must be finite and > 0",
     r"is not in the answer", r"must be left out (for direction|beside)", r"must be two stiffnesses",
-    r"must be across or along for a ball", r"has (y0|Fz_amplitude), which direction",
-    r"has approximations, which are those of one spring", r".* is (not computed|for one case)",
+    r"must be across or along for a ball", r"must be without (y0|Fz_amplitude|approx)",
+    r".* is (not computed|for one case)",
     r"must be >= 0 and below Fz", r"must be left out: (over an interval|unknown field)",
     r"must be left out where k is the swept input", r"must be given(:| \[)",
 )  # fmt: skip

@@ -83,19 +83,6 @@ def test_a_large_batch_keeps_its_order(client: Any, case: Case, surrogate: Surro
     assert [result["mu_macro"] for result in rows["results"]] == answer["mu_macro"][::10]
 
 
-@pytest.mark.parametrize("n", [1, 7, 300, 4096, 4097])
-def test_plain_columns_get_the_same_bytes_on_the_fast_path(client: Any, case: Case, n: int) -> None:
-    columns = {**case, "v0": np.geomspace(1e-6, 1e2, n).tolist(), "k": [1e6] * n}
-    text = json.dumps(columns)
-    escaped = text.replace('"mu0"', '"\\u006du0"')  # an escaped name is read by the general parser
-    short, long = (posted(client, "json", body) for body in (text, escaped))
-    assert short.content == long.content
-    assert len(short.json()["mu_macro"]) == n
-    answer = client.post(BATCH, json={**columns, "v0": [*columns["v0"][:-1], -1.0]}).json()
-    assert (answer["n_errors"], answer["errors"][0]["index"]) == (1, n - 1)
-    assert answer["mu_macro"][:-1] == short.json()["mu_macro"][:-1]
-
-
 def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(client: Any, case: Case) -> None:
     rows = client.post(BATCH, json=[]).json()
     assert (rows["results"], rows["errors"], rows["n_errors"]) == ([], [], 0)
@@ -141,19 +128,6 @@ def test_an_odd_line_among_plain_ones_affects_only_itself(client: Any, case: Cas
     if status not in (..., None):
         assert answers[1]["instance"] == f"{BATCH}#line=3"
         assert answers[1]["type"].endswith("malformed-body") == (status == 400)
-
-
-def test_bad_lines_among_many_plain_ones_are_reported_by_number(client: Any, case: Case, surrogate: Surrogate) -> None:
-    lines = [{**case, "v0": 1e-4 * (i + 1)} for i in range(3000)]
-    expected = surrogate.evaluate({**case, "v0": [line["v0"] for line in lines]}).mu_macro.tolist()
-    bad = range(3, 3000, 7)
-    for index in bad:
-        lines[index] = {**case, "v0": -1.0} if index % 2 else {**case, "speed": 1.0}
-    answers = asked(client, "ndjson", lines)
-    assert [answer.get("mu_macro") for answer in answers] == [None if i in bad else x for i, x in enumerate(expected)]
-    for index in bad:
-        assert answers[index]["instance"] == f"{BATCH}#line={index + 1}"
-        assert answers[index]["errors"][0]["field"] == ("v0" if index % 2 else "speed")
 
 
 def test_a_stream_may_be_longer_than_a_body_but_its_lines_may_not(started: Any, case: Case) -> None:

@@ -107,12 +107,6 @@ def test_a_head_is_refused_with_its_status(raw: Any, text: bytes, status: Any) -
     assert status == 200 or json.loads(content)["status"] == status
 
 
-def test_a_head_without_an_end_is_cut_at_its_limit(raw: Any) -> None:
-    with suppress(OSError):
-        raw.sendall(GET[:-2] + b"A: " + b"b" * 10_000_000)
-    assert not to_end(raw).startswith(b"HTTP/1.1 200")
-
-
 #: what a client sends, what it sends again and again, and what is in the answer before the connection ends
 SLOW = {
     "silent": (b"", b"", b""),
@@ -236,22 +230,6 @@ def test_a_body_is_read_in_any_pieces_after_100_continue(live_server: Any, raw: 
     status, received = answer(raw)
     assert status == 200
     assert received.strip() == live_server.ask("POST", BATCH, body)[2]
-
-
-def test_no_piece_of_a_stream_is_lost(raw: Any) -> None:
-    # Lines end inside pieces and between pieces, and both directions are busy at the same time.
-    lines = b"".join(json.dumps({**CASE, "v0": 1e-5 * i}).encode() + b"\n" for i in range(1, 3001))
-    answers: list[Any] = []
-    reader = threading.Thread(target=lambda: answers.extend(map(json.loads, answer(raw)[1].splitlines())))
-    reader.start()
-    raw.sendall(head(BATCH, None, NDJSON))
-    for start in range(0, len(lines), 777):
-        raw.sendall(chunk(lines[start : start + 777]))
-    raw.sendall(END)
-    reader.join(PATIENCE_S)
-    found = [line["mu_macro"] for line in answers]
-    assert len(found) == 3000
-    assert found == sorted(found)
 
 
 @pytest.mark.slow

@@ -59,18 +59,18 @@ REFUSED = [
     *(("POST mu-macro", {"include": [name]}, "#/include/0", "groups, limits") for name in ("curvature", "Groups", 1)),
     *(("POST mu-macro", {"include": value}, "#/include", "a list of names") for value in ("groups", 3, {"groups": 1})),
     *(("GET mu-macro", {"include": name}, "?include", "groups, limits") for name in ("curvature", "")),
-    *((f"POST {path}", {"include": ["std"]}, "#/std", "is required") for path in ("mu-macro", "mu-macro/batch")),
+    *((f"POST {path}", {"include": ["std"]}, "#/std", "given if") for path in ("mu-macro", "mu-macro/batch")),
     *((f"POST {path}", {"include": ["groups"], "std": {}}, "#/std", "no effect")
       for path in ("mu-macro", "mu-macro/batch")),
     *(("POST mu-macro", {"include": ["std"], "std": {name: value}}, f"#/std/{name}", words)
       for name, value, words in (("mu0", -1, "finite and >= 0"), ("mu0", "0.1", "number"), ("speed", 1, "unknown"))),
     ("POST mu-macro", {"include": ["std"], "std": [1, 2]}, "#/std", "an object of numbers"),
     ("POST mu-macro", {"include": ["std"], "std": {"omega": 1.0, "f": 1.0}}, "#/std/f", "not of both"),
-    ("GET mu-macro", {"include": "std"}, "?std_mu0", "is required"),
+    ("GET mu-macro", {"include": "std"}, "?std_mu0", "given if"),
     ("GET mu-macro", {"std_v0": 1}, "?std_mu0", "no effect"),
     ("GET mu-macro", {"include": "std", "std_v0": -1}, "?std_v0", "finite and >= 0"),
     ("GET mu-macro", {"include": "std", "std_omega": 1.0, "std_f": 1.0}, "?std_f", "not of both"),
-    ("POST mu-macro/batch?include=std", {}, "?std_mu0", "is required"),
+    ("POST mu-macro/batch?include=std", {}, "?std_mu0", "given if"),
     # contact, direction, interval
     *(("POST mu-macro", changed, f"#/{place}", words) for changed, place, words in (
         ({"contact": "cone"}, "contact", "spring, ball"), ({"direction": "up"}, "direction", "across, along, normal"),

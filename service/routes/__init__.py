@@ -6,8 +6,9 @@ answer.  What is refused is raised, see :mod:`service.problems`.
 
 import inspect
 import string
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 from urllib.parse import parse_qsl
@@ -20,29 +21,15 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from ..answers import Wanted
-from ..limits import SMALL_BODY, media_type_of, read_body
-from ..options import NAMES, Options, query_of, read_form
+from ..case import asked_of, checked
+from ..limits import SMALL_BODY, form_of, read_body
+from ..options import NAMES, Options, kind_in, names_in, options_of, query_of
 from ..problems import FieldFault, Kind, RequestError, refuse
-from ..tables import LoadedTable
+from ..tables import LoadedTable, Tables
 from ..wire.json import decode
 
-__all__ = [
-    "Asking", "Endpoint", "Routes", "file_answer", "given_in_body", "given_in_query", "in_thread", "path_of", "reply",
-]  # fmt: skip
-
 _JSON = "application/json"
-_AS_JSON = _JSON.encode()
-_WHY = {
-    400: "The request cannot be read: an empty body, a wrong text, a header that is given twice",
-    401: "The service needs an API key, and none or a wrong one was sent",
-    408: "The request was not complete in time",
-    413: "The body or the batch is too large",
-    415: "The body has another media type",
-    416: "The file has no such part",
-    422: "Invalid, missing or unknown fields",
-    501: "The service was installed without a package that this needs",
-    503: "Not ready or overloaded; see Retry-After",
-}
+_TITLES = {code: "; ".join(kind.title for kind in Kind if kind.status == code) for code in {k.status for k in Kind}}
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()  # of a query that needs no decoding
 _PROBLEM = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
 _ID = {"X-Request-ID": {"description": "The request's id, as in the log", "schema": {"type": "string"}}}
@@ -80,7 +67,7 @@ class Endpoint:
         statuses = {*self.statuses, *(() if self.open else (401, 503)), *((400, 422) if self.form else ())}
         statuses |= {408, 413, 415} if post else set()
         responses: dict[int | str, dict[str, Any]] = {200: {}, **self.content}
-        responses |= {code: {"description": _WHY[code], "content": _PROBLEM} for code in sorted(statuses)}
+        responses |= {code: {"description": _TITLES[code], "content": _PROBLEM} for code in sorted(statuses)}
         for code, response in responses.items():
             headers = {**response.get("headers", {}), **_ID, **({"Retry-After": _RETRY} if code == 503 else {})}
             responses[code] = {**response, "headers": headers}
@@ -100,31 +87,23 @@ class Endpoint:
         )  # fmt: skip
 
 
-class Routes:
-    """Finds the endpoint of a path, which has no parameters, and of a method."""
+class Routes(dict[str, dict[str, Answer]]):
+    """The functions that answer, by path, which has no parameters, and by method."""
 
     def __init__(self, endpoints: Iterable[Endpoint]) -> None:
-        self._found: dict[str, dict[str, Answer]] = {}
         for endpoint in endpoints:
-            methods = self._found.setdefault(endpoint.path, {})
-            for method in ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,):
-                methods[method] = endpoint.answer
+            methods = ("GET", "HEAD") if endpoint.method == "GET" else (endpoint.method,)
+            self.setdefault(endpoint.path, {}).update(dict.fromkeys(methods, endpoint.answer))
 
-    def __call__(self, path: str, method: str) -> Answer | None:
+    def find(self, path: str, method: str) -> Answer | None:
         """The function that answers; None for a path of no endpoint."""
-        methods = self._found.get(path)
+        methods = self.get(path)
         if methods is None:
             return None
         if method in methods:
             return methods[method]
         allowed = ", ".join(sorted(methods))
-        told = f"{method[:20]} is not allowed here; allowed: {allowed}"
-        raise HTTPException(405, told, {"Allow": allowed})
-
-
-def path_of(scope: Scope) -> str:
-    """The path within this application: without the prefix of a proxy."""
-    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
+        raise HTTPException(405, f"{method[:20]} is not allowed here; allowed: {allowed}", {"Allow": allowed})
 
 
 # --- requests -------------------------------------------------------------------------------------------
@@ -143,15 +122,29 @@ class Asking(NamedTuple):
         """Read and check a request; the option ``wanted`` names the input that is asked for."""
         given = await given_in_body(request) if request.scope["method"] == "POST" else given_in_query(request)
         name = wanted and given.get(wanted, model.model_fields[wanted].default)
-        found = read_form(model, given, [name] if name and name in NAMES else [], one=one)
-        return cls(request.app.tables.pick(found[0].tolerance), *found)
+        return cls.made(request.app.tables, model, given, [name] if name in NAMES else [], one=one)
+
+    @classmethod
+    def made(
+        cls, tables: Tables, model: Any, given: Mapping[str, Any], left_out: Sequence[str] = (),
+        null_is_rigid: bool = True, one: bool = False,
+    ) -> "Asking":  # fmt: skip
+        """Check what is given; ``left_out`` are the inputs that are asked for, of which a null says the same."""
+        form, rest, faults = options_of(model, given)
+        if left_out:
+            rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
+        asked = asked_of(rest, form.kind if form is not None else kind_in(given))
+        values, more = checked(rest, left_out, null_is_rigid, names_in(model)[1], asked)
+        if form is None or more:
+            refuse([*faults, *more])
+        return cls(tables.pick(form.tolerance), form, values, form.wanted(asked, one))
 
 
 async def given_in_body(request: Request) -> dict[str, Any]:
     """The members of a small JSON body."""
     headers = dict(request.scope["headers"])
-    if headers.get(b"content-type") != _AS_JSON or b"content-encoding" in headers:
-        media_type_of(headers, {_JSON: _JSON})
+    if headers.get(b"content-type") != b"application/json" or b"content-encoding" in headers:
+        form_of(headers, {_JSON: _JSON})
     limit = min(SMALL_BODY, request.app.settings.max_body_bytes)
     found = decode(await read_body(headers, request.receive, limit))
     if not isinstance(found, dict):
@@ -213,28 +206,34 @@ def _number(text: str) -> Any:
 class Reply(Response):
     """A complete answer; Starlette's own looks for what the headers may lack, which takes as long as a case."""
 
-    background = None
-
-    def __init__(self, content: bytes, headers: Mapping[str, str], media_type: str) -> None:
-        self.status_code, self.body = 200, content
+    def __init__(self, content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> None:
+        self.status_code, self.body, self.background = 200, content, None
         self.raw_headers = [(b"content-length", b"%d" % len(content)), (b"content-type", media_type.encode())]
-        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+        self.raw_headers += [(name.lower().encode(), value.encode()) for name, value in (headers or {}).items()]
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        del scope, receive
+    async def __call__(self, _scope: Scope, _receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
         await send({"type": "http.response.body", "body": self.body})
-
-
-def reply(content: bytes, headers: Mapping[str, str] | None = None, media_type: str = _JSON) -> Response:
-    """A complete answer."""
-    return Reply(content, headers or {}, media_type)
 
 
 async def in_thread(request: Request, work: Callable[[], Response]) -> Response:
     """The answer to the question of a person, made in a thread."""
     answer: Response = await request.app.work.question(work)
     return answer
+
+
+def question(model: type[Options], wanted: str) -> Callable[[Callable[[Asking], Response]], Answer]:
+    """Makes the function of a question about the input that the option ``wanted`` names an endpoint's."""
+
+    def made(work: Callable[[Asking], Response]) -> Answer:
+        @wraps(work)
+        async def answer(request: Request) -> Response:
+            found = await Asking.of(request, model, wanted)
+            return await in_thread(request, lambda: work(found))
+
+        return answer
+
+    return made
 
 
 class _File(FileResponse):

@@ -5,7 +5,9 @@ A slot is taken when more than a small body, or a large computation, is at hand;
 line.  Computing and reading happen in threads.
 """
 
+import asyncio
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
@@ -16,18 +18,22 @@ from mumacro.errors import MumacroError
 
 from ..answers import answer_case
 from ..case import Columns
-from ..limits import AT_ONCE, SMALL_BODY, Work, media_type_of, read_body
-from ..options import Options, options_of, read_form
+from ..limits import AT_ONCE, SMALL_BODY, form_of, read_body, within
+from ..options import Options, options_of
 from ..problems import FieldFault, Kind, RequestError, document_of, refuse
-from ..wire import Batch, Form, forms
+from ..wire import Batch, Form, csv, json
 from ..wire.json import decode, dump
-from . import Endpoint, given_in_query
-
-__all__ = ["ENDPOINTS"]
+from . import Asking, Endpoint, given_in_query
 
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _LINES = 512 * 1024  # bytes of lines that are answered together
 _BYTES_PER_UNIT = 16  # of a body, read in the time of a plain case
+_FORMS = [*json.FORMS, csv.FORM]
+if find_spec("pyarrow"):
+    from ..wire import arrow
+
+    _FORMS.append(arrow.FORM)
+FORMS = {name: form for form in _FORMS for name in (form.media_type, *form.aliases)}
 
 
 class _Answer(Response):
@@ -36,26 +42,22 @@ class _Answer(Response):
     background = None
 
     def __init__(self, request: Request) -> None:
-        self._request, self._app = request, request.app
+        self._request, self._app, self._work = request, request.app, request.app.work
         self._given: Mapping[bytes, bytes] = dict(request.scope["headers"])
-        self._work: Work = request.app.work
-        self._limit: int = self._app.settings.max_body_bytes
-        self._most: int = self._app.settings.max_batch
+        self._limit, self._most = self._app.settings.max_body_bytes, self._app.settings.max_batch
         self._placed = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, and give the slot back if one was taken."""
         del scope
         try:
-            async with self._work.deadline():
+            async with within(self._app.settings.time_limit_s):
                 self._query = given_in_query(self._request)
                 _, rest, faults = options_of(Options, self._query, parameter=True)
                 told = "is no option; inputs belong in the body"
                 if faults := [*faults, *(FieldFault((name,), told, parameter=True) for name in rest)]:
                     refuse(faults)
-                found = forms()
-                known = {name: form.media_type for form in found.values() for name in (form.media_type, *form.aliases)}
-                form = found[media_type_of(self._given, known)]
+                form = form_of(self._given, FORMS)
                 await (self._stream if form.streams else self._whole)(form, receive, send)
         finally:
             if self._placed:
@@ -67,9 +69,11 @@ class _Answer(Response):
             self._placed = True
 
     async def _run(self, work: Any, cost: float) -> Any:
-        if cost > AT_ONCE:
-            self._place()
-        return await self._work.batches.run(work, cost)
+        """Do the work at once if it is small, else in a thread, so that it delays no other request."""
+        if cost <= AT_ONCE:
+            return work()
+        self._place()
+        return await asyncio.wrap_future(self._work.batches.threads.submit(work))
 
     def _batch(self, columns: Columns, given: Mapping[str, Any]) -> Batch:
         """The batch with the options of query and body together."""
@@ -165,8 +169,7 @@ class _Answer(Response):
         """The answer to one case of a stream, where a null is a gap."""
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
-        options, case, wanted = read_form(Options, self._both(given), null_is_rigid=False)
-        table = self._app.tables.pick(options.tolerance)
+        table, _, case, wanted = Asking.made(self._app.tables, Options, self._both(given), null_is_rigid=False)
         values, source = answer_case(table.surrogate, case, wanted)
         self._app.metrics.case(table, source)
         return dump({**values, **table.signature})
@@ -186,16 +189,14 @@ async def _next_line(receive: Receive, text: bytearray) -> bool:
 
 def _gathered(pieces: Iterator[bytes]) -> Iterator[bytes]:
     """The same bytes in larger pieces."""
-    gathered: list[bytes] = []
-    size = 0
+    gathered = bytearray()
     for piece in pieces:
-        gathered.append(piece)
-        size += len(piece)
-        if size >= _PIECE:
-            yield b"".join(gathered)
-            gathered, size = [], 0
-    if size:
-        yield b"".join(gathered)
+        gathered += piece
+        if len(gathered) >= _PIECE:
+            yield bytes(gathered)
+            gathered.clear()
+    if gathered:
+        yield bytes(gathered)
 
 
 async def post_mu_macro_batch(request: Request) -> Response:
@@ -206,7 +207,7 @@ async def post_mu_macro_batch(request: Request) -> Response:
     return _Answer(request)
 
 
-_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in forms().values()} for part in ("body", "answer"))
+_BODIES, _ANSWERS = ({form.media_type: getattr(form, part) for form in _FORMS} for part in ("body", "answer"))
 ENDPOINTS = [
     Endpoint(
         "/v1/mu-macro/batch", "POST", post_mu_macro_batch, "Macroscopic friction of many cases", Options,

@@ -12,9 +12,7 @@ from ..models import CaseAnswer, model
 from ..options import MODEL, CaseRequest, Options, bounded
 from ..problems import FieldFault, refuse
 from ..wire.json import dump
-from . import Asking, Endpoint, reply
-
-__all__ = ["ENDPOINTS"]
+from . import Asking, Endpoint, Reply
 
 PATH = "/v1/mu-macro"
 _LARGE = 100  # cost from which one case is computed in a thread, in times of a plain one
@@ -47,12 +45,12 @@ async def _answered(request: Request, asking: type[Options] = Options) -> tuple[
 
 async def post_mu_macro(request: Request) -> Response:
     """Answer one case given as a JSON object; ``include`` adds quantities to the default answer."""
-    return reply(dump((await _answered(request))[1]))
+    return Reply(dump((await _answered(request))[1]))
 
 
 async def get_mu_macro(request: Request) -> Response:
     """Answer one case given as a query.  The answer can be cached."""
-    return reply(dump((await _answered(request))[1]), request.app.settings.cache_fields)
+    return Reply(dump((await _answered(request))[1]), request.app.settings.cache_fields)
 
 
 async def get_mu_macro_text(request: Request) -> Response:
@@ -65,7 +63,7 @@ async def get_mu_macro_text(request: Request) -> Response:
         told = f"is not in the answer; there are: {', '.join(answer)}; more with include"
         refuse([FieldFault.of("value", told, form.value)])
     text = found.encode() if isinstance(found, str) else dump(found)
-    return reply(text, request.app.settings.cache_fields, "text/plain; charset=utf-8")
+    return Reply(text, request.app.settings.cache_fields, "text/plain; charset=utf-8")
 
 
 _KEPT = {"description": "How long, and by whom, it may be cached", "schema": {"type": "string"}}

@@ -16,19 +16,18 @@ from mumacro.contact import AMPLITUDE, ContactName, DirectionName
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
 from mumacro.geometries import ARGUMENTS, GEOMETRIES, contact_of
+from mumacro.inputs import NAMES as INPUTS
 from mumacro.inputs import RIGID, is_rigid
 from mumacro.measured import STD, UNKNOWNS
 
 from .. import API_VERSION
-from ..case import INPUTS, Asked, not_finite, stranger
+from ..case import Asked, not_finite, stranger
 from ..models import Answered, Strict, many, model, optional, told
 from ..options import NAMES, Choice, Positive, bounded, input_fields, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from ..tables import LoadedTable
 from ..wire.json import dump
-from . import Endpoint, given_in_body, in_thread, reply
-
-__all__ = ["ENDPOINTS"]
+from . import Endpoint, Reply, given_in_body, in_thread
 
 _MODULI = ("E", "E2")  # which the word rigid may stand for
 _Poisson = Annotated[float, Field(gt=-1.0, le=0.5)]
@@ -37,16 +36,13 @@ _Poisson = Annotated[float, Field(gt=-1.0, le=0.5)]
 async def post_stiffness(request: Request) -> Response:
     """Return k, and the contact to ask for with it; the arguments of a geometry in SI."""
     given = {name: value for name, value in (await given_in_body(request)).items() if value is not None}
-    geometry = given.pop("geometry", None)
+    geometry = str(given.pop("geometry", None))
     rigid = {name: math.inf for name in _MODULI if isinstance(given.get(name), str) and is_rigid(given[name])}
     numbers = [name for name in given if name in ARGUMENTS and name not in rigid and not ARGUMENTS[name].choices]
-    faults = [fault for name in numbers if (fault := not_finite(name, given[name]))]
-    if not isinstance(geometry, str):
-        faults.append(FieldFault.of("geometry", f"must be one of {', '.join(GEOMETRIES)}", geometry))
-    if faults:
+    if faults := [fault for name in numbers if (fault := not_finite(name, given[name]))]:
         refuse(faults)
-    found = asdict(contact_of(str(geometry), **{**given, **rigid}))
-    return reply(dump({"geometry": geometry, **found, "api_version": API_VERSION}))
+    found = asdict(contact_of(geometry, **{**given, **rigid}))
+    return Reply(dump({"geometry": geometry, **found, "api_version": API_VERSION}))
 
 
 def _member(name: str) -> Any:
@@ -96,32 +92,28 @@ async def post_fit(request: Request) -> Response:
     form, points, faults = options_of(FitOptions, given)
     columns = {name: _column(name, value, faults) for name, value in points.items() if value is not None}
     if form is not None:
-        twice = [name for name in form.unknowns if name in columns]
-        faults += [FieldFault.of(name, "must be left out: it is among the unknowns") for name in twice]
-        wrong = "y0" if form.kind.normal else AMPLITUDE
-        faults += [FieldFault.of(wrong, stranger(wrong, Asked(form.kind), ()))] if wrong in columns else []
+        told = stranger("y0", Asked(form.kind), ())
+        wrong = {"y0" if form.kind.normal else AMPLITUDE: told}
+        wrong |= dict.fromkeys(form.unknowns, "must be left out: it is among the unknowns")
+        faults += [FieldFault.of(name, reason) for name, reason in wrong.items() if name in columns]
     if form is None or faults:
         refuse(faults)
     table = request.app.tables.pick(form.tolerance)
-    return await in_thread(request, lambda: reply(dump(_answer(table, form, columns))))
+    return await in_thread(request, lambda: Reply(dump(_answer(table, form, columns))))
 
 
 def _column(name: str, value: Any, faults: list[FieldFault]) -> Any:
     """Numbers as an array, of no dimension for one number; the word rigid is an infinite k."""
     if name == "k" and isinstance(value, str) and is_rigid(value):
         return math.inf
-    places = [(i,) for i in range(len(value))] if isinstance(value, list) else [()]
-    entries = value if isinstance(value, list) else [value]
-    bad = (not_finite(name, entry, *place) for entry, place in zip(entries, places, strict=True))
-    fault = next(filter(None, bad), None)
+    entries = {(i,): entry for i, entry in enumerate(value)} if isinstance(value, list) else {(): value}
+    bad = [fault for place, entry in entries.items() if (fault := not_finite(name, entry, *place))][:1]
     if name not in _COLUMNS:
-        fault = FieldFault.of(name, f"unknown field; allowed: {', '.join(_COLUMNS)}")
+        bad = [FieldFault.of(name, f"unknown field; allowed: {', '.join(_COLUMNS)}")]
     elif len(entries) > MAX_POINTS:
-        fault = FieldFault.of(name, f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them")
-    if fault is None:
-        return np.array(value, np.float64)
-    faults.append(fault)
-    return None
+        bad = [FieldFault.of(name, f"may have up to {MAX_POINTS} points, this has {len(entries)}: average them")]
+    faults += bad
+    return None if bad else np.array(value, np.float64)
 
 
 def _answer(table: LoadedTable, form: FitOptions, columns: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,7 @@
-"""``/``: the page.  It shows the map of all cases with the user's point on it, and the friction law."""
+"""``/``: the page, a map of all cases with the user's point on it, and the friction law; ``/docs``: the description.
+
+What is served from files holds no number of a table and loads nothing from elsewhere.
+"""
 
 from pathlib import Path
 
@@ -10,32 +13,34 @@ from mumacro.page import POLICY, map_of, names
 from .. import __version__
 from ..options import CaseRequest
 from ..wire.json import dump
-from . import Endpoint, file_answer, in_thread, reply
+from . import Endpoint, Reply, file_answer, in_thread
 
-__all__ = ["ASSETS", "ENDPOINTS", "FOLDER", "POLICY"]
-
-FOLDER = Path(__file__).resolve().parent.parent / "static" / "page"
-_TYPES = {".js": "text/javascript", ".css": "text/css"}
-ASSETS = {path.name: _TYPES[path.suffix] for path in sorted(FOLDER.iterdir()) if path.suffix in _TYPES}
+STATIC = Path(__file__).resolve().parent.parent / "static"
+_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _FRESH = {"Cache-Control": "no-cache"}
-_SECURE = {"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer", **_FRESH}
+# Inline styles are allowed at /docs: the interface sets some on its elements.
+_DOCS_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 
 
-def asset(path: Path, media_type: str, url: str, headers: dict[str, str]) -> Endpoint:
-    """The endpoint of a file; it holds no number of a table."""
+def _file(path: Path, url: str = "", policy: str = "") -> Endpoint:
+    """The endpoint of a file.  What is vendored changes with its version only."""
+    headers = {"Cache-Control": "public, max-age=86400"} if path.name.startswith("swagger-ui") else _FRESH
+    if policy:
+        headers = {"Content-Security-Policy": policy, "Referrer-Policy": "no-referrer", **headers}
 
     async def answer(request: Request) -> Response:
-        return file_answer(request, path, headers, media_type=media_type)
+        return file_answer(request, path, headers, media_type=_TYPES[path.suffix])
 
-    return Endpoint(url, "GET", answer, open=True)
+    return Endpoint(url or f"/static/{path.relative_to(STATIC).as_posix()}", "GET", answer, open=True)
 
 
 async def _names(request: Request) -> Response:
     """The library's inputs, units and bounds, the geometries of a contact, and what this service can do."""
     guide = ["guide"] if request.app.settings.guide is not None else []
-    paths = {getattr(route, "path", "").removeprefix("/v1/") for route in request.app.routes}
-    panels = [name for name in ("stiffness", "fit") if name in paths]
-    return reply(dump(names(["service", *CaseRequest.model_fields, *panels, *guide])), _FRESH)
+    return Reply(dump(names(["service", *CaseRequest.model_fields, "stiffness", "fit", *guide])), _FRESH)
 
 
 async def _map(request: Request) -> Response:
@@ -45,12 +50,19 @@ async def _map(request: Request) -> Response:
     headers = {"ETag": etag, **_FRESH}
     if etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return await in_thread(request, lambda: reply(dump(map_of(surrogate)), headers))
+    return await in_thread(request, lambda: Reply(dump(map_of(surrogate)), headers))
 
 
+async def _description(request: Request) -> Response:
+    return await in_thread(request, lambda: Reply(request.app.described))
+
+
+ASSETS, _VENDORED = ([*(STATIC / folder).glob("*.*s")] for folder in ("page", "swagger-ui"))  # .js, .css
 ENDPOINTS = [
-    asset(FOLDER / "index.html", "text/html", "/", _SECURE),
+    _file(STATIC / "page" / "index.html", "/", POLICY),
+    _file(STATIC / "swagger-ui" / "index.html", "/docs", _DOCS_POLICY),
+    *map(_file, [*ASSETS, *_VENDORED]),
     Endpoint("/static/page/names.json", "GET", _names, open=True),
     Endpoint("/static/page/map.json", "GET", _map),
-    *(asset(FOLDER / name, kind, f"/static/page/{name}", _FRESH) for name, kind in ASSETS.items()),
+    Endpoint("/openapi.json", "GET", _description),
 ]

@@ -6,21 +6,19 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
-from starlette.requests import Request
 from starlette.responses import Response
 
 from mumacro.contact import SPRING
+from mumacro.errors import InputError
 from mumacro.inputs import field_of, unit_of
 from mumacro.inverse import Solution, solve_for
 from mumacro.law import APPROXIMATIONS, BORDERS, Law, approximations, border_speeds, friction_law, sweep_values
 
 from ..answers import REGIME_NAMES, Part, answer_columns, nested
 from ..models import Answered, default, grouped, included, many, model, optional, told
-from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes, relation
+from ..options import NAMES, Five, Name, NotNegative, Options, Positive, bounded, example, includes
 from ..wire.json import dump
-from . import Asking, Endpoint, in_thread, reply
-
-__all__ = ["ENDPOINTS"]
+from . import Asking, Endpoint, Reply, question
 
 # --- friction law --------------------------------------------------------------------------------------
 
@@ -50,27 +48,8 @@ class LawOptions(_more, Options):  # type: ignore[misc]
     @model_validator(mode="after")
     def _sensible(self) -> Self:
         if _APPROXIMATIONS in (self.include or ()) and self.kind != SPRING:
-            raise relation("include", "has approximations, which are those of one spring that oscillates across")
-        if self.scale == "log" and self.start == 0.0:
-            raise relation("start", "must be > 0 on a logarithmic scale; for a range from 0 set scale to linear")
-        if not self.stop > self.start:
-            raise relation("stop", f"must be > start, which is {self.start:g}")
+            raise InputError("include", _APPROXIMATIONS, "without approximations: they are those of one spring, across")
         return self
-
-
-async def post_law(request: Request) -> Response:
-    """Return the law in columns, with its static limit and its border."""
-    found = await Asking.of(request, LawOptions, "along")
-    return await in_thread(request, lambda: reply(_as_json(found)))
-
-
-async def get_law_csv(request: Request) -> Response:
-    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their units."""
-    found = await Asking.of(request, LawOptions, "along")
-    name = f'attachment; filename="friction-law-{found.form.along}.csv"'
-    headers = {"Content-Disposition": name, "Cache-Control": "no-cache"}
-    kind = "text/csv; charset=utf-8; header=present"
-    return await in_thread(request, lambda: reply(_as_csv(found), headers, kind))
 
 
 def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
@@ -89,21 +68,24 @@ def _law(found: Asking) -> tuple[Law, dict[Part, list[Any]]]:
     return law, {part: part.values(answer[part.path]) for part in parts}
 
 
-def _as_json(found: Asking) -> bytes:
+@question(LawOptions, "along")
+def post_law(found: Asking) -> Response:
+    """Return the law in columns, with its static limit and its border."""
     law, columns = _law(found)
     along, per = found.form.along, field_of(found.form.along)[1]
     swept = {"along": along, "unit": unit_of(along), "values": law.values / per}
     border = [{"value": mark.value / per, "mu_macro": mark.mu_macro} for mark in law.border]
     answer = nested({part.path: column for part, column in columns.items()})
-    return dump({**swept, **answer, "border": border, **found.table.signature})
+    return Reply(dump({**swept, **answer, "border": border, **found.table.signature}))
 
 
-def _as_csv(found: Asking) -> bytes:
-    """The columns in order, texts last, with the path as their name."""
+@question(LawOptions, "along")
+def get_law_csv(found: Asking) -> Response:
+    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their units."""
     law, columns = _law(found)
-    per = field_of(found.form.along)[1]
-    heads = {f"{found.form.along} [{unit_of(found.form.along)}]": (law.values / per).tolist()}
-    for part in sorted(columns, key=lambda part: bool(part.names)):
+    along, per = found.form.along, field_of(found.form.along)[1]
+    heads = {f"{along} [{unit_of(along)}]": (law.values / per).tolist()}
+    for part in sorted(columns, key=lambda part: bool(part.names)):  # texts last
         name = part.path.removeprefix(f"{_APPROXIMATIONS}.").replace(f"{_SPEEDS}.", "border_")
         shown = ["" if value != value else value for value in columns[part]]
         heads[name if part.names else f"{name} [{part.unit}]"] = shown
@@ -111,7 +93,8 @@ def _as_csv(found: Asking) -> bytes:
     writer = csv.writer(text)
     writer.writerow(heads)
     writer.writerows(zip(*heads.values(), strict=True))
-    return text.getvalue().encode()
+    headers = {"Content-Disposition": f'attachment; filename="friction-law-{along}.csv"', "Cache-Control": "no-cache"}
+    return Reply(text.getvalue().encode(), headers, "text/csv; charset=utf-8; header=present")
 
 
 # --- inverse -------------------------------------------------------------------------------------------
@@ -140,17 +123,13 @@ class SolveForOptions(Options):
     @model_validator(mode="after")
     def _sensible(self) -> Self:
         if self.quantity == "mu_ratio" and self.unknown == "mu0":
-            raise relation("quantity", "must be mu_macro where mu0 is the unknown")
+            raise InputError("quantity", self.quantity, "mu_macro where mu0 is the unknown")
         return self
 
 
-async def post_solve_for(request: Request) -> Response:
+@question(SolveForOptions, "unknown")
+def post_solve_for(found: Asking) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the range of mu_macro."""
-    found = await Asking.of(request, SolveForOptions, "unknown")
-    return await in_thread(request, lambda: reply(dump(_solved(found))))
-
-
-def _solved(found: Asking) -> dict[str, Any]:
     (table, form, case, wanted), (name, per) = found, field_of(found.form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
@@ -162,23 +141,17 @@ def _solved(found: Asking) -> dict[str, Any]:
     reach, more = solution.reach, iter(_included(found, name, solution))
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
-        in_unit = ({key: getattr(root, key) / per for key in ("value", "low", "high")} for root in roots)
-        shown = [{**root._asdict(), **ends, **next(more)} for root, ends in zip(roots, in_unit, strict=True)]
-        results.append(
-            {"target": target, "roots": shown} | ({} if roots else {"reason": _reason(form, target, solution, unit)})
-        )
-    return {
-        "unknown": form.unknown,
-        "unit": unit_of(form.unknown),
-        "quantity": form.quantity,
-        "range": [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per],
-        "reachable": {
-            "min": reach.mu_min / unit, "max": reach.mu_max / unit,
-            "min_included": reach.min_included, "max_included": reach.max_included,
-        },
-        "results": results,
-        **table.signature,
+        in_unit = [root._replace(value=root.value / per, low=root.low / per, high=root.high / per) for root in roots]
+        results.append({"target": target, "roots": [{**root._asdict(), **next(more)} for root in in_unit]})
+        if not roots:
+            results[-1]["reason"] = _reason(form, target, solution, unit)
+    reachable = {
+        "min": reach.mu_min / unit, "max": reach.mu_max / unit,
+        "min_included": reach.min_included, "max_included": reach.max_included,
     }  # fmt: skip
+    answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity, "results": results}
+    searched = [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per]
+    return Reply(dump({**answer, "range": searched, "reachable": reachable, **table.signature}))
 
 
 def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:

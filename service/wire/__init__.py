@@ -1,36 +1,27 @@
-"""Wire forms of batches: text -> columns, answers -> text.  One file each; ``forms`` names all that are installed.
+"""Wire forms of batches: text -> columns, answers -> text.  One file each.
 
 Answers are evaluated and written in slices, so that memory stays small and other threads run between them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from mumacro.contact import Kind as ContactKind
 
-from ..answers import Codes, Part, Wanted, answer_columns
-from ..case import MAX_ERRORS, Columns, asked_of, faults_in, names_of, stranger
-from ..problems import FieldFault, refuse
+from ..answers import Codes, Wanted, answer_columns
+from ..case import MAX_ERRORS, Columns, columns_of
+from ..problems import FieldFault
 from ..tables import LoadedTable
-
-__all__ = ["Batch", "Form", "check_names", "forms", "text_form"]
 
 
 def check_names(names: Sequence[str], kind: ContactKind, more: Mapping[str, str]) -> None:
     """Refuse columns that such cases lack, do not have, or have twice; ``more`` are other reasons, by name."""
-    asked = asked_of(names, kind)
-    known = names_of(asked)
-    faults = [FieldFault.of(name, stranger(name, asked, known)) for name in dict.fromkeys(names) if name not in known]
-    faults += [FieldFault.of(name, "is given more than once") for name in known if names.count(name) > 1]
-    faults += [FieldFault.of(name, reason) for name, reason in more.items() if name in known]
-    faults += faults_in(names, asked=asked)
-    if faults:
-        refuse(faults)
+    twice = {name: "is given more than once" for name in names if names.count(name) > 1}
+    faults = [FieldFault.of(name, reason) for name, reason in {**more, **twice}.items()]
+    columns_of({name: [] for name in names}, 0, faults=faults, kind=kind)
 
 
 @dataclass
@@ -43,11 +34,6 @@ class Batch:
     errors: list[dict[str, Any]] = field(default_factory=list)
     n_errors: int = 0
     count: Callable[[LoadedTable, Codes], None] = lambda _table, _source: None
-
-    @property
-    def parts(self) -> list[Part]:
-        """The columns of the answers."""
-        return self.wanted.parts
 
     def slices(self, step: int) -> Iterator[tuple[dict[str, Any], Codes, list[str | None]]]:
         """Columns by path, source codes and faults of ``step`` cases after another; a bad case has NaN and -1.
@@ -93,16 +79,3 @@ class Form(NamedTuple):
 def text_form(description: str, **more: Any) -> dict[str, Any]:
     """The description of a body or an answer that is no JSON."""
     return {"schema": {"type": "string", "description": description, **more}}
-
-
-@cache
-def forms() -> dict[str, Form]:
-    """All forms by media type; Arrow only where pyarrow is installed."""
-    from . import csv, json
-
-    made = [*json.FORMS, csv.FORM]
-    if find_spec("pyarrow"):
-        from . import arrow
-
-        made.append(arrow.FORM)
-    return {form.media_type: form for form in made}

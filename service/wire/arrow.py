@@ -11,13 +11,12 @@ import pyarrow as pa
 
 from mumacro.inputs import RIGID
 
+from ..answers import Part
 from ..case import Columns, columns_of, too_large
 from ..options import kind_in
 from ..problems import Kind, RequestError
 from . import Batch, Form, check_names, text_form
 from .json import dump
-
-__all__ = ["FORM"]
 
 _SLICE = 32768  # cases of a record batch of the answer
 
@@ -84,7 +83,8 @@ def _write(batch: Batch) -> Iterator[bytes]:
     sink, signature = io.BytesIO(), batch.table.signature
     writer: Any = None
     for found, source, faults in batch.slices(_SLICE):
-        made = _record(batch, found, source, faults)
+        arrays = {part.path: _array(part, found[part.path], source) for part in batch.wanted.parts}
+        made = pa.record_batch({**arrays, "error": pa.array(faults, pa.string())})
         if writer is None:
             label = {name: value if isinstance(value, str) else dump(value) for name, value in signature.items()}
             writer = pa.ipc.new_stream(sink, made.schema.with_metadata(label))
@@ -96,18 +96,13 @@ def _write(batch: Batch) -> Iterator[bytes]:
     yield sink.getvalue()
 
 
-def _record(batch: Batch, found: dict[str, Any], source: Any, faults: list[str | None]) -> Any:
-    """One record batch.  Regime and source are dictionaries: one byte per case."""
-    arrays = {}
-    for part in batch.parts:
-        column = found[part.path]
-        if part.names:
-            names = list(dict.fromkeys(part.names))
-            codes = np.array([names.index(name) for name in part.names], np.int8)[column]
-            arrays[part.path] = pa.DictionaryArray.from_arrays(pa.array(codes, mask=source < 0), names)
-        else:
-            arrays[part.path] = pa.array(column, mask=np.isnan(column))
-    return pa.record_batch({**arrays, "error": pa.array(faults, pa.string())})
+def _array(part: Part, column: Any, source: Any) -> Any:
+    """A column.  Regime and source are dictionaries: one byte per case."""
+    if not part.names:
+        return pa.array(column, mask=np.isnan(column))
+    names = list(dict.fromkeys(part.names))
+    codes = np.array([names.index(name) for name in part.names], np.int8)[column]
+    return pa.DictionaryArray.from_arrays(pa.array(codes, mask=source < 0), names)
 
 
 FORM = Form(

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 
 from mumacro.contact import Kind as ContactKind
-from mumacro.inputs import LIKE, RIGID, UNITS_OF, Scale, is_rigid, scale_of, split_unit
+from mumacro.inputs import LIKE, UNITS_OF, Scale, scale_of, split_unit
 
-from ..case import MAX_ERRORS, Columns, Reason, columns_of, joined, too_large
+from ..case import Columns, Reason, columns_of, numbers, too_large
 from ..options import kind_in
 from ..problems import Kind, RequestError
 from . import Batch, Form, check_names, text_form
-
-__all__ = ["FORM"]
 
 _LONGEST_LINE = 64 * 1024  # characters
 _SLICE = 4096  # lines that are read or written at a time
@@ -27,24 +25,24 @@ _DIGITS = b"0123456789.eE+-"
 def _read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Columns, dict[str, Any]]:
     kind = kind_in(query)
     lines = csv.reader(_lines(text, max_batch), strict=True)
-    short: dict[int, Reason] = {}
+    reasons: dict[int, Reason] = {}
     size = 0
     try:
         scales = _head(next(lines, []), kind)
-        parts: dict[str, list[Any]] = {name: [np.empty(0)] for name in scales}
+        parts = {name: [np.empty(0)] for name in scales}
         while rows := list(islice(lines, _SLICE)):
             rows = [row for row in rows if row]
             for i, row in enumerate(rows):
                 if len(row) != len(scales):
-                    short[size + i] = None, f"has {len(row)} cells where the head has {len(scales)}"
+                    reasons[size + i] = None, f"has {len(row)} cells where the head has {len(scales)}"
                     rows[i] = ["nan"] * len(scales)
             for (name, scale), cells in zip(scales.items(), zip(*rows, strict=True), strict=False):
-                parts[name].append(_values(name, scale, cells))
+                parts[name].append(_values(name, scale, cells, reasons, size))
             size += len(rows)
     except (UnicodeDecodeError, csv.Error) as error:
         raise RequestError(Kind.MALFORMED_BODY, f"the body is not CSV: {error}") from None
-    columns = columns_of({name: joined(name, found) for name, found in parts.items()}, max_batch, kind=kind)
-    columns.reasons |= dict(islice(short.items(), MAX_ERRORS))
+    columns = columns_of({name: np.concatenate(found) for name, found in parts.items()}, max_batch, kind=kind)
+    columns.reasons = reasons
     return columns, {}
 
 
@@ -77,22 +75,20 @@ def _head(cells: list[str], kind: ContactKind) -> dict[str, Scale]:
     return scales
 
 
-def _values(name: str, scale: Scale, cells: tuple[str, ...]) -> Any:
-    """A part of a column: an array, or a list where a cell is no number within double range."""
+def _values(name: str, scale: Scale, cells: tuple[str, ...], reasons: dict[int, Reason], first: int) -> Any:
+    """A part of a column, and why a cell is no number within double range."""
     if all(cells) and not "".join(cells).encode().translate(None, _DIGITS):
         with suppress(ValueError), np.errstate(over="ignore"):
             column = np.array(list(map(float, cells))) * scale.times / scale.over
             if np.isfinite(column).all():
                 return column
-    return [_value(name, scale, cell.strip()) for cell in cells]
+    return numbers(name, [_value(scale, cell.strip()) for cell in cells], reasons, first)
 
 
-def _value(name: str, scale: Scale, text: str) -> Any:
-    """What a cell says; a gap is None."""
+def _value(scale: Scale, text: str) -> Any:
+    """What a cell says: a number, None for a gap, or a word."""
     if not text or text.lower() == "nan":
         return None
-    if name == "k" and is_rigid(text):
-        return RIGID
     with suppress(ValueError):
         if not text.encode().translate(None, _DIGITS):
             return scale.si(float(text))
@@ -102,16 +98,10 @@ def _value(name: str, scale: Scale, text: str) -> Any:
 def _write(batch: Batch) -> Iterator[bytes]:
     text = io.StringIO()
     writer = csv.writer(text)
-    writer.writerow([*(part.path for part in batch.parts), "error"])
-    for found, source, faults in batch.slices(_SLICE):
-        bad = (source < 0).tolist()
-        columns = (
-            [
-                None if no or value != value else value
-                for no, value in zip(bad, part.values(found[part.path]), strict=True)
-            ]
-            for part in batch.parts
-        )
+    writer.writerow([*(part.path for part in batch.wanted.parts), "error"])
+    for found, _, faults in batch.slices(_SLICE):
+        shown = (part.values(found[part.path]) for part in batch.wanted.parts)
+        columns = ([None if value != value else value for value in column] for column in shown)
         writer.writerows(zip(*columns, faults, strict=True))
         yield text.getvalue().encode()
         text.seek(0)

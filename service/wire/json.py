@@ -9,34 +9,28 @@ import json
 import math
 import re
 import secrets
-from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from itertools import chain
-from operator import attrgetter
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
 import orjson
 import simdjson
+from msgspec.structs import astuple
 
-from mumacro.contact import SPRING
 from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import RAD_PER_CYCLE
 
 from ..answers import Part, nested
-from ..case import INPUTS, LIKE, MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, names_of, too_large
-from ..options import OPTIONS, example, kind_in, options_of
-from ..options import Options as OptionsModel
+from ..case import MAX_ERRORS, Columns, Reason, asked_of, checked, columns_of, too_large
+from ..options import OPTIONS, Options, example, kind_in, names_in, options_of
 from ..problems import FieldFault, Kind, RequestError, refuse
 from . import Batch, Form
 
-__all__ = ["FORMS", "decode", "dump", "read"]
-
-NAMES = (*INPUTS, *LIKE, "k_range", *OPTIONS)
-_MEMBERS = 18  # of one object: the inputs and the options
+_, NAMES = names_in(Options)
 _READ = 256 * 1024  # bytes of rows that are read at a time
 _TOKEN = secrets.token_hex(16).encode()  # stands in place of a list; nobody else knows it
 _SHORT = 4096  # bytes of a list that json reads
@@ -87,10 +81,9 @@ def read(text: bytearray, max_batch: int, query: Mapping[str, Any]) -> tuple[Col
     given = _columns(text)
     if not isinstance(given, dict):
         refuse([FieldFault((), "must be an object of columns or a list of rows", given)])
-    _, rest, faults = options_of(OptionsModel, given)
+    _, rest, faults = options_of(Options, given)
     options = {name: given[name] for name in OPTIONS if given.get(name) is not None}
-    kind = kind_in({**query, **options}) if not faults else SPRING
-    return columns_of(rest, max_batch, NAMES, faults, kind), options
+    return columns_of(rest, max_batch, NAMES, faults, kind_in({**query, **options})), options
 
 
 def _limit_values(text: bytearray, max_batch: int) -> None:
@@ -103,7 +96,7 @@ def _limit_values(text: bytearray, max_batch: int) -> None:
     objects = text.count(b"{")
     if text.count(b",") > len(NAMES) * room or text.count(b"[") + objects > room:
         raise too_large(max_batch)
-    if text.count(b":") > _MEMBERS * objects + 64:
+    if text.count(b":") > len(NAMES) * objects + 64:
         raise RequestError(Kind.INVALID_VALUE, "the body has objects with more members than there are fields")
 
 
@@ -137,11 +130,11 @@ _BETWEEN = re.compile(rb"\}\s*,")
 
 
 @cache
-def _row_of(names: tuple[str, ...]) -> tuple[Callable[[bytes], list[Any]], Callable[[Any], tuple[Any, ...]]]:
-    """How rows of numbers with these names are read, and their values taken."""
+def _rows_of(names: tuple[str, ...]) -> Any:
+    """What reads rows of numbers with these names."""
     kinds: Any = [(name, float | Literal["rigid"] if name == "k" else float) for name in names]
-    row = msgspec.defstruct("Row", kinds, forbid_unknown_fields=True, gc=False)
-    return msgspec.json.Decoder(list[row]).decode, attrgetter(*names)  # type: ignore[valid-type]
+    row: Any = msgspec.defstruct("Row", kinds, forbid_unknown_fields=True, gc=False)
+    return msgspec.json.Decoder(list[row])
 
 
 def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns | None:
@@ -152,14 +145,13 @@ def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns |
     asked = asked_of((), kind)
     hertz = b'"f"' in text[:_SHORT]
     names = tuple("f" if hertz and name == "omega" else name for name in asked.fields)
-    decode_rows, values = _row_of(names)
     parts: list[Any] = []
     at = size = 0
     while at < len(text):
         cut = _BETWEEN.search(text, at + _READ)
         piece = (b"[" if at else b"") + text[at : cut.start() + 1 if cut else None] + (b"]" if cut else b"")
         try:
-            rows = decode_rows(piece)
+            rows = _rows_of(names).decode(piece)
         except (msgspec.MsgspecError, ValueError, RecursionError):
             return None
         if not rows or piece.count(b":") != len(names) * len(rows):  # a member twice
@@ -167,12 +159,10 @@ def _quick_rows(text: bytearray, max_batch: int, kind: ContactKind) -> Columns |
         size += len(rows)
         if size > max_batch:
             raise too_large(max_batch)
-        try:
-            flat = array("d", chain.from_iterable(map(values, rows)))
-        except TypeError:
-            every = chain.from_iterable(map(values, rows))
-            flat = array("d", (math.inf if value == "rigid" else value for value in every))
-        parts.append(np.frombuffer(flat).reshape(len(rows), -1).T)
+        values: Any = chain.from_iterable(map(astuple, rows))
+        if b'"rigid"' in piece:
+            values = (math.inf if value == "rigid" else value for value in values)
+        parts.append(np.fromiter(values, np.float64).reshape(len(rows), -1).T)
         at = cut.end() if cut else len(text)
     six = np.concatenate(parts, axis=1)
     if hertz:
@@ -186,7 +176,7 @@ def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
     if len(found) > max_batch:
         raise too_large(max_batch)
     asked = asked_of(found[0] if found and isinstance(found[0], dict) else (), kind)
-    fields, names = asked.fields, names_of(asked)
+    fields, names = asked.fields, asked.names
     six = np.full((len(fields), len(found)), np.nan)
     reasons: dict[int, Reason] = {}
     for i, row in enumerate(found):
@@ -216,19 +206,19 @@ def write(batch: Batch) -> Iterator[bytes]:
 
 def _write_columns(batch: Batch) -> Iterator[bytes]:
     slices = [found for found, _, _ in batch.slices(_ROWS)]
-    form = _form(batch.parts, b"[\0]")
-    for opening, part in zip(form, batch.parts, strict=False):
+    form = _form(batch.wanted.parts, b"[\0]")
+    for opening, part in zip(form, batch.wanted.parts, strict=False):
         for found in slices:
-            yield opening + _texts(part, found[part.path])
+            yield opening + _values(part, found[part.path])
             opening = b","
     yield form[-1][:-1] + b"," + dump(batch.end)[1:]
 
 
 def _write_rows(batch: Batch) -> Iterator[bytes]:
-    row = b"%b".join(text.replace(b"%", b"%%") for text in _form(batch.parts, b"\0"))
+    row = b"%b".join(text.replace(b"%", b"%%") for text in _form(batch.wanted.parts, b"\0"))
     opening = b'{"results":['
     for found, source, _ in batch.slices(_ROWS):
-        columns = [_texts(part, found[part.path]).split(b",") for part in batch.parts]
+        columns = [_values(part, found[part.path]).split(b",") for part in batch.wanted.parts]
         made = [row % cells for cells in zip(*columns, strict=True)] if source.size else []
         for i in np.flatnonzero(source < 0).tolist():
             made[i] = b"null"
@@ -243,38 +233,29 @@ def _form(parts: list[Part], place: bytes) -> list[bytes]:
     return text.replace(b'"\\u0000"', place).split(b"\0")
 
 
-def _texts(part: Part, column: Any) -> bytes:
+def _values(part: Part, column: Any) -> bytes:
     """The values of a column, separated by commas."""
-    if part.names:
-        # numpy fills texts up with zeros to one width, and copies equal widths faster than objects
-        texts = np.array([orjson.dumps(name) + b"," for name in (*part.names, None)])
-        return bytes(texts.take(column).tobytes().translate(None, b"\0")[:-1])
-    return dump(column)[1:-1]
+    return dump(part.values(column) if part.names else column)[1:-1]
 
 
-def _described(kind: str, *names: str, **more: Any) -> dict[str, Any]:
+def _any_of(*names: str, **more: Any) -> dict[str, Any]:
     """The description of a text that is one of these models, or a list of one, whose name ends with ``[]``."""
-    found: list[dict[str, Any]] = [{"$ref": f"#/components/schemas/{name.removesuffix('[]')}"} for name in names]
-    lists = (
-        {"type": "array", "items": one} if name[-1] == "]" else one for name, one in zip(names, found, strict=True)
-    )
-    return {"schema": {kind: list(lists), **more}}
+    refs = [(name, {"$ref": f"#/components/schemas/{name.removesuffix('[]')}"}) for name in names]
+    kinds = [{"type": "array", "items": ref} if name.endswith("[]") else ref for name, ref in refs]
+    return {"schema": {"anyOf": kinds, **more}}
 
 
 _MANY = {"example": {**example, "v0": [0.01, 0.1]}}
+_LINE = "One of these per line, in the order of the lines"
 FORMS = (
     Form(
         "application/json", (), read, write,
-        body=_described("oneOf", "CaseColumns", "Case[]") | _MANY,
-        answer=_described("oneOf", "ColumnsAnswer", "RowsAnswer"),
+        body=_any_of("CaseColumns", "Case[]") | _MANY, answer=_any_of("ColumnsAnswer", "RowsAnswer"),
     ),
     Form(
         "application/x-ndjson", ("application/ndjson", "application/jsonl", "application/x-jsonlines"), read, write,
-        body=_described("anyOf", "CaseColumns", "Case", "Case[]", description="One of these per line") | _MANY,
-        answer=_described(
-            "anyOf", "ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem",
-            description="One of these per line, in the order of the lines",
-        ),
+        body=_any_of("CaseColumns", "Case", "Case[]", description=_LINE) | _MANY,
+        answer=_any_of("ColumnsAnswer", "RowsAnswer", "CaseAnswer", "Problem", description=_LINE),
         streams=True,
     ),
 )  # fmt: skip
