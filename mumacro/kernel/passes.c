@@ -12,6 +12,7 @@ typedef struct {
     double v[MU_CHUNK], y[MU_CHUNK]; /* 1 where a point is not common */
     double crit[MU_CHUNK], ln_y[MU_CHUNK], a[MU_CHUNK], b[MU_CHUNK], base[MU_CHUNK], factor[MU_CHUNK];
     double local[MU_CHUNK]; /* coordinate in the border's cell */
+    double u[MU_CHUNK], w[MU_CHUNK]; /* coordinates in the cell */
     int64_t block[MU_CHUNK];
     int32_t border[MU_CHUNK + MU_LANES], cell[MU_CHUNK];
 } mu_chunk;
@@ -114,14 +115,15 @@ MU_INLINE mu_lanes mu_wholes_of(mu_lanes x) {
     return MU_AS(mu_lanes, MU_AS(mu_whole, mu_select(MU_WHERE(x < 1e9), x, mu_all(1e9))));
 }
 
-/* mu_find for points of the chunk in whole lanes; returns how many points that are. */
-MU_INLINE int mu_pass_cells(const double *blocks, int64_t cells, int n, mu_chunk *c) {
+/* Cells of mu~: mu_find, several points at once.  A point without a cell gets one that means nothing. */
+MU_INLINE void mu_pass_cells(const mumacro_data *data, int n, mu_chunk *c) {
+    const int64_t cells = data->quantities[MU_MU_RATIO].cells;
     const mu_lanes last = mu_all((double)(cells - 1)), zero = mu_all(0.0);
     mu_column column[MU_STEP_B + 1];
     int done = 0;
-    if (n < 2 * MU_LANES) return 0; /* too few for the columns to be fetched */
-    for (int i = 0; i <= MU_STEP_B; ++i) column[i] = mu_column_of(blocks, i);
-    for (; done + MU_LANES <= n; done += MU_LANES) {
+    const int together = n < 2 * MU_LANES ? 0 : n - n % MU_LANES; /* not for few: the columns have to be fetched */
+    for (int i = 0; together && i <= MU_STEP_B; ++i) column[i] = mu_column_of(data->blocks, i);
+    for (; done < together; done += MU_LANES) {
         const mu_lanes a = mu_load(c->a + done), b = mu_load(c->b + done);
         mu_mask block;
         mu_lanes x, z, i, j, cell;
@@ -135,22 +137,21 @@ MU_INLINE int mu_pass_cells(const double *blocks, int64_t cells, int n, mu_chunk
         cell = mu_select(MU_WHERE(cell > 0.0), cell, zero);
         index = MU_AS(mu_whole, mu_select(MU_WHERE(cell < last), cell, last));
         memcpy(c->cell + done, &index, sizeof index);
-        mu_store(c->a + done, 2.0 * (x - i) - 1.0);
-        mu_store(c->b + done, 2.0 * (z - j) - 1.0);
+        mu_store(c->u + done, 2.0 * (x - i) - 1.0);
+        mu_store(c->w + done, 2.0 * (z - j) - 1.0);
     }
-    return done;
+    for (; done < n; ++done) {
+        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[done]), 0, cells, c->a[done], c->b[done]);
+        c->cell[done] = (int32_t)spot.cell;
+        c->u[done] = spot.u;
+        c->w[done] = spot.w;
+    }
 }
-/* Cells and values of mu~.  A point without a cell reads one that means nothing. */
-MU_INLINE void mu_pass_values(const mumacro_data *data, int n, mu_chunk *c, double *value) {
+
+MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c, double *value) {
     const mumacro_cells *cells = &data->quantities[MU_MU_RATIO];
-    for (int i = mu_pass_cells(data->blocks, cells->cells, n, c); i < n; ++i) {
-        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[i]), 0, cells->cells, c->a[i], c->b[i]);
-        c->cell[i] = (int32_t)spot.cell;
-        c->a[i] = spot.u;
-        c->b[i] = spot.w;
-    }
     for (int i = 0; i < n; ++i) {
-        const double q = mu_cell_value(cells->polynomials + 64 * (int64_t)c->cell[i], c->a[i], c->b[i]);
+        const double q = mu_cell_value(cells->polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
         value[i] = mu_fma1(c->factor[i], q, c->base[i]);
     }
     for (int i = 0; i < n; ++i) value[i] = mu_min(mu_max(value[i], 0.0), 1.0);
@@ -183,6 +184,7 @@ static void mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v,
     int left;
     mu_pass_borders(data, n, v, y, &c);
     left = mu_pass_places(n, &c);
+    mu_pass_cells(data, n, &c);
     mu_pass_values(data, n, &c, value);
     if (bound)
         for (int i = 0; i < n; ++i) {
@@ -243,9 +245,11 @@ MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const m
     const mu_form form = MU_QUANTITY[quantity].forms[c->block[i] < MU_CHARTS ? c->block[i] : 0];
     if (c->block[i] < MU_CHARTS && form.factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
-        if (quantity == MU_MU_RATIO && at.block != MU_CORNER)
-            return mu_slopes_in_block(data, quantity, &at, c->base[i], c->factor[i]);
-        return mu_slopes_in_block(data, quantity, &at, mu_base(form.base, &at), mu_factor(form.factor, &at));
+        if (quantity == MU_MU_RATIO && at.block != MU_CORNER) {
+            const mu_spot spot = {c->cell[i], c->u[i], c->w[i]};
+            return mu_slopes_in_block(data, quantity, &at, spot, c->base[i], c->factor[i]);
+        }
+        return mu_slopes_at_place(data, quantity, &at);
     }
     return mu_slopes_at(data, quantity, v, y);
 }
@@ -257,6 +261,7 @@ static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t 
         mu_chunk c;
         mu_pass_borders(data, few, v + i, y + i, &c);
         mu_pass_places(few, &c);
+        if (quantity == MU_MU_RATIO) mu_pass_cells(data, few, &c);
         for (int j = 0; j < few; ++j) {
             const mu_slopes found = mu_slopes_of(data, quantity, &c, j, v[i + j], y[i + j]);
             out[i + j] = found.value;
