@@ -31,17 +31,24 @@ MU_INLINE void mu_rows(const double *cell, double w, double *row) {
     for (int p = 0; p < MU_PARTS; ++p) mu_store(row + p * MU_LANES, sum[p]);
 }
 
-/* The polynomial of a cell at u, w: the sum over powers of u by halves, u^4, u^2, u. */
-MU_INLINE double mu_cell_value(const double *cell, double u, double w) {
-    double c[8], half[4];
+/* A sum over falling powers of u by halves, u^4, u^2, u. */
+MU_INLINE double mu_by_halves(const double *c, double u) {
+    double half[4];
     const double u2 = u * u, u4 = u2 * u2;
-    mu_rows(cell, w, c);
     for (int i = 0; i < 4; ++i) half[i] = mu_fma1(c[i], u4, c[i + 4]);
     return mu_fma1(mu_fma1(half[0], u2, half[2]), u, mu_fma1(half[1], u2, half[3]));
 }
 
+/* The polynomial of a cell at u, w. */
+MU_INLINE double mu_cell_value(const double *cell, double u, double w) {
+    double c[8];
+    mu_rows(cell, w, c);
+    return mu_by_halves(c, u);
+}
+
 typedef struct {
     double q, q_a, q_b; /* and its derivatives along a and b */
+    double value;       /* q to the bit as mu_cell_value has it */
 } mu_slope;
 
 /* The same with its derivatives along u and w. */
@@ -62,6 +69,7 @@ MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
         mu_store(c + p * MU_LANES, value[p]);
         mu_store(d + p * MU_LANES, rising[p]);
     }
+    out.value = mu_by_halves(c, u);
     out.q = c[0];
     out.q_a = 0.0;
     out.q_b = d[0];

@@ -195,12 +195,14 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
     double *slopes = rows == MU_ROWS ? out + MU_ROW_SLOPES * stride : NULL;
     const double *errors = data->quantities[MU_MU_RATIO].errors;
     mu_chunk c;
+    mu_slope slope[MU_CHUNK];
     int left;
     mu_pass_groups(n, in, v, y);
     mu_pass_borders(data, n, v, y, &c);
     left = mu_pass_places(n, &c);
     mu_pass_cells(data, n, &c);
-    mu_pass_values(data, n, &c, mu);
+    if (slopes) mu_pass_slopes(data, n, &c, slope);
+    mu_pass_values(data, n, &c, slopes ? slope : NULL, mu);
     for (int i = 0; i < n; ++i) {
         const double *error = errors + 2 * c.block[i];
         bound[i] = fabs(c.factor[i]) * error[0] + error[1];
@@ -211,7 +213,7 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
         const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
         for (int i = 0; i < n; ++i) {
             const int later = mu_is_left(c.block[i]);
-            const mu_slopes at = later ? none : mu_slopes_of(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+            const mu_slopes at = later ? none : mu_slopes_of(data, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
             const mu_case found = mu_case_of(at.value, bound[i], source[i], v[i], y[i]);
             mu_know(&found, &at, known, i);
         }

@@ -148,10 +148,18 @@ MU_INLINE void mu_pass_cells(const mumacro_data *data, int n, mu_chunk *c) {
     }
 }
 
-MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c, double *value) {
-    const mumacro_cells *cells = &data->quantities[MU_MU_RATIO];
+/* q and its derivatives in the cells: apart from what is made of them, so that the sums of several points overlap. */
+MU_INLINE void mu_pass_slopes(const mumacro_data *data, int n, const mu_chunk *c, mu_slope *slope) {
+    const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
+    for (int i = 0; i < n; ++i) slope[i] = mu_cell_slopes(polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
+}
+
+/* mu~, from q in its cells or from slopes that are known already. */
+MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c, const mu_slope *known, double *value) {
+    const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
     for (int i = 0; i < n; ++i) {
-        const double q = mu_cell_value(cells->polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
+        const double *cell = polynomials + 64 * (int64_t)c->cell[i];
+        const double q = known ? known[i].value : mu_cell_value(cell, c->u[i], c->w[i]);
         value[i] = mu_fma1(c->factor[i], q, c->base[i]);
     }
     for (int i = 0; i < n; ++i) value[i] = mu_min(mu_max(value[i], 0.0), 1.0);
@@ -185,7 +193,7 @@ static void mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v,
     mu_pass_borders(data, n, v, y, &c);
     left = mu_pass_places(n, &c);
     mu_pass_cells(data, n, &c);
-    mu_pass_values(data, n, &c, value);
+    mu_pass_values(data, n, &c, NULL, value);
     if (bound)
         for (int i = 0; i < n; ++i) {
             const double *error = errors + 2 * c.block[i];
@@ -240,14 +248,15 @@ static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
     return mu;
 }
 
-/* Slopes at up to MU_CHUNK points that are handed on one by one to what wants them. */
-MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const mu_chunk *c, int i, double v, double y) {
+/* Slopes at a point of the chunk; slope: of mu_pass_slopes, which counts for mu~ only. */
+MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const mu_chunk *c, const mu_slope *slope, int i,
+                                 double v, double y) {
     const mu_form form = MU_QUANTITY[quantity].forms[c->block[i] < MU_CHARTS ? c->block[i] : 0];
     if (c->block[i] < MU_CHARTS && form.factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
         if (quantity == MU_MU_RATIO && at.block != MU_CORNER) {
             const mu_spot spot = {c->cell[i], c->u[i], c->w[i]};
-            return mu_slopes_in_block(data, quantity, &at, spot, c->base[i], c->factor[i]);
+            return mu_slopes_in_block(data, quantity, &at, spot, slope[i], c->base[i], c->factor[i]);
         }
         return mu_slopes_at_place(data, quantity, &at);
     }
@@ -259,11 +268,15 @@ static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t 
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         mu_chunk c;
+        mu_slope slope[MU_CHUNK];
         mu_pass_borders(data, few, v + i, y + i, &c);
         mu_pass_places(few, &c);
-        if (quantity == MU_MU_RATIO) mu_pass_cells(data, few, &c);
+        if (quantity == MU_MU_RATIO) {
+            mu_pass_cells(data, few, &c);
+            mu_pass_slopes(data, few, &c, slope);
+        }
         for (int j = 0; j < few; ++j) {
-            const mu_slopes found = mu_slopes_of(data, quantity, &c, j, v[i + j], y[i + j]);
+            const mu_slopes found = mu_slopes_of(data, quantity, &c, slope, j, v[i + j], y[i + j]);
             out[i + j] = found.value;
             out[stride + i + j] = found.along_v;
             out[2 * stride + i + j] = found.along_y;

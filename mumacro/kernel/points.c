@@ -51,16 +51,15 @@ MU_INLINE double mu_slope_error(const double *errors, double of_factor, double o
     return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
 }
 
-/* The slopes in a block, from the place, its spot in a cell, and base and factor there. */
+/* The slopes in a block, from the place, its spot in a cell, q there, and base and factor. */
 MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at, mu_spot spot,
-                                       double base, double factor) {
+                                       mu_slope slope, double base, double factor) {
     const mu_quantity *about = &MU_QUANTITY[quantity];
     const mumacro_cells *cells = &data->quantities[quantity];
     const double *block = mu_block_of(data, at->block);
     const mu_turn turn = mu_turn_of(at);
     const mu_form_slopes form = mu_slopes_of_form(about->forms[at->block], at, &turn);
     const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
-    const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
     const double q_b = slope.q_b * 2.0 * block[MU_STEP_B];
     double reach = fabs(turn.b_v), ratio, noise;
@@ -113,7 +112,8 @@ static mu_slopes mu_slopes_at_place(const mumacro_data *data, int quantity, cons
     const mumacro_cells *cells = &data->quantities[quantity];
     const mu_form form = MU_QUANTITY[quantity].forms[at->block];
     const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
-    return mu_slopes_in_block(data, quantity, at, spot, mu_base(form.base, at), mu_factor(form.factor, at));
+    const mu_slope slope = mu_cell_slopes(cells->polynomials + 64 * spot.cell, spot.u, spot.w);
+    return mu_slopes_in_block(data, quantity, at, spot, slope, mu_base(form.base, at), mu_factor(form.factor, at));
 }
 
 /* The slopes where the record knows the value in closed form, at the ends of v~ and y~. */
