@@ -337,8 +337,13 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
         if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
         return mu_limit(line->mu, found.bound, line->source);
     }
-    if (contact == MU_BALL) return mu_ball_answer(data, quantity, v, y);
-    return mu_answer_at(data, quantity, v, y);
+    if (contact == MU_SPRING) { /* the same bits as in any array */
+        int8_t source;
+        mu_answer out;
+        mu_values(data, quantity, 1, &v, &y, &out.value, &out.bound, &source);
+        return mu_limit(out.value, out.bound, source);
+    }
+    return mu_ball_answer(data, quantity, v, y);
 }
 
 static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v, double y) {

@@ -184,45 +184,42 @@ static mu_answer mu_answer_left(const mumacro_data *data, int quantity, const mu
     return c->block[i] == MU_FAST ? MU_QUANTITY[quantity].fast(data, v, y) : mu_answer_at(data, quantity, v, y);
 }
 
-/* mu~ at up to MU_CHUNK points. */
-static void mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, double *value,
-                               double *bound, int8_t *source) {
+/* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as mu_pass_places. */
+static int mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c,
+                              mu_slope *slope, double *value, double *bound, int8_t *source) {
     const double *errors = data->quantities[MU_MU_RATIO].errors;
-    mu_chunk c;
     int left;
-    mu_pass_borders(data, n, v, y, &c);
-    left = mu_pass_places(n, &c);
-    mu_pass_cells(data, n, &c);
-    mu_pass_values(data, n, &c, NULL, value);
-    if (bound)
-        for (int i = 0; i < n; ++i) {
-            const double *error = errors + 2 * c.block[i];
-            bound[i] = fabs(c.factor[i]) * error[0] + error[1];
-        }
-    if (source)
-        for (int i = 0; i < n; ++i) source[i] = (int8_t)c.block[i];
-    if (!left) return;
-    for (int i = 0; i < n; ++i) {
-        if (mu_is_left(c.block[i])) {
-            const mu_answer found = mu_answer_left(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+    mu_pass_borders(data, n, v, y, c);
+    left = mu_pass_places(n, c);
+    mu_pass_cells(data, n, c);
+    if (slope) mu_pass_slopes(data, n, c, slope);
+    mu_pass_values(data, n, c, slope, value);
+    for (int i = 0; bound && i < n; ++i) {
+        const double *error = errors + 2 * c->block[i];
+        bound[i] = fabs(c->factor[i]) * error[0] + error[1];
+    }
+    for (int i = 0; source && i < n; ++i) source[i] = (int8_t)c->block[i];
+    for (int i = 0; left && i < n; ++i) {
+        if (mu_is_left(c->block[i])) {
+            const mu_answer found = mu_answer_left(data, MU_MU_RATIO, c, i, v[i], y[i]);
             value[i] = found.value;
             if (bound) bound[i] = found.bound;
             if (source) source[i] = (int8_t)found.source;
         }
     }
+    return left;
 }
 
 /* Another quantity at up to MU_CHUNK points. */
 static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, const double *v, const double *y,
-                               double *value, double *bound, int8_t *source) {
-    mu_chunk c;
-    mu_pass_borders(data, n, v, y, &c);
-    mu_pass_places(n, &c);
+                               mu_chunk *c, double *value, double *bound, int8_t *source) {
+    mu_pass_borders(data, n, v, y, c);
+    mu_pass_places(n, c);
     for (int i = 0; i < n; ++i) {
         mu_answer found;
-        if (mu_is_left(c.block[i])) found = mu_answer_left(data, quantity, &c, i, v[i], y[i]);
+        if (mu_is_left(c->block[i])) found = mu_answer_left(data, quantity, c, i, v[i], y[i]);
         else {
-            const mu_place at = mu_place_of(data, &c, i, 0);
+            const mu_place at = mu_place_of(data, c, i, 0);
             found = mu_in_block(data, quantity, &at);
         }
         value[i] = found.value;
@@ -237,14 +234,15 @@ static void mu_values(const mumacro_data *data, int quantity, int64_t n, const d
         const int few = mu_few(n - i);
         double *error = bound ? bound + i : NULL;
         int8_t *from = source ? source + i : NULL;
-        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, value + i, error, from);
-        else mu_chunk_of_others(data, quantity, few, v + i, y + i, value + i, error, from);
+        mu_chunk c;
+        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, &c, NULL, value + i, error, from);
+        else mu_chunk_of_others(data, quantity, few, v + i, y + i, &c, value + i, error, from);
     }
 }
 
 static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
     double mu;
-    mu_chunk_of_ratios(data, 1, &v, &y, &mu, NULL, NULL);
+    mu_values(data, MU_MU_RATIO, 1, &v, &y, &mu, NULL, NULL);
     return mu;
 }
 
