@@ -1,7 +1,5 @@
 """``python -m builder``: build, verify, query and export tables offline."""
 
-from __future__ import annotations
-
 import math
 import sys
 import time
@@ -16,8 +14,6 @@ from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json,
 from mumacro.extras import missing
 from mumacro.processors import processors
 from mumacro.writing import alone_in
-
-__all__ = ["main"]
 
 
 class _Bar:

@@ -1,7 +1,5 @@
 """Nodes of a block, and their refinement until the interpolant meets the tolerance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -17,8 +15,6 @@ from mumacro.table import Block, BorderPiece
 
 from .quantities import SOLVED
 from .sweep import Sweep
-
-__all__ = ["build_block", "build_border", "solve_nodes", "tabulated"]
 
 Array = NDArray[np.float64]
 MAX_NODES = 96

@@ -8,8 +8,6 @@ the table is kept by :class:`mumacro.Surrogate` alone.
 Every file is written beside its name and then renamed, and the same table gives the same bytes.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable
@@ -27,8 +25,6 @@ from mumacro.writing import write_whole
 from .c.fmu.model import fmu2, fmu3
 from .c.source import write_c
 from .c.wasm import wasm
-
-__all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
 
 Array = NDArray[np.float64]
 PLANE = ("mu_ratio", "stick_fraction", "error_estimate")

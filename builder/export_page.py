@@ -6,8 +6,6 @@
 It is the page of the service with another ``service.js``.  It hides the functions that need the service, and says so.
 """
 
-from __future__ import annotations
-
 import html
 import json
 import shutil
@@ -17,8 +15,6 @@ from typing import Any
 
 from mumacro import MumacroError, Surrogate
 from mumacro.page import POLICY, map_of, names
-
-__all__ = ["write_page"]
 
 # the files of the service, as data: this package does not import it
 _FOLDER = Path(__file__).resolve().parent.parent / "service" / "static" / "page"

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf, workdps
 
-from builder.differences import differences
 from builder.sweep import Sweep
-from builder.verify import CASES, draw
+from builder.verify import CASES, differences, draw
 from mumacro import Surrogate
 from mumacro.charts import CONTINUOUS, QUANTITY_NAMES, REGIME_OF_SOURCE
 from mumacro.inputs import FIELDS

@@ -7,10 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 from builder import sections, steady
-from builder.limits import V_RANGE, Y_RANGE
 from builder.model import OK
 from builder.sections import ANGLE_SECTION, COS_0, SIGMA_1, SIN_0, TIME_SECTION, section, stick_slip
-from builder.steady import RELATIVE_ERROR, solve, workspace
+from builder.steady import RELATIVE_ERROR, V_RANGE, Y_RANGE, solve, workspace
 from builder.sweep import Sweep
 from mumacro.closed_forms import outer, second_order
 from tests.cases import log_uniform, opened

@@ -11,10 +11,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from builder import cycle
+from builder import figures
 from builder.__main__ import main
-from builder.cycle import CASES, steady_cycle
-from builder.figures import FIGURES, Curve, FiguresError, Panel, draw_figures
+from builder.figures import CASES, FIGURES, Curve, FiguresError, Panel, draw_figures, steady_cycle
 from builder.steady import border, solve
 from mumacro import Surrogate
 from tests.comparing import close
@@ -146,4 +145,4 @@ def test_without_matplotlib_the_extra_is_named(surrogate: Surrogate, tmp_path: A
 
 
 def test_the_example_runs() -> None:
-    assert doctest.testmod(cycle).failed == 0
+    assert doctest.testmod(figures).failed == 0

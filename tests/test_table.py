@@ -16,8 +16,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from builder.assemble import build_table
-from builder.rounding import STEPS, bits, to_bits, to_step
+from builder.assemble import STEPS, bits, build_table, to_bits, to_step
 from builder.sweep import Sweep
 from mumacro import InputError, Surrogate, TableError, charts
 from mumacro.cells import nodes

@@ -4,8 +4,6 @@ The functions are those of ``mumacro/kernel``, joined into one text; nothing is 
 module needs only what the library itself needs.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import subprocess
@@ -23,8 +21,6 @@ from mumacro.library import Array
 from mumacro.table import Table
 from mumacro.version import __version__
 from mumacro.writing import write_whole
-
-__all__ = ["DEFAULT_TOLERANCE", "CompilerError", "OutputError", "compiled", "files", "header_text", "write_c", "zig"]
 
 #: of the bundled table that is written if none is named: a C program holds it in its text
 DEFAULT_TOLERANCE = 1e-7

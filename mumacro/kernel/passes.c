@@ -185,8 +185,8 @@ static mu_answer mu_answer_left(const mumacro_data *data, int quantity, const mu
 }
 
 /* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as mu_pass_places. */
-static int mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c,
-                              mu_slope *slope, double *value, double *bound, int8_t *source) {
+MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c,
+                                 mu_slope *slope, double *value, double *bound, int8_t *source) {
     const double *errors = data->quantities[MU_MU_RATIO].errors;
     int left;
     mu_pass_borders(data, n, v, y, c);

@@ -3,8 +3,6 @@
 It needs no C library and imports nothing.  Exported are ``memory`` and the functions of ``module.c``.
 """
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -12,8 +10,6 @@ from mumacro.errors import MumacroError
 from mumacro.table import Table
 
 from ..source import compiled, header_text, zig
-
-__all__ = ["WasmError", "compiler", "wasm"]
 
 _HERE = Path(__file__).parent
 _OPTIONS = (
