@@ -15,18 +15,14 @@ static double mu_held_value(int quantity, double v, double y, double *bound) {
     return value;
 }
 
-/* An answer from its rows; the bad input, or 0. */
-static int mu_fill(const double *rows, int source, int bad, mumacro_answer *out) {
-    out->mu_macro = rows[MU_ROW_MACRO];
-    out->mu_ratio = rows[MU_ROW_RATIO];
-    out->error_bound = rows[MU_ROW_BOUND];
-    out->v_tilde = rows[MU_ROW_V];
-    out->y_tilde = rows[MU_ROW_Y];
+/* An answer from its rows; what is returned. */
+static int mu_fill(const double *rows, int source, int returned, mumacro_answer *out) {
+    memcpy(out, rows, MU_ROW_SLOPES * sizeof *rows); /* the first members are these rows */
     out->source = source;
     out->regime = source < 0 ? -1 : MU_REGIME_OF_SOURCE[source];
     memcpy(out->gradient, rows + MU_ROW_SLOPES, sizeof out->gradient);
     memcpy(out->gradient_bound, rows + MU_ROW_SLOPES + 6, sizeof out->gradient_bound);
-    return bad;
+    return returned;
 }
 
 MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
