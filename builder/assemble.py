@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import Surrogate
+from mumacro import MumacroError, Surrogate
 from mumacro.border import Border
 from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
 from mumacro.table import Block, Table, write_table
@@ -40,7 +40,7 @@ REFERENCE = (
 )
 
 
-class BuildError(RuntimeError):
+class BuildError(MumacroError):
     """The tolerance was not reached; the message states where and by how much."""
 
 

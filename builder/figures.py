@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import Surrogate, closed_forms
+from mumacro import MumacroError, Surrogate, closed_forms
 from mumacro.law import approximations, border_speeds, friction_law
 
 from .steady import border
@@ -30,10 +30,6 @@ CASES = {
     (0.1, 0.8): r"stick-slip, $\tilde y < 1$",
     (0.1, 1.5): r"stick-slip, $\tilde y > 1$",
 }
-
-
-class FiguresError(RuntimeError):
-    """matplotlib is not installed."""
 
 
 class Curve(NamedTuple):
@@ -264,14 +260,14 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
 
     Raises
     ------
-    FiguresError
+    MumacroError
         Without matplotlib.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise FiguresError(f"figures need the extra 'figures' (matplotlib): {error}") from error
+        raise MumacroError(f"figures need the extra 'figures' (matplotlib): {error}") from error
     written = []
     for name, panels_of in FIGURES.items():
         panels, figure = panels_of(surrogate), Figure(figsize=SIZE, layout="constrained")

@@ -31,7 +31,7 @@ COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
 _MU, _DEFICIT, _ERROR, _STATUS = map(COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status"))
 
 
-class SolveError(ArithmeticError):
+class SolveError(MumacroError):
     """A node could not be solved; the message states which and what to do."""
 
 

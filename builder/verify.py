@@ -45,25 +45,22 @@ def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     return v, np.where(which == 2, _log(rng, 1e-9, 1e-3, n), y)
 
 
-#: name of the kind of case, share of the points, how they are drawn
 _How = Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]
-CASES: tuple[tuple[str, float, _How], ...] = (
-    ("random", 0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
-    ("wide", 0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
-    ("border", 0.12, _border),
-    ("corner", 0.12, lambda rng, n, _: _corner(rng, n)),
-    ("seams", 0.10, near_seams),
-    ("creep", 0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
-    ("tails", 0.08, lambda rng, n, _: _tails(rng, n)),
-)
+#: kind of case -> share of the points, how they are drawn
+CASES: dict[str, tuple[float, _How]] = {
+    "random": (0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
+    "wide": (0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
+    "border": (0.12, _border),
+    "corner": (0.12, lambda rng, n, _: _corner(rng, n)),
+    "seams": (0.10, near_seams),
+    "creep": (0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
+    "tails": (0.08, lambda rng, n, _: _tails(rng, n)),
+}
 
 
 def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
     """``n`` points (v~, y~) of one kind of :data:`CASES`."""
-    for name, _, how in CASES:
-        if name == case:
-            return how(np.random.default_rng(seed), n, surrogate)
-    raise ValueError(f"case must be one of {', '.join(name for name, _, _ in CASES)}, got {case!r}")
+    return CASES[case][1](np.random.default_rng(seed), n, surrogate)
 
 
 def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
@@ -217,7 +214,7 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     names = surrogate.table.quantities
     values: dict[str, list[_Compared]] = {name: [] for name in names}
     slopes: dict[str, list[_Compared]] = {name: [] for name in names}
-    for i, (_, share, how) in enumerate(CASES):
+    for i, (share, how) in enumerate(CASES.values()):
         v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
         v, y = v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)]
         solved = sweep.solve("full", v, y)
@@ -227,7 +224,7 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
             slopes[name].append(_slopes(surrogate, around, name))
     return {
         **_report(values["mu_ratio"]),
-        "cases": {case: _said(part) for (case, _, _), part in zip(CASES, values["mu_ratio"], strict=True)},
+        "cases": {case: _said(part) for case, part in zip(CASES, values["mu_ratio"], strict=True)},
         **{name: _report(values[name]) for name in names[1:]},
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
         "seam_jump": seam_jumps(surrogate),

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from builder.c import wasm
-from builder.c.source import OutputError, files, header_text, write_c
+from builder.c.source import ExportError, files, header_text, write_c
 from builder.export import export_table
 from builder.verify import CASES, draw
 from mumacro import REGIMES, Surrogate, charts
@@ -246,9 +246,9 @@ def test_a_header_has_no_names_of_the_kernel_of_its_own(table: Surrogate) -> Non
 def test_where_nothing_can_be_written_is_said(table: Surrogate, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("before")
     (tmp_path / "folder.h").mkdir()
-    with pytest.raises(OutputError, match="is a file"):
+    with pytest.raises(ExportError, match="is a file"):
         write_c(table.table, tmp_path / "file")
-    with pytest.raises(OutputError, match="is a folder"):
+    with pytest.raises(ExportError, match="is a folder"):
         write_c(table.table, tmp_path / "folder.h")
     with pytest.raises(FileNotFoundError):
         write_c(table.table, tmp_path / "no" / "mumacro.h")

@@ -61,7 +61,7 @@ def compare(table: Surrogate, sweep: Sweep, v: Array, y: Array) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [name for name, _, _ in CASES])
+@pytest.mark.parametrize("case", CASES)
 def test_fresh_solves_lie_within_tolerance_and_bounds(table: Surrogate, sweep: Sweep, case: str) -> None:
     compare(table, sweep, *draw(case, 3000, table, seed=77))
 

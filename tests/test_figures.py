@@ -13,9 +13,9 @@ import pytest
 
 from builder import figures
 from builder.__main__ import main
-from builder.figures import CASES, FIGURES, Curve, FiguresError, Panel, draw_figures, steady_cycle
+from builder.figures import CASES, FIGURES, Curve, Panel, draw_figures, steady_cycle
 from builder.steady import border, solve
-from mumacro import Surrogate
+from mumacro import MumacroError, Surrogate
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -139,7 +139,7 @@ def test_without_matplotlib_the_extra_is_named(surrogate: Surrogate, tmp_path: A
     loaded = [name for name in sys.modules if name.startswith("matplotlib.")]  # by another test
     for name in ("matplotlib", *loaded):
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(FiguresError, match="extra 'figures'"):
+    with pytest.raises(MumacroError, match="extra 'figures'"):
         draw_figures(surrogate, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
