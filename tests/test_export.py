@@ -16,7 +16,8 @@ from scipy.io import loadmat
 
 from builder.__main__ import main
 from builder.c import wasm
-from builder.export import FORMATS, MODELICA_TABLES, ExportError, export_table
+from builder.c.source import ExportError
+from builder.export import FORMATS, MODELICA_TABLES, export_table
 from mumacro import Surrogate
 from mumacro.errors import TableError
 from mumacro.table import Table, read_table

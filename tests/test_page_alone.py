@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from builder.c.source import ExportError
 from builder.c.wasm import compiler
-from builder.export import ExportError, export_table
+from builder.export import export_table
 from builder.export_page import main, write_page
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
