@@ -1,7 +1,5 @@
 """``python -m builder``: build, verify, query and export tables offline."""
 
-from __future__ import annotations
-
 import math
 import sys
 import time
@@ -16,8 +14,6 @@ from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json,
 from mumacro.extras import missing
 from mumacro.processors import processors
 from mumacro.writing import alone_in
-
-__all__ = ["main"]
 
 
 class _Bar:
@@ -45,19 +41,16 @@ def _place(out: Path, folder: bool = False) -> None:
 
 
 def _build(chosen: Namespace) -> str:
-    from .assemble import MAX_TOLERANCE, MIN_TOLERANCE, BuildError, build_table, stages
-    from .sweep import SolveError, Sweep
+    from .assemble import MAX_TOLERANCE, MIN_TOLERANCE, build_table, stages
+    from .sweep import Sweep
 
     out, tolerance = chosen.out, chosen.tolerance
     if not MIN_TOLERANCE <= tolerance <= MAX_TOLERANCE:
         raise UsageError(f"--tolerance must be from {MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, got {tolerance!r}")
     _place(out)
     checkpoint = out.with_name(out.name + ".checkpoint")
-    try:
-        with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep:
-            surrogate = build_table(out, tolerance, sweep, _Bar(stages()))
-    except (BuildError, SolveError) as error:
-        raise ImpossibleError(str(error)) from error
+    with alone_in(checkpoint), Sweep(chosen.workers, checkpoint) as sweep:
+        surrogate = build_table(out, tolerance, sweep, _Bar(stages()))
     return as_json({
         "table": str(out), "tolerance": tolerance, "verified_max_abs_error": surrogate.max_abs_error,
         "verified_max_rel_error": surrogate.max_rel_error, "n_solves": sweep.n_solves, "bytes": out.stat().st_size,
@@ -78,15 +71,12 @@ def _solve(chosen: Namespace) -> int:
 
 
 def _verify(chosen: Namespace) -> int:
-    from .sweep import SolveError, Sweep
+    from .sweep import Sweep
     from .verify import holds, verify
 
     surrogate = Surrogate.open(chosen.table)
-    try:
-        with Sweep(chosen.workers) as sweep:
-            report = verify(surrogate, sweep, chosen.points, chosen.seed)
-    except SolveError as error:
-        raise ImpossibleError(str(error)) from error
+    with Sweep(chosen.workers) as sweep:
+        report = verify(surrogate, sweep, chosen.points, chosen.seed)
     report |= {"tolerance": surrogate.tolerance, "holds": holds(report, surrogate.tolerance)}
     print(as_json(report))
     if not report["holds"]:
@@ -115,15 +105,12 @@ def _export(chosen: Namespace) -> str:
 
 
 def _figures(chosen: Namespace) -> str:
-    from .figures import FiguresError, draw_figures
+    from .figures import draw_figures
 
     _place(chosen.out, folder=True)
     surrogate = Surrogate.open(chosen.table)
     chosen.out.mkdir(exist_ok=True)
-    try:
-        written = draw_figures(surrogate, chosen.out)
-    except FiguresError as error:
-        raise UsageError(str(error)) from error
+    written = draw_figures(surrogate, chosen.out)
     return as_json({"table": str(surrogate.path), "figures": list(map(str, written))})
 
 

@@ -1,16 +1,17 @@
 """From a tolerance to a verified table file: border, blocks, plain grid, fresh solves, provenance."""
 
-from __future__ import annotations
-
+import dataclasses
 import json
+import math
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mumacro import Surrogate
+from mumacro import MumacroError, Surrogate
 from mumacro.border import Border
 from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
 from mumacro.table import Block, Table, write_table
@@ -19,28 +20,61 @@ from mumacro.version import __version__
 from .blocks import build_block, build_border
 from .measure import block_errors
 from .quantities import ABS_TO_REL, SOLVED
-from .rounding import bits, round_block, to_bits
 from .sweep import Sweep
 from .verify import holds, uncovered, verify
 
-__all__ = ["ABS_TO_REL", "MAX_TOLERANCE", "MIN_TOLERANCE", "BuildError", "build_table", "stages"]
-
+Array = NDArray[np.float64]
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
 #: the same in every cell.  Less, since nothing is left to chance there: the error of a cell is known on 17 x 17 of its
-#: points, edges included; what is allowed for is the rest that the finer interpolant misses, see builder/cell_errors.py
+#: points, edges included; what is allowed for is the rest that the finer interpolant misses, see builder/measure.py
 CELL_SAFETY = 1.5
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
 ATTEMPTS = 4
+#: steps of rounding in one tolerance; with 64, mu~ of the coarsest table is no longer monotone to rounding
+STEPS = 256
 ERROR_BITS = 3  # digits of the errors of the plain grid and of cells
 REFERENCE = (
     "Benad J., Nakano K., Popov V. L., Popov M.: Active control of friction by transverse oscillations. Friction (2018)"
 )
 
 
-class BuildError(RuntimeError):
+class BuildError(MumacroError):
     """The tolerance was not reached; the message states where and by how much."""
+
+
+# --- rounding: bits below the tolerance are zero, which zlib compresses; errors are those of the rounded numbers ---
+
+
+def bits(tolerance: float) -> int:
+    """Binary digits after the point of which the last one is at most ``tolerance``/:data:`STEPS`."""
+    return math.ceil(math.log2(STEPS / tolerance))
+
+
+def to_step(values: Array, tolerance: float) -> Array:
+    """``values`` at multiples of a power of two; none moves by more than half of ``tolerance``/:data:`STEPS`."""
+    return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
+
+
+def to_bits(values: Array, digits: int, up: bool = False) -> Array:
+    """``values`` with ``digits`` binary digits each, to the nearest or, with ``up``, away from zero."""
+    mantissa, exponent = np.frexp(values)
+    scaled = np.ldexp(mantissa, digits)
+    whole = np.copysign(np.ceil(np.abs(scaled)), scaled) if up else np.round(scaled)
+    return np.asarray(np.ldexp(whole, exponent - digits))
+
+
+def round_block(block: Block, tolerance: float) -> Block:
+    """``block`` with its node values rounded.
+
+    All that a block tabulates is of order one, and mu~ changes by at most about as much as what is tabulated: a step
+    that is the same for all values of a block suits the relative error of mu~ too.
+    """
+    return dataclasses.replace(block, nodes={name: to_step(x, tolerance) for name, x in block.nodes.items()})
+
+
+# --- the table ------------------------------------------------------------------------------------------------------
 
 
 def stages() -> int:

@@ -1,7 +1,5 @@
 """Nodes of a block, and their refinement until the interpolant meets the tolerance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -18,8 +16,6 @@ from mumacro.table import Block, BorderPiece
 from .quantities import SOLVED
 from .sweep import Sweep
 
-__all__ = ["build_block", "build_border", "solve_nodes", "tabulated"]
-
 Array = NDArray[np.float64]
 MAX_NODES = 96
 MAX_CELLS = 160
@@ -28,11 +24,14 @@ CELL_SHARE = 0.4  # the same of the cells: fewer cells are faster, nodes cost no
 NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
 
 
-def tabulated(index: int, v: Array, y: Array, eta: Array, sweep: Sweep) -> dict[str, Array]:
-    """What a block tabulates at points of one shape, by quantity, from fresh solves; eta = y~ - 1."""
-    chart = charts.CHARTS[index]
+def solve_nodes(
+    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves."""
+    chart, found = charts.CHARTS[index], {}
+    a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
+    v, y, eta = chart.point(a[:, None], b[None, :], border)
     solved = sweep.solve("continuous" if chart.regime == CONTINUOUS else "full", v, y, eta)
-    found = {}
     for code, quantity in enumerate(QUANTITIES):
         if chart.holds(quantity):
             base, factor = kernels[-1].forms(code, index, v, y, eta)
@@ -40,16 +39,7 @@ def tabulated(index: int, v: Array, y: Array, eta: Array, sweep: Sweep) -> dict[
             if complement:  # next to 1 it has the digits
                 rest = np.where(base == 1.0, -solved[complement], rest)
             found[quantity.name] = rest / factor
-    return found
-
-
-def solve_nodes(
-    index: int, shape: tuple[int, int], border: Border, sweep: Sweep
-) -> tuple[Array, Array, dict[str, Array]]:
-    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves."""
-    chart = charts.CHARTS[index]
-    a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
-    return a, b, tabulated(index, *chart.point(a[:, None], b[None, :], border), sweep)
+    return a, b, found
 
 
 def _next(n: int) -> int:

@@ -1,7 +1,5 @@
 """How the solver is compiled, and the digest of everything that its results depend on."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 from pathlib import Path
@@ -10,8 +8,6 @@ import llvmlite
 import numba
 
 import mumacro
-
-__all__ = ["solver_kernel", "source_digest"]
 
 #: Compiles a function at its first call in a process; it runs without the interpreter's lock and without fused
 #: multiply-add.  Nothing is stored: see docs/decisions.md.

@@ -8,8 +8,6 @@ the table is kept by :class:`mumacro.Surrogate` alone.
 Every file is written beside its name and then renamed, and the same table gives the same bytes.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable
@@ -20,25 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from mumacro.errors import MumacroError
 from mumacro.table import Table, json_attributes, read_table
 from mumacro.writing import write_whole
 
 from .c.fmu.model import fmu2, fmu3
-from .c.source import write_c
+from .c.source import ExportError, write_c
 from .c.wasm import wasm
-
-__all__ = ["FORMATS", "MODELICA_TABLES", "ExportError", "export_table", "long_columns"]
 
 Array = NDArray[np.float64]
 PLANE = ("mu_ratio", "stick_fraction", "error_estimate")
 #: matrices of a Modelica file; those with log10 axes are the ones to interpolate
 MODELICA_TABLES = (*PLANE, "mu_ratio_log10", "stick_fraction_log10", "v_tilde_crit")
 _MAT_TEXT = 116  # bytes of free text at the start of a MAT file, where scipy would write the time of day
-
-
-class ExportError(MumacroError):
-    """A table that cannot be exported; the text states why."""
 
 
 def long_columns(table: Table) -> dict[str, Array]:
@@ -130,9 +121,7 @@ def export_table(path: str | Path, kind: str, out: str | Path) -> Table:
     Raises
     ------
     ExportError
-        Unknown format, a package missing, ``out`` is the table itself.
-    OutputError
-        ``out`` is no place for C sources.
+        Unknown format, a package or a compiler missing, ``out`` is the table itself or no place for C sources.
     TableError
         The table cannot be read.
     OSError

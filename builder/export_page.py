@@ -6,8 +6,6 @@
 It is the page of the service with another ``service.js``.  It hides the functions that need the service, and says so.
 """
 
-from __future__ import annotations
-
 import html
 import json
 import shutil
@@ -18,7 +16,7 @@ from typing import Any
 from mumacro import MumacroError, Surrogate
 from mumacro.page import POLICY, map_of, names
 
-__all__ = ["write_page"]
+from .c.source import ExportError
 
 # the files of the service, as data: this package does not import it
 _FOLDER = Path(__file__).resolve().parent.parent / "service" / "static" / "page"
@@ -27,23 +25,19 @@ _POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-ev
 )  # browsers ignore frame-ancestors in a meta element
 
 
-class PageError(MumacroError):
-    """The module is not of that table."""
-
-
 def write_page(table: Path, wasm: Path, out: Path) -> Surrogate:
     """Write the folder ``out`` from a table and the module that was exported from it; what is in it is replaced.
 
     Raises
     ------
-    PageError
+    ExportError
         The module was exported from another table.
     TableError, OSError
         The table cannot be read; a file cannot be read or written.
     """
     surrogate, module = Surrogate.open(table), wasm.read_bytes()
     if surrogate.checksum.encode() not in module:
-        raise PageError(f"{wasm} was not exported from {table}")
+        raise ExportError(f"{wasm} was not exported from {table}")
     parts = out / "static" / "page"
     parts.mkdir(parents=True, exist_ok=True)
     for path in _FOLDER.glob("*.*s"):  # scripts and styles

@@ -8,8 +8,6 @@ all its digits.  Source of the equations: Benad, Nakano, Popov, Popov (2018), eq
 Everything here is compiled; arguments are float64 scalars, dimensionless: v = v~, y = y~.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

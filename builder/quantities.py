@@ -3,15 +3,11 @@
 The solver's column (:data:`builder.sweep.COLUMNS`) has the quantity's name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-__all__ = ["ABS_TO_REL", "SOLVED", "SOLVER_NOISE", "Solved", "solver_noise"]
 
 Array = NDArray[np.float64]
 Sliding = NDArray[np.bool_] | bool

@@ -3,8 +3,6 @@
 Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols and charts as in :mod:`.model`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

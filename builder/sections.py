@@ -11,8 +11,6 @@ Two sections are used, because neither is well conditioned everywhere:
 v = v~ [-], y = y~ [-]; angles and charts as in :mod:`.model`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Every polynomial is a row (ORDER + 2,) of the workspace ``w``, its coefficients 
 start of the step.  Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols as in :mod:`.model`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,19 +3,21 @@
 Continuous sliding is a fixed point of the half-period map, th(tau + pi) = -th(tau), found by Newton's method with
 d th_end / d th_start = exp(-integral of lam).  Stick-slip is a root on a section, :mod:`.sections`.
 
-The solver's range is 1e-60 <= v~ <= 1e10, 1e-15 <= y~ <= 1e14, :mod:`.limits`; beyond it :func:`solve` refuses.
+The solver's range is 1e-60 <= v~ <= 1e10, 1e-15 <= y~ <= 1e14; beyond it :func:`check_range` refuses.  Below it
+products underflow.  Above y~ = 1e14 the section's root is lost in rounding, and at v~ = 1e12 some points need too many
+steps.  The limits of the model hold to rounding there, so a table answers for every v~ and y~.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mumacro.errors import InputError
 
 from . import model
 from .compiled import solver_kernel
-from .limits import check_range
 from .model import OK, rechart, slip
 from .sections import COS_0, DEFICIT_0, DURATION, NOT_CONVERGED, SIGMA_0, SIN_0, border_guess, stick_slip
 from .series import ORDER
@@ -37,6 +39,7 @@ ADVICE = {
 RESULTS = ("mu_ratio", "deficit", "stick_fraction", "power", "regime", "slip_speed", "min_slip_speed")
 MU_RATIO, DEFICIT, STICK_FRACTION, POWER, REGIME, SLIP_SPEED, MIN_SLIP_SPEED = range(N_RESULTS := len(RESULTS))
 
+V_RANGE, Y_RANGE = (1e-60, 1e10), (1e-15, 1e14)  # of v~ and y~, dimensionless
 MEAN = 1.0 / math.pi  # of an integral over half a period
 RELATIVE_ERROR = 3e-15  # of the smaller of mu~ and 1 - mu~, see error_estimate
 
@@ -195,6 +198,28 @@ class Steady:
         return self.status == OK
 
 
+def check_range(v: ArrayLike, y: ArrayLike, eta: ArrayLike) -> None:
+    """Refuse v~, y~ or eta = y~ - 1 [-], arrays of one shape, that the solver is not made for.
+
+    Raises
+    ------
+    InputError
+        A value out of range or NaN; an ``eta`` that is not y~ - 1 to rounding.
+    """
+    v, y, eta = (np.asarray(values, dtype=np.float64) for values in (v, y, eta))
+    for field, values, (low, high) in (("v_tilde", v, V_RANGE), ("y_tilde", y, Y_RANGE)):
+        bound = f"from {low:g} to {high:g}, the range of the solver (Surrogate.mu_ratio of a table answers beyond it)"
+        _refuse(field, values, (low <= values) & (values <= high), bound)
+    _refuse("eta", eta, np.abs(eta - (y - 1.0)) <= 4e-16 * np.maximum(1.0, y), "y_tilde - 1 to rounding")
+
+
+def _refuse(field: str, values: NDArray[np.float64], right: NDArray[np.bool_], bound: str) -> None:
+    """Raise for the first of ``values`` that is not ``right``."""
+    if not right.all():
+        at = int(np.argmin(right))
+        raise InputError(field, values.flat[at].item(), bound, at if values.ndim else None)
+
+
 @solver_kernel
 def workspace() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set per thread."""
@@ -207,7 +232,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     Parameters
     ----------
     v, y : float
-        Dimensionless speed and amplitude [-], in ``builder.limits.V_RANGE`` and ``builder.limits.Y_RANGE``.
+        Dimensionless speed and amplitude [-], in ``builder.steady.V_RANGE`` and ``builder.steady.Y_RANGE``.
     eta : float, optional
         y~ - 1 [-], to be given where it is known better than ``y`` in double precision.
 
@@ -238,7 +263,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
 
 
 def border(y: float) -> tuple[float, float]:
-    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in ``builder.limits.Y_RANGE``.
+    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in ``builder.steady.Y_RANGE``.
 
     Raises
     ------

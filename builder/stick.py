@@ -4,8 +4,6 @@ During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit
 Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1 [-]; angles of u as in :mod:`.model`.
 """
 
-from __future__ import annotations
-
 import math
 
 from .compiled import solver_kernel

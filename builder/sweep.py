@@ -4,13 +4,12 @@ Work is cut into chunks of points; a chunk is a pure function of its inputs, so 
 workers there are or on whether a build was interrupted.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +19,7 @@ from mumacro.writing import write_whole
 
 from . import steady
 from .compiled import solver_kernel, source_digest
-from .limits import check_range
 from .model import OK
-
-__all__ = ["COLUMNS", "CheckpointError", "SolveError", "Sweep", "solve_chunk"]
 
 Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
@@ -35,7 +31,7 @@ COLUMNS = (*steady.RESULTS[:_RESULTS], "error_estimate", "status")
 _MU, _DEFICIT, _ERROR, _STATUS = map(COLUMNS.index, ("mu_ratio", "deficit", "error_estimate", "status"))
 
 
-class SolveError(ArithmeticError):
+class SolveError(MumacroError):
     """A node could not be solved; the message states which and what to do."""
 
 
@@ -85,7 +81,7 @@ class Sweep:
         self.checkpoint = checkpoint
         self._pool = ThreadPoolExecutor(max_workers=workers)
 
-    def __enter__(self) -> Sweep:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -99,13 +95,13 @@ class Sweep:
         Raises
         ------
         InputError
-            A point outside the solver's range, :mod:`.limits`.
+            A point outside the solver's range, :mod:`.steady`.
         SolveError
             When any point fails: a table must have no missing node.
         """
         v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
         eta = y - 1.0 if eta is None else np.broadcast_to(np.asarray(eta, dtype=np.float64), y.shape)
-        check_range(v, y, eta)
+        steady.check_range(v, y, eta)
         points = np.stack([v.ravel(), y.ravel(), eta.ravel()], axis=1)
         out = self._run(kind, points) if self.checkpoint is None else self._kept(self.checkpoint, kind, points)
         self.n_solves += points.shape[0]

@@ -1,7 +1,5 @@
 """The table against fresh solves: error off the nodes, coverage of every bound, seams, monotony."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -12,16 +10,18 @@ from numpy.typing import NDArray
 from mumacro import Surrogate, charts
 from mumacro.charts import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
 
-from .differences import Neighbours
 from .measure import SEAMS, fast_from, near_seams
 from .measure import log_uniform as _log
 from .quantities import ABS_TO_REL, solver_noise
 from .sweep import Sweep
 
-__all__ = ["CASES", "draw", "holds", "monotony", "seam_jumps", "seam_slope_jumps", "uncovered", "verify"]
-
 Array = NDArray[np.float64]
 BESIDE_BORDER = 1e-3  # of v~crit: nearer, slopes of what is not smooth at the border are not compared
+# differences of fresh solves stand for the slopes of the model
+_STENCIL = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+_SIXTH_ORDER = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+_FOURTH_ORDER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
+_STEP = 0.003  # in ln v~ and ln y~: beside the corner 0.01 leaves out more than the finest table errs by
 SLOPE_SHARE = 20  # one point in so many is also compared with differences, which take twelve solves each
 
 
@@ -45,25 +45,22 @@ def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     return v, np.where(which == 2, _log(rng, 1e-9, 1e-3, n), y)
 
 
-#: name of the kind of case, share of the points, how they are drawn
 _How = Callable[[np.random.Generator, int, Surrogate], tuple[Array, Array]]
-CASES: tuple[tuple[str, float, _How], ...] = (
-    ("random", 0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
-    ("wide", 0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
-    ("border", 0.12, _border),
-    ("corner", 0.12, lambda rng, n, _: _corner(rng, n)),
-    ("seams", 0.10, near_seams),
-    ("creep", 0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
-    ("tails", 0.08, lambda rng, n, _: _tails(rng, n)),
-)
+#: kind of case -> share of the points, how they are drawn
+CASES: dict[str, tuple[float, _How]] = {
+    "random": (0.30, lambda rng, n, _: (_log(rng, 1e-3, 1e3, n), _log(rng, 1e-3, 1e3, n))),
+    "wide": (0.20, lambda rng, n, _: (_log(rng, 1e-12, 1e8, n), _log(rng, 1e-8, 1e8, n))),
+    "border": (0.12, _border),
+    "corner": (0.12, lambda rng, n, _: _corner(rng, n)),
+    "seams": (0.10, near_seams),
+    "creep": (0.08, lambda rng, n, _: (_log(rng, 1e-12, 1e-4, n), _log(rng, 1e-2, 1e3, n))),
+    "tails": (0.08, lambda rng, n, _: _tails(rng, n)),
+}
 
 
 def draw(case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
     """``n`` points (v~, y~) of one kind of :data:`CASES`."""
-    for name, _, how in CASES:
-        if name == case:
-            return how(np.random.default_rng(seed), n, surrogate)
-    raise ValueError(f"case must be one of {', '.join(name for name, _, _ in CASES)}, got {case!r}")
+    return CASES[case][1](np.random.default_rng(seed), n, surrogate)
 
 
 def _both_sides(surrogate: Surrogate, n: int, seed: int) -> Iterator[tuple[Array, Array, Array, Array]]:
@@ -102,6 +99,40 @@ def monotony(surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 
         steps = -np.diff(surrogate.mu_ratio(rise, fixed)), np.diff(surrogate.mu_ratio(fixed, rise))
         worst = max(worst, float(np.max(steps)))
     return worst
+
+
+class Neighbours:
+    """Fresh solves around points (n,): three on either side along ln v~ and along ln y~.
+
+    A step is a share of the distance to what is not smooth: border and corner.
+    """
+
+    def __init__(self, surrogate: Surrogate, sweep: Sweep, v: Array, y: Array) -> None:
+        self.v, self.y, self.crit, mu = v, y, surrogate.v_tilde_crit(y), surrogate.mu_ratio(v, y)
+        gap = np.abs(np.log(v / self.crit))
+        stiff = np.maximum(mu * mu, np.abs(1.0 - y * y))
+        self.steps = np.minimum(_STEP, gap / 32.0), np.minimum(np.minimum(_STEP, gap / 64.0), _STEP * stiff)
+        around_v, around_y = (
+            x[:, None] * np.exp(_STENCIL * step[:, None]) for x, step in zip((v, y), self.steps, strict=True)
+        )
+        self.solved = sweep.solve("full", around_v, y[:, None]), sweep.solve("full", v[:, None], around_y)
+
+    def slopes(self, name: str) -> tuple[Array, Array]:
+        """Slopes along ln v~ and ln y~, (2, n), by central differences, and what these may be wrong by."""
+        slope, noise = np.empty((2, self.v.size)), np.empty((2, self.v.size))
+        sliding = (self.v > self.crit)[:, None]
+        for row, (step, solved) in enumerate(zip(self.steps, self.solved, strict=True)):
+            slope[row] = solved[name] @ _SIXTH_ORDER / step
+            # what the fourth order leaves out; the sixth leaves out up to a seventh of it
+            left_out = np.abs(slope[row] - solved[name] @ _FOURTH_ORDER / step)
+            each = solver_noise(name, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
+            noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
+        return slope, noise
+
+
+def differences(surrogate: Surrogate, sweep: Sweep, name: str, v: Array, y: Array) -> tuple[Array, Array]:
+    """:meth:`Neighbours.slopes` of one quantity at points (n,)."""
+    return Neighbours(surrogate, sweep, v, y).slopes(name)
 
 
 class _Compared(NamedTuple):
@@ -183,7 +214,7 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
     names = surrogate.table.quantities
     values: dict[str, list[_Compared]] = {name: [] for name in names}
     slopes: dict[str, list[_Compared]] = {name: [] for name in names}
-    for i, (_, share, how) in enumerate(CASES):
+    for i, (share, how) in enumerate(CASES.values()):
         v, y = how(np.random.default_rng([seed, i]), max(1, math.ceil(share * points)), surrogate)
         v, y = v[(v > 0.0) & (y > 0.0)], y[(v > 0.0) & (y > 0.0)]
         solved = sweep.solve("full", v, y)
@@ -193,7 +224,7 @@ def verify(surrogate: Surrogate, sweep: Sweep, points: int, seed: int = 2018) ->
             slopes[name].append(_slopes(surrogate, around, name))
     return {
         **_report(values["mu_ratio"]),
-        "cases": {case: _said(part) for (case, _, _), part in zip(CASES, values["mu_ratio"], strict=True)},
+        "cases": {case: _said(part) for case, part in zip(CASES, values["mu_ratio"], strict=True)},
         **{name: _report(values[name]) for name in names[1:]},
         "slopes": {name: _report(parts) for name, parts in slopes.items()},
         "seam_jump": seam_jumps(surrogate),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measuring import main, markdown, quantity, sections
-from builder.limits import V_RANGE, Y_RANGE
+from builder.steady import V_RANGE, Y_RANGE
 from builder.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS

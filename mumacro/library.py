@@ -116,23 +116,20 @@ class Kernel:
 
     def values(
         self, data: Data, quantity: int, v: Array, y: Array, value: Array, bound: Array | None, source: Codes | None,
-        kind: tuple[int, int] | None = None,
+        kind: tuple[int, int] = (0, 0),
     ) -> None:  # fmt: skip
         """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where wanted.
 
         Of another ``kind``, see :meth:`cases`, all three are.
         """
         codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
-        arrays = v.size, _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
-        if kind is None:
-            self._values(data.pointer, quantity, *arrays)
-        else:
-            self._found.values_as(data.pointer, *kind, quantity, *arrays)
+        arrays = _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
+        self._values(data.pointer, *kind, quantity, v.size, *arrays)
 
     def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
         """A quantity at one point in plain numbers, its bound and the source."""
         point, code = _FFI.new(_POINT, (v, y)), _FFI.new(_CODE)
-        self._values(data.pointer, quantity, 1, point, point + 1, point + 2, point + 3, code)
+        self._values(data.pointer, 0, 0, quantity, 1, point, point + 1, point + 2, point + 3, code)
         return point[2], point[3], code[0]
 
     def slopes(self, data: Data, quantity: int, v: Array, y: Array, rows: Array, start: int = 0) -> None:
@@ -142,7 +139,7 @@ class Kernel:
 
     def cases(
         self, data: Data, n: int, columns: Sequence[Array | float], rows: Array, source: Codes, start: int = 0,
-        kind: tuple[int, int] | None = None,
+        kind: tuple[int, int] = (0, 0),
     ) -> None:  # fmt: skip
         """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
 
@@ -160,12 +157,7 @@ class Kernel:
                 kept.append(pointer)
         out = _numbers(rows.reshape(-1)[start:] if start else rows)
         codes = _FFI.from_buffer(_CODES, source)
-        if kind is None:
-            self._cases(data.pointer, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
-        else:
-            self._found.cases_as(
-                data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
-            )  # fmt: skip
+        self._cases(data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
 
     def one(self, data: Data, six: tuple[float, ...], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""

@@ -381,8 +381,7 @@ class Surrogate:
             raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
         self._data_of(kind)
         v, y, shape = _points(v_tilde, y_tilde)
-        code = None if kind == SPRING else kind
-        value, bound, source = batch.values(_CODES[name], self._with(name), v, y, self.threads, code)
+        value, bound, source = batch.values(_CODES[name], self._with(name), v, y, self.threads, kind)
         if not shape:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
             _refuse_illegal(int(source[0]), v, y, ">= 0 and < 1" if kind.normal else finite)
@@ -540,7 +539,7 @@ class Surrogate:
         if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
             raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
         given = [c if c.size == n else float(c[0]) for c in columns]
-        rows, source = batch.cases(self._data_of(kind), given, n, 1, 3, None if kind == SPRING else kind)
+        rows, source = batch.cases(self._data_of(kind), given, n, 1, 3, kind)
         return rows[0], rows[1], rows[2], source
 
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
@@ -619,8 +618,7 @@ class Surrogate:
             float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape) for c in columns
         ]
         found, source = batch.cases(
-            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3,
-            None if kind == SPRING else kind,
+            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3, kind,
         )  # fmt: skip
         rows = found.reshape(len(found), *shape)
         answer: Answer[Array] = (AnswerWithGradient if gradient else Answer)(
@@ -641,11 +639,11 @@ class Surrogate:
         """``answer`` for the middle of an interval of k, and the extremes over it."""
         shape = answer.mu_macro.shape
         flat = {name: _flat(column, shape) for name, column in columns.items()}
-        data, code = self._data_of(kind), None if kind == SPRING else kind
+        data = self._data_of(kind)
 
         def evaluate(k: Array, places: NDArray[np.intp]) -> tuple[Array, Array, Array]:
             six = [_contiguous(k if name == "k" else column[places]) for name, column in flat.items()]
-            rows = batch.cases(data, six, k.size, self.threads, 17, code)[0]
+            rows = batch.cases(data, six, k.size, self.threads, 17, kind)[0]
             return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k
 
         low, high, bound = extremes(evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends))

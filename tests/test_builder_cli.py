@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from builder.__main__ import main
-from builder.assemble import ABS_TO_REL
+from builder.quantities import ABS_TO_REL
 from mumacro import Surrogate
 from mumacro.table import read_table, write_table
 from tests.comparing import close

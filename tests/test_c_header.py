@@ -141,7 +141,7 @@ def neighbours(x: Any, most: int = 3) -> Any:
 
 def drawn(table: Surrogate, n: int, seed: int) -> Any:
     """``n`` points of every kind, shape (2, kinds n)."""
-    return np.concatenate([draw(case, n, table, seed) for case, _, _ in CASES], axis=1)
+    return np.concatenate([draw(case, n, table, seed) for case in CASES], axis=1)
 
 
 def points(table: Surrogate, n: int, seed: int) -> Any:

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from builder.assemble import ABS_TO_REL, build_table
+from builder.assemble import STEPS, build_table, to_step
 from builder.measure import SEAMS
-from builder.quantities import STICK_NOISE, solver_noise
-from builder.rounding import STEPS, to_step
+from builder.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
 from builder.steady import solve
 from builder.sweep import Sweep
 from builder.verify import holds, monotony, seam_jumps, seam_slope_jumps, verify

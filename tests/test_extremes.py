@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from builder.limits import V_RANGE, Y_RANGE
-from builder.steady import RELATIVE_ERROR, solve
+from builder.steady import RELATIVE_ERROR, V_RANGE, Y_RANGE, solve
 from builder.sweep import Sweep
 from mumacro.closed_forms import outer, second_order
 from tests.cases import log_uniform, opened

@@ -11,12 +11,11 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from builder import cycle
+from builder import figures
 from builder.__main__ import main
-from builder.cycle import CASES, steady_cycle
-from builder.figures import FIGURES, Curve, FiguresError, Panel, draw_figures
+from builder.figures import CASES, FIGURES, Curve, Panel, draw_figures, steady_cycle
 from builder.steady import border, solve
-from mumacro import Surrogate
+from mumacro import MumacroError, Surrogate
 from tests.comparing import close
 
 pytestmark = pytest.mark.slow
@@ -139,10 +138,10 @@ def test_without_matplotlib_the_extra_is_named(surrogate: Surrogate, tmp_path: A
     loaded = [name for name in sys.modules if name.startswith("matplotlib.")]  # by another test
     for name in ("matplotlib", *loaded):
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(FiguresError, match="extra 'figures'"):
+    with pytest.raises(MumacroError, match="extra 'figures'"):
         draw_figures(surrogate, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_example_runs() -> None:
-    assert doctest.testmod(cycle).failed == 0
+    assert doctest.testmod(figures).failed == 0

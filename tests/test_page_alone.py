@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from builder.c.source import ExportError
 from builder.c.wasm import compiler
 from builder.export import export_table
-from builder.export_page import PageError, main, write_page
+from builder.export_page import main, write_page
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from tests.browser import START
@@ -63,7 +64,7 @@ def test_the_module_is_small_and_is_of_its_table(
     assert module[:4] == b"\0asm"
     assert len(module) < 320_000
     assert table.checksum.encode() in module
-    with pytest.raises(PageError, match="not exported from"):
+    with pytest.raises(ExportError, match="not exported from"):
         write_page(other, path, tmp_path)
     assert list(tmp_path.iterdir()) == []
     assert (main([str(other), str(path), str(tmp_path)]), main([])) == (1, 2)

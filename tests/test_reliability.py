@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.limits import Y_RANGE
-from builder.steady import solve
+from builder.steady import Y_RANGE, solve
 from builder.sweep import CheckpointError, Sweep
 from mumacro import Surrogate
 from mumacro.closed_forms import outer

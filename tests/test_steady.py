@@ -12,9 +12,8 @@ import pytest
 from scipy.integrate import fixed_quad
 
 from builder import model, sections, steady
-from builder.limits import V_RANGE, Y_RANGE
 from builder.model import ANGLE, CHART, MIN_SPEED, NO_SLIP, OK, PATH, SIGMA, SUM_UX, WORK, slip
-from builder.steady import ADVICE, border, solve, solve_raw, workspace
+from builder.steady import ADVICE, V_RANGE, Y_RANGE, border, solve, solve_raw, workspace
 from builder.sweep import Sweep
 from mumacro import InputError
 from mumacro.closed_forms import outer, second_order

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.assemble import ABS_TO_REL
 from builder.measure import SEAMS
-from builder.quantities import SOLVER_NOISE
+from builder.quantities import ABS_TO_REL, SOLVER_NOISE
 from builder.sweep import Sweep
 from mumacro import InputError, Surrogate
 from mumacro.charts import SIGMA_CUT, SOURCES, Y_STICK_HI, Y_STICK_LO

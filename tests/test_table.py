@@ -13,7 +13,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from builder.rounding import STEPS, bits, to_bits, to_step
+from builder.assemble import STEPS, bits, to_bits, to_step
 from mumacro import InputError, Surrogate, TableError, charts
 from mumacro.cells import nodes
 from mumacro.charts import BORDER_PIECES, CHARTS, NAMES

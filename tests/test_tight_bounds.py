@@ -23,7 +23,7 @@ from mumacro.settling import settling
 from tests.cases import UNIT, Array, Case, opened, tables
 from tests.comparing import close
 
-KINDS = [kind for kind, _, _ in CASES]
+KINDS = list(CASES)
 Ask = Callable[[Surrogate, Array, Array], Any]  # values and bounds
 table = tables(1e-7)
 

@@ -4,8 +4,6 @@ The functions are those of ``mumacro/kernel``, joined into one text; nothing is 
 module needs only what the library itself needs.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import subprocess
@@ -23,8 +21,6 @@ from mumacro.library import Array
 from mumacro.table import Table
 from mumacro.version import __version__
 from mumacro.writing import write_whole
-
-__all__ = ["DEFAULT_TOLERANCE", "CompilerError", "OutputError", "compiled", "files", "header_text", "write_c", "zig"]
 
 #: of the bundled table that is written if none is named: a C program holds it in its text
 DEFAULT_TOLERANCE = 1e-7
@@ -45,12 +41,8 @@ _STATIC = "#ifndef MUMACRO_API\n#define MUMACRO_API static inline\n#endif\n"
 _PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
 
 
-class OutputError(MumacroError):
-    """The text cannot be written there; the message states why."""
-
-
-class CompilerError(MumacroError):
-    """A C compiler refuses the text; this is its message."""
+class ExportError(MumacroError):
+    """What cannot be exported, or not there; the message states why, a compiler's in its own words."""
 
 
 def zig(target: str) -> list[str] | None:
@@ -68,7 +60,7 @@ def compiled(texts: dict[str, str], command: list[str]) -> bytes:
         words = [*command, f"-I{folder}", "-o", "made"]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         if done.returncode != 0:
-            raise CompilerError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
+            raise ExportError(f"{' '.join(words)}: {done.stderr.strip()[-2000:]}")
         return Path(folder, "made").read_bytes()
 
 
@@ -97,18 +89,18 @@ def write_c(table: Table, out: Path) -> list[Path]:
 
     Raises
     ------
-    OutputError
+    ExportError
         ``out`` is neither a folder nor the name of a new one, or ends in ``.h`` and is a folder.
     OSError
         It cannot be written.
     """
     if out.suffix == ".h":
         if out.is_dir():
-            raise OutputError(f"{out} is a folder: name a folder without the suffix .h, or a header in it")
+            raise ExportError(f"{out} is a folder: name a folder without the suffix .h, or a header in it")
         texts = {out: header_text(table)}
     else:
         if out.exists() and not out.is_dir():
-            raise OutputError(f"{out} is a file: name a folder for three files, or a header that ends in .h")
+            raise ExportError(f"{out} is a file: name a folder for three files, or a header that ends in .h")
         out.mkdir(exist_ok=True)
         texts = {out / name: text for name, text in files(table).items()}
     for path, text in texts.items():

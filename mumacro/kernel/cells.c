@@ -22,46 +22,51 @@ MU_INLINE mu_spot mu_find(const double *block, int64_t first, int64_t cells, dou
 
 enum { MU_PARTS = 8 / MU_LANES };
 
-/* Rows hold falling powers of w, columns falling powers of u: Horner in w for all columns at once. */
-MU_INLINE void mu_rows(const double *cell, double w, double *row) {
-    mu_lanes sum[MU_PARTS];
-    for (int p = 0; p < MU_PARTS; ++p) sum[p] = mu_load(cell + p * MU_LANES);
+/* Rows hold falling powers of w, columns falling powers of u: Horner in w for all columns at once, and where rising is
+ * not NULL the derivative along w. */
+MU_INLINE void mu_rows(const double *cell, double w, double *row, double *rising) {
+    mu_lanes sum[MU_PARTS], slope[MU_PARTS];
+    for (int p = 0; p < MU_PARTS; ++p) {
+        sum[p] = mu_load(cell + p * MU_LANES);
+        slope[p] = mu_all(0.0);
+    }
     for (int k = 1; k < 8; ++k)
-        for (int p = 0; p < MU_PARTS; ++p) sum[p] = mu_fma(sum[p], mu_all(w), mu_load(cell + 8 * k + p * MU_LANES));
-    for (int p = 0; p < MU_PARTS; ++p) mu_store(row + p * MU_LANES, sum[p]);
+        for (int p = 0; p < MU_PARTS; ++p) {
+            if (rising) slope[p] = mu_fma(slope[p], mu_all(w), sum[p]);
+            sum[p] = mu_fma(sum[p], mu_all(w), mu_load(cell + 8 * k + p * MU_LANES));
+        }
+    for (int p = 0; p < MU_PARTS; ++p) {
+        mu_store(row + p * MU_LANES, sum[p]);
+        if (rising) mu_store(rising + p * MU_LANES, slope[p]);
+    }
 }
 
-/* The polynomial of a cell at u, w: the sum over powers of u by halves, u^4, u^2, u. */
-MU_INLINE double mu_cell_value(const double *cell, double u, double w) {
-    double c[8], half[4];
+/* A sum over falling powers of u by halves, u^4, u^2, u. */
+MU_INLINE double mu_by_halves(const double *c, double u) {
+    double half[4];
     const double u2 = u * u, u4 = u2 * u2;
-    mu_rows(cell, w, c);
     for (int i = 0; i < 4; ++i) half[i] = mu_fma1(c[i], u4, c[i + 4]);
     return mu_fma1(mu_fma1(half[0], u2, half[2]), u, mu_fma1(half[1], u2, half[3]));
 }
 
+/* The polynomial of a cell at u, w. */
+MU_INLINE double mu_cell_value(const double *cell, double u, double w) {
+    double c[8];
+    mu_rows(cell, w, c, NULL);
+    return mu_by_halves(c, u);
+}
+
 typedef struct {
     double q, q_a, q_b; /* and its derivatives along a and b */
+    double value;       /* q to the bit as mu_cell_value has it */
 } mu_slope;
 
 /* The same with its derivatives along u and w. */
 MU_INLINE mu_slope mu_cell_slopes(const double *cell, double u, double w) {
-    mu_lanes value[MU_PARTS], rising[MU_PARTS];
     double c[8], d[8];
     mu_slope out;
-    for (int p = 0; p < MU_PARTS; ++p) {
-        value[p] = mu_load(cell + p * MU_LANES);
-        rising[p] = mu_all(0.0);
-    }
-    for (int k = 1; k < 8; ++k)
-        for (int p = 0; p < MU_PARTS; ++p) {
-            rising[p] = mu_fma(rising[p], mu_all(w), value[p]);
-            value[p] = mu_fma(value[p], mu_all(w), mu_load(cell + 8 * k + p * MU_LANES));
-        }
-    for (int p = 0; p < MU_PARTS; ++p) {
-        mu_store(c + p * MU_LANES, value[p]);
-        mu_store(d + p * MU_LANES, rising[p]);
-    }
+    mu_rows(cell, w, c, d);
+    out.value = mu_by_halves(c, u);
     out.q = c[0];
     out.q_a = 0.0;
     out.q_b = d[0];

@@ -141,37 +141,18 @@ MU_INLINE double mu_speed_share(double v) {
 
 /* In the last 1e-9 of sigma below the border the derivative of b is that 1e-9 below it. */
 MU_INLINE mu_turn mu_turn_of(const mu_place *at) {
+    /* a is this power of y~; where it is 0, ln y~ */
+    static const signed char power[MU_CHARTS] = {2, 0, 0, 0, -1, 2, 1, 0, 0, 0, 0, -1};
     mu_turn out = {0.0, 1.0, 1.0, -at->tilt, 0.0, 0.0};
-    switch (at->block) {
-    case MU_CORNER:
-        return mu_turn_corner(at);
-    case MU_C_LOW: {
-        const double share = mu_speed_share(at->v);
-        out.a_y = 2.0 * at->a;
-        out.b_v = 2.0 * share / mu_fma1(at->v, at->v, 1.0);
-        out.b_y = 0.0;
-        return out;
-    }
-    case MU_C_TAIL:
-        out.a_y = -at->a;
-        out.b_y = -0.5;
-        return out;
-    case MU_S_LOW:
-        out.a_y = 2.0 * at->a;
-        break;
-    case MU_S_MID:
-        out.a_y = at->a;
-        break;
-    case MU_S_TAIL:
-        out.a_y = -at->a;
-        break;
-    default:
-        break;
-    }
+    if (at->block == MU_CORNER) return mu_turn_corner(at);
+    if (power[at->block]) out.a_y = power[at->block] * at->a;
     if (at->block >= MU_S_LOW) {
         const double root = mu_max(MU_SQRT2 - at->b, 1e-9);
         out.b_v = at->b < 0.5 * MU_SQRT2 ? 0.5 * at->b : 0.5 * (1.0 - root * root) / root;
         out.b_y = -at->tilt * out.b_v;
-    }
+    } else if (at->block == MU_C_LOW) {
+        out.b_v = 2.0 * mu_speed_share(at->v) / mu_fma1(at->v, at->v, 1.0);
+        out.b_y = 0.0;
+    } else if (at->block == MU_C_TAIL) out.b_y = -0.5;
     return out;
 }

@@ -276,14 +276,15 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
     return out;
 }
 
-/* A ball whose springs all turn at the same phase; those further out than 1 - xi = `reversed` slip backwards, too. */
-static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
-    mu_driven out = mu_drive_spring(MU_ALONG, v, y);
+/* One spring; or a ball, whose springs all turn at the same phase: those further out than 1 - xi = `reversed` slip
+ * backwards, too. */
+static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
+    mu_driven out = mu_drive_spring(direction, v, y);
     mu_turning at;
     mu_springs c;
     double reversed, still, load, h, deficit, rest = 0.0, slopes = 0.0;
     const double (*errors)[8] = data->rules[MU_ABOVE].errors;
-    if (out.line.source < 0 || out.line.source == MU_NO_OSCILLATION || !(v < y) || !(y < MU_HUGE)) return out;
+    if (contact == MU_SPRING || !(v >= 0.0 && v < y && y < MU_HUGE)) return out;
     at = mu_turning_of(v, y);
     reversed = mu_outside(0.5 * at.travel * y / MU_MIDDLE);
     still = 1.0 - reversed; /* xi of the last spring without reverse slip, load of these springs */
@@ -320,10 +321,6 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     return out;
 }
 
-static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
-    return contact == MU_BALL ? mu_drive_ball(data, v, y) : mu_drive_spring(direction, v, y);
-}
-
 /* --- any contact and direction ---------------------------------------------------------------------------- */
 
 /* A quantity of a contact; the normal direction has z for y~ and no power: how far the load moves is not modelled. */
@@ -337,8 +334,13 @@ static mu_answer mu_answer_as(const mumacro_data *data, int contact, int directi
         if (quantity == MU_STICK) return mu_limit(line->stick, found.stick_bound, line->source);
         return mu_limit(line->mu, found.bound, line->source);
     }
-    if (contact == MU_BALL) return mu_ball_answer(data, quantity, v, y);
-    return mu_answer_at(data, quantity, v, y);
+    if (contact == MU_SPRING) { /* the same bits as in any array */
+        int8_t source;
+        mu_answer out;
+        mu_values(data, quantity, 1, &v, &y, &out.value, &out.bound, &source);
+        return mu_limit(out.value, out.bound, source);
+    }
+    return mu_ball_answer(data, quantity, v, y);
 }
 
 static mu_slopes mu_slopes_as(const mumacro_data *data, int contact, int direction, double v, double y) {

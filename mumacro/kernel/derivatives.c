@@ -25,14 +25,6 @@ static void mu_partials(const mumacro_data *data, int quantity, int64_t n, const
     }
 }
 
-/* Slopes along ln v~ and ln y~ where both are moved by so many steps. */
-static void mu_slopes_beside(const mumacro_data *data, int quantity, double v, double y, double step_v, double step_y,
-                             double *slopes) {
-    const mu_slopes at = mu_slopes_at(data, quantity, v * (1.0 + step_v), y * (1.0 + step_y));
-    slopes[0] = at.along_v;
-    slopes[1] = at.along_y;
-}
-
 /* Derivatives of both slopes along one logarithm: central, or towards `side` where the border is near. */
 static void mu_bend(const mumacro_data *data, int quantity, double v, double y, double step_v, double step_y, int side,
                     double *out) {
@@ -43,11 +35,11 @@ static void mu_bend(const mumacro_data *data, int quantity, double v, double y, 
     for (int i = 0; i < 5; ++i) {
         const double weight = (side ? sign * forward[i] : central[i]) / step;
         const double at = side ? sign * i : i - 2;
-        double slopes[2];
+        mu_slopes beside;
         if (weight == 0.0) continue;
-        mu_slopes_beside(data, quantity, v, y, mu_growth(at * step_v), mu_growth(at * step_y), slopes);
-        out[0] += weight * slopes[0];
-        out[1] += weight * slopes[1];
+        beside = mu_slopes_at(data, quantity, v * (1.0 + mu_growth(at * step_v)), y * (1.0 + mu_growth(at * step_y)));
+        out[0] += weight * beside.along_v;
+        out[1] += weight * beside.along_y;
     }
 }
 
@@ -68,17 +60,18 @@ static void mu_bends_at(const mumacro_data *data, int quantity, double v, double
     /* at y~ = 0 the limit y~ -> 0; next to the corner v~ -> 0, y~ = 1 all changes over |y~ - 1| + phi^2, phi of
      * y~ = 1, the cube root of pi v~ */
     const double y = mu_max(given, 1e-6);
-    double along_v[2], along_y[2], here[2], phi, step;
+    double along_v[2], along_y[2], phi, step;
+    mu_slopes here;
     out[0] = out[1] = out[2] = NAN;
     if (!(v > 0.0 && v < HUGE_VAL && given >= 0.0 && given < HUGE_VAL)) return;
     phi = mu_normal_form_root(mu_min(v, 1.0), 0.0);
     step = MU_STEP * mu_min(1.0, fabs(y - 1.0) + 0.5 * phi * phi);
-    mu_slopes_beside(data, quantity, v, y, 0.0, 0.0, here);
+    here = mu_slopes_at(data, quantity, v, y);
     mu_bend(data, quantity, v, y, MU_STEP, 0.0, mu_free_side(data, v, y, MU_STEP, 0.0), along_v);
     mu_bend(data, quantity, v, y, 0.0, step, mu_free_side(data, v, y, 0.0, step), along_y);
-    out[0] = given == 0.0 ? 0.0 : (along_v[0] - here[0]) / v / v;
+    out[0] = given == 0.0 ? 0.0 : (along_v[0] - here.along_v) / v / v;
     out[1] = given == 0.0 ? 0.0 : along_v[1] / v / y;
-    out[2] = (along_y[1] - here[1]) / y / y;
+    out[2] = (along_y[1] - here.along_y) / y / y;
 }
 
 static void mu_bends(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *vv,

@@ -5,11 +5,6 @@ typedef struct {
     double mu0, Fz, k, y0, omega, v0;
 } mu_inputs;
 
-typedef struct {
-    double mu, bound, v, y; /* mu~, its bound, groups */
-    int source;
-} mu_case;
-
 /* 0 for a legal case, else 1 + the place of its first bad input.  Where the normal force oscillates y0 stands for its
  * amplitude, which is below Fz: else the contact lifts off. */
 static int mu_first_bad(int direction, const mu_inputs *in) {
@@ -38,16 +33,6 @@ static void mu_groups(int direction, const mu_inputs *in, double *v, double *y) 
         *v = mu_quotient(in->v0, in->k, in->mu0, in->Fz, in->omega);
 }
 
-static mu_case mu_case_of(double mu, double bound, int source, double v, double y) {
-    mu_case out;
-    out.mu = mu;
-    out.bound = bound;
-    out.source = source;
-    out.v = v;
-    out.y = y;
-    return out;
-}
-
 /* mu~ of rigid contact at r = y~/v~: eq. (35), or the mean direction of slip. */
 static double mu_rigid_ratio(int direction, double r) {
     if (direction == MU_ACROSS) return mu_outer_expansion(r).first;
@@ -60,85 +45,101 @@ static double mu_rigid_slope(int direction, double r) {
     return r > 1.0 ? -MU_TWO_OVER_PI / sqrt((r - 1.0) * (r + 1.0)) : 0.0;
 }
 
-/* Any case of any contact: zero inputs, rigid contact, groups beyond double precision. */
-static mu_case mu_any_case(const mumacro_data *data, int contact, int direction, const mu_inputs *in) {
-    double v, y, r, mu;
-    if (mu_first_bad(direction, in)) return mu_case_of(NAN, NAN, -1, NAN, NAN);
-    mu_groups(direction, in, &v, &y);
-    if (in->y0 == 0.0 || in->omega == 0.0) return mu_case_of(1.0, 0.0, MU_NO_OSCILLATION, v, y);
-    if (in->v0 == 0.0 && y == HUGE_VAL) return mu_case_of(0.0, 0.0, MU_STATIC_LIMIT, v, y);
-    if (y == 0.0 && in->v0 > 0.0) return mu_case_of(1.0, MU_ROUNDING, MU_NO_OSCILLATION, v, y);
-    if ((v < HUGE_VAL && y < HUGE_VAL) || direction == MU_NORMAL) {
-        double bound;
-        int8_t source;
-        if (contact == MU_SPRING && direction == MU_ACROSS) mu_chunk_of_ratios(data, 1, &v, &y, &mu, &bound, &source);
-        else {
-            const mu_answer found = mu_answer_as(data, contact, direction, MU_MU_RATIO, v, y);
-            mu = found.value;
-            bound = found.bound;
-            source = (int8_t)found.source;
-        }
+/* mu~ of any case of any contact, and the groups: zero inputs, rigid contact, groups beyond double precision. */
+static mu_answer mu_any_case(const mumacro_data *data, int contact, int direction, const mu_inputs *in, double *v,
+                             double *y) {
+    double r, mu;
+    *v = *y = NAN;
+    if (mu_first_bad(direction, in)) return mu_limit(NAN, NAN, -1);
+    mu_groups(direction, in, v, y);
+    if (in->y0 == 0.0 || in->omega == 0.0) return mu_limit(1.0, 0.0, MU_NO_OSCILLATION);
+    if (in->v0 == 0.0 && *y == HUGE_VAL) return mu_limit(0.0, 0.0, MU_STATIC_LIMIT);
+    if (*y == 0.0 && in->v0 > 0.0) return mu_limit(1.0, MU_ROUNDING, MU_NO_OSCILLATION);
+    if ((*v < HUGE_VAL && *y < HUGE_VAL) || direction == MU_NORMAL) {
+        mu_answer found = mu_answer_as(data, contact, direction, MU_MU_RATIO, *v, *y);
         /* v~ below 5e-324: the static limit holds to rounding, mu~ itself underflows for y~ > 1 */
-        return mu_case_of(mu, bound + (v == 0.0 && in->v0 > 0.0 ? MU_DENORMAL : 0.0), source, v, y);
+        if (*v == 0.0 && in->v0 > 0.0) found.bound += MU_DENORMAL;
+        return found;
     }
     r = mu_amplitude_ratio(in);
-    if (r == 0.0) return mu_case_of(1.0, MU_RIGID_ROUNDING, MU_RIGID, v, y);
-    if (r == HUGE_VAL) return mu_case_of(0.0, 3.0 * MU_DENORMAL, MU_RIGID, v, y); /* eq. (35) is 2.5e-306 there */
+    if (r == 0.0) return mu_limit(1.0, MU_RIGID_ROUNDING, MU_RIGID);
+    if (r == HUGE_VAL) return mu_limit(0.0, 3.0 * MU_DENORMAL, MU_RIGID); /* eq. (35) is 2.5e-306 there */
     mu = mu_rigid_ratio(direction, r);
     /* y~ beyond double range: only the outer solution is left, corrected by the layers when v~ is not large */
-    return mu_case_of(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || v > 1e150 ? 0.0 : mu), MU_RIGID, v, y);
+    return mu_limit(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || *v > 1e150 ? 0.0 : mu), MU_RIGID);
 }
 
-/* d mu_macro / d input and the bounds, 12 numbers stride apart.  One-sided at the edges: d/dy0 = 0 at y0 = 0,
- * d/domega = 0 at omega = 0, d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, infinite on y~ = 1 and for rigid contact.
- * Relative to k the slope is 0 for rigid contact.  slopes: those of mu~, or NULL where they are not known yet. */
-MU_INLINE void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
-                           const mu_case *found, const mu_slopes *known, double *out, int64_t stride) {
-    const double mu0 = in->mu0;
-    double slope[6] = {found->mu, 0.0, 0.0, 0.0, 0.0, 0.0}, error[6] = {found->bound, 0.0, 0.0, 0.0, 0.0, 0.0};
-    if (found->source == -1) {
-        for (int i = 0; i < 6; ++i) slope[i] = error[i] = NAN;
-    } else if (found->source == MU_RIGID) {
-        double along = 0.0;
-        const double rounding = 8.0 * MU_ROUNDING * found->mu;
-        const double all = rounding + (found->bound > rounding ? found->bound : 0.0);
-        if (found->mu < 1.0 || in->y0 * in->omega > 0.0) along = mu_rigid_slope(direction, mu_amplitude_ratio(in));
-        slope[3] = mu0 * along / in->y0;
-        slope[4] = mu0 * along / in->omega;
-        slope[5] = -mu0 * along / in->v0;
-        error[3] = mu0 * all / in->y0;
-        error[4] = mu0 * all / in->omega;
-        error[5] = mu0 * all / in->v0;
-    } else if (found->source == MU_STATIC_LIMIT && found->y == HUGE_VAL) {
-        slope[5] = error[5] = HUGE_VAL;
-    } else if (found->source != MU_NO_OSCILLATION) {
-        const mu_slopes at = known ? *known : mu_slopes_as(data, contact, direction, found->v, found->y);
-        const double both = at.along_v + at.along_y, errors = at.bound_v + at.bound_y;
+/* What the chain rule takes of each case: mu~ and its slopes along ln v~ and ln y~, and the bounds of all three. */
+enum { MU_OF_MU, MU_OF_V, MU_OF_Y, MU_OF_BOUND, MU_OF_BOUND_V, MU_OF_BOUND_Y, MU_KNOWN };
+
+/* sign mu0 slope / input. */
+static void mu_chain_row(int n, double sign, const double *mu0, const double *slope, const double *input,
+                         double *out) {
+    for (int i = 0; i < n; ++i) out[i] = sign * mu0[i] * slope[i] / input[i];
+}
+
+/* d mu_macro / d input of cases without zeros and infinities, and the bounds: 12 rows, stride apart. */
+static void mu_chain_rule(int direction, int n, double in[6][MU_CHUNK], double known[MU_KNOWN][MU_CHUNK], double *out,
+                          int64_t stride) {
+    for (int bounds = 0; bounds < 2; ++bounds, out += 6 * stride) {
+        double(*of)[MU_CHUNK] = known + (bounds ? MU_OF_BOUND : MU_OF_MU), both[MU_CHUNK];
         /* z = Fz_amplitude / Fz has neither mu0 nor k */
-        const double stiff = direction == MU_NORMAL ? at.along_v : both;
-        const double unsure = direction == MU_NORMAL ? at.bound_v : errors;
-        slope[0] = found->mu - stiff;
-        error[0] = (found->source < MU_CHARTS ? mu_min(found->bound, at.bound) : found->bound) + unsure;
-        slope[1] = -mu0 * both / in->Fz;
-        error[1] = mu0 * errors / in->Fz;
-        slope[2] = mu0 * stiff / in->k;
-        error[2] = mu0 * unsure / in->k;
-        slope[3] = mu0 * at.along_y / in->y0;
-        error[3] = mu0 * at.bound_y / in->y0;
-        slope[4] = -mu0 * at.along_v / in->omega;
-        error[4] = mu0 * at.bound_v / in->omega;
-        if (found->v > 0.0) {
-            slope[5] = mu0 * at.along_v / in->v0;
-            error[5] = mu0 * at.bound_v / in->v0;
-        } else {
-            const double unit = (in->k / in->Fz) / in->omega;
-            slope[5] = mu_speed_slope_as(data, contact, direction, found->y, &error[5]) * unit;
-            error[5] *= unit;
-        }
+        const double *stiff = direction == MU_NORMAL ? of[MU_OF_V] : both, sign = bounds ? 1.0 : -1.0;
+        for (int i = 0; i < n; ++i) both[i] = of[MU_OF_V][i] + of[MU_OF_Y][i];
+        for (int i = 0; i < n; ++i) out[i] = of[MU_OF_MU][i] + sign * stiff[i];
+        mu_chain_row(n, sign, in[0], both, in[1], out + stride);
+        mu_chain_row(n, 1.0, in[0], stiff, in[2], out + 2 * stride);
+        mu_chain_row(n, 1.0, in[0], of[MU_OF_Y], in[3], out + 3 * stride);
+        mu_chain_row(n, sign, in[0], of[MU_OF_V], in[4], out + 4 * stride);
+        mu_chain_row(n, 1.0, in[0], of[MU_OF_V], in[5], out + 5 * stride);
     }
-    for (int i = 0; i < 6; ++i) {
-        out[i * stride] = slope[i];
-        out[(6 + i) * stride] = error[i];
+}
+
+static void mu_know(mu_answer found, mu_slopes at, double known[MU_KNOWN][MU_CHUNK], int i) {
+    known[MU_OF_MU][i] = found.value;
+    known[MU_OF_V][i] = at.along_v;
+    known[MU_OF_Y][i] = at.along_y;
+    known[MU_OF_BOUND][i] = found.source < MU_CHARTS ? mu_min(found.bound, at.bound) : found.bound;
+    known[MU_OF_BOUND_V][i] = at.bound_v;
+    known[MU_OF_BOUND_Y][i] = at.bound_y;
+}
+
+/* The same of any case.  One-sided at the edges: d/dy0 = 0 at y0 = 0, d/domega = 0 at omega = 0,
+ * d/dv0 = mu0/(l0 omega) dmu~/dv~ at v0 = 0, infinite on y~ = 1 and for rigid contact.  Relative to k the slope is 0 for
+ * rigid contact. */
+static void mu_gradient(const mumacro_data *data, int contact, int direction, const mu_inputs *in,
+                        mu_answer found, double v, double y, double *out, int64_t stride) {
+    const double mu0 = in->mu0, six[6] = {in->mu0, in->Fz, in->k, in->y0, in->omega, in->v0};
+    double *error = out + 6 * stride;
+    if (found.source != -1 && found.source != MU_RIGID && found.source != MU_NO_OSCILLATION &&
+        !(found.source == MU_STATIC_LIMIT && y == HUGE_VAL)) {
+        const mu_slopes at = mu_slopes_as(data, contact, direction, v, y);
+        double inputs[6][MU_CHUNK], known[MU_KNOWN][MU_CHUNK];
+        for (int i = 0; i < 6; ++i) inputs[i][0] = six[i];
+        mu_know(found, at, known, 0);
+        mu_chain_rule(direction, 1, inputs, known, out, stride);
+        if (!(v > 0.0)) {
+            const double unit = (in->k / in->Fz) / in->omega;
+            double bound;
+            out[5 * stride] = mu_speed_slope_as(data, contact, direction, y, &bound) * unit;
+            error[5 * stride] = bound * unit;
+        }
+        return;
+    }
+    for (int i = 0; i < 12; ++i) out[i * stride] = found.source == -1 ? NAN : 0.0;
+    if (found.source == -1) return;
+    out[0] = found.value;
+    error[0] = found.bound;
+    if (found.source == MU_STATIC_LIMIT) out[5 * stride] = error[5 * stride] = HUGE_VAL;
+    if (found.source == MU_RIGID) {
+        const double rounding = 8.0 * MU_ROUNDING * found.value;
+        const double all = rounding + (found.bound > rounding ? found.bound : 0.0);
+        const int oscillates = found.value < 1.0 || in->y0 * in->omega > 0.0;
+        const double along = oscillates ? mu_rigid_slope(direction, mu_amplitude_ratio(in)) : 0.0;
+        for (int i = 3; i < 6; ++i) {
+            out[i * stride] = (i < 5 ? mu0 : -mu0) * along / six[i];
+            error[i * stride] = mu0 * all / six[i];
+        }
     }
 }
 
@@ -172,45 +173,30 @@ static void mu_chunk_of_cases(const mumacro_data *data, int n, double in[6][MU_C
                               int64_t stride, int8_t *source) {
     double v[MU_CHUNK], y[MU_CHUNK], *mu = out + MU_ROW_RATIO * stride, *bound = out + MU_ROW_BOUND * stride;
     double *slopes = rows == MU_ROWS ? out + MU_ROW_SLOPES * stride : NULL;
-    const double *errors = data->quantities[MU_MU_RATIO].errors;
     mu_chunk c;
+    mu_slope slope[MU_CHUNK];
     int left;
     mu_pass_groups(n, in, v, y);
-    mu_pass_borders(data, n, v, y, &c);
-    left = mu_pass_places(n, &c);
-    if (slopes) { /* before the values, which turn coordinates into those of cells */
+    left = mu_chunk_of_ratios(data, n, v, y, &c, slopes ? slope : NULL, mu, bound, source);
+    if (slopes) {
+        double known[MU_KNOWN][MU_CHUNK];
+        const mu_slopes none = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
         for (int i = 0; i < n; ++i) {
-            const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
-            if (!mu_is_left(c.block[i])) {
-                const mu_slopes at = mu_slopes_of(data, MU_MU_RATIO, &c, i, v[i], y[i]);
-                const double *error = errors + 2 * c.block[i];
-                const mu_case found = mu_case_of(at.value, fabs(c.factor[i]) * error[0] + error[1],
-                                                 (int)c.block[i], v[i], y[i]);
-                mu_gradient(data, MU_SPRING, MU_ACROSS, &six, &found, &at, slopes + i, stride);
-            }
+            const int later = mu_is_left(c.block[i]);
+            const mu_slopes at = later ? none : mu_slopes_of(data, MU_MU_RATIO, &c, slope, i, v[i], y[i]);
+            mu_know(mu_limit(at.value, bound[i], source[i]), at, known, i);
         }
-    }
-    mu_pass_values(data, n, &c, mu);
-    for (int i = 0; i < n; ++i) {
-        const double *error = errors + 2 * c.block[i];
-        bound[i] = fabs(c.factor[i]) * error[0] + error[1];
-        source[i] = (int8_t)c.block[i];
+        mu_chain_rule(MU_ACROSS, n, in, known, slopes, stride);
     }
     for (int i = 0; left && i < n; ++i) {
         const mu_inputs six = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i]};
-        mu_case found;
+        mu_answer found = {mu[i], bound[i], source[i]};
         if (!mu_is_left(c.block[i])) continue;
-        if (v[i] == -1.0) found = mu_any_case(data, MU_SPRING, MU_ACROSS, &six);
-        else {
-            const mu_answer at = mu_answer_left(data, MU_MU_RATIO, &c, i, v[i], y[i]);
-            found = mu_case_of(at.value, at.bound, at.source, v[i], y[i]);
-        }
-        mu[i] = found.mu;
+        if (v[i] == -1.0) found = mu_any_case(data, MU_SPRING, MU_ACROSS, &six, v + i, y + i);
+        mu[i] = found.value;
         bound[i] = found.bound;
         source[i] = (int8_t)found.source;
-        v[i] = found.v;
-        y[i] = found.y;
-        if (slopes) mu_gradient(data, MU_SPRING, MU_ACROSS, &six, &found, NULL, slopes + i, stride);
+        if (slopes) mu_gradient(data, MU_SPRING, MU_ACROSS, &six, found, v[i], y[i], slopes + i, stride);
     }
     for (int i = 0; i < n; ++i) {
         out[i] = mu[i] * in[0][i];
@@ -239,23 +225,27 @@ static void mu_cases(const mumacro_data *data, int64_t n, const double *const *c
 /* As mu_cases, of any contact and direction; where the normal force oscillates, y0's column holds its amplitude. */
 static void mu_cases_as(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
                         const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source) {
+    if (contact == MU_SPRING && direction == MU_ACROSS) {
+        mu_cases(data, n, columns, strides, rows, out, stride, source);
+        return;
+    }
     for (int64_t i = 0; i < n; ++i) {
-        double in[6];
+        double in[6], v, y;
         mu_inputs six;
-        mu_case found;
+        mu_answer found;
         for (int j = 0; j < 6; ++j) in[j] = columns[j][strides[j] ? i : 0];
         memcpy(&six, in, sizeof six);
-        found = mu_any_case(data, contact, direction, &six);
-        out[MU_ROW_MACRO * stride + i] = found.mu * six.mu0;
-        out[MU_ROW_RATIO * stride + i] = found.mu;
+        found = mu_any_case(data, contact, direction, &six, &v, &y);
+        out[MU_ROW_MACRO * stride + i] = found.value * six.mu0;
+        out[MU_ROW_RATIO * stride + i] = found.value;
         out[MU_ROW_BOUND * stride + i] = found.bound * six.mu0;
         source[i] = (int8_t)found.source;
         if (rows > MU_ROW_V) {
-            out[MU_ROW_V * stride + i] = found.v;
-            out[MU_ROW_Y * stride + i] = found.y;
+            out[MU_ROW_V * stride + i] = v;
+            out[MU_ROW_Y * stride + i] = y;
         }
         if (rows == MU_ROWS)
-            mu_gradient(data, contact, direction, &six, &found, NULL, out + MU_ROW_SLOPES * stride + i, stride);
+            mu_gradient(data, contact, direction, &six, found, v, y, out + MU_ROW_SLOPES * stride + i, stride);
     }
 }
 

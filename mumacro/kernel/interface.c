@@ -7,26 +7,22 @@ static int mu_is_held(int quantity) {
     return quantity >= 0 && quantity < MU_QUANTITIES && MU_TABLE->quantities[quantity].cells > 0;
 }
 
-/* Value of a quantity at a point, and its bound; NaN where the table does not hold it. */
+/* Value of a quantity at a point, and its bound, where wanted; NaN where the table does not hold it. */
 static double mu_held_value(int quantity, double v, double y, double *bound) {
     double value = NAN;
-    *bound = NAN;
+    if (bound) *bound = NAN;
     if (mu_is_held(quantity)) mu_values(MU_TABLE, quantity, 1, &v, &y, &value, bound, NULL);
     return value;
 }
 
-/* An answer from its rows; the bad input, or 0. */
-static int mu_fill(const double *rows, int source, int bad, mumacro_answer *out) {
-    out->mu_macro = rows[MU_ROW_MACRO];
-    out->mu_ratio = rows[MU_ROW_RATIO];
-    out->error_bound = rows[MU_ROW_BOUND];
-    out->v_tilde = rows[MU_ROW_V];
-    out->y_tilde = rows[MU_ROW_Y];
+/* An answer from its rows; what is returned. */
+static int mu_fill(const double *rows, int source, int returned, mumacro_answer *out) {
+    memcpy(out, rows, MU_ROW_SLOPES * sizeof *rows); /* the first members are these rows */
     out->source = source;
     out->regime = source < 0 ? -1 : MU_REGIME_OF_SOURCE[source];
     memcpy(out->gradient, rows + MU_ROW_SLOPES, sizeof out->gradient);
     memcpy(out->gradient_bound, rows + MU_ROW_SLOPES + 6, sizeof out->gradient_bound);
-    return bad;
+    return returned;
 }
 
 MUMACRO_API int mumacro_evaluate(double mu0, double Fz, double k, double y0, double omega, double v0,
@@ -47,9 +43,7 @@ MUMACRO_API int mumacro_evaluate_as(int contact, int direction, double mu0, doub
     if (contact < 0 || contact >= MU_CONTACTS || direction < 0 || direction >= MU_DIRECTIONS)
         return mu_fill(rows, -1, MUMACRO_NO_CONTACT, out);
     if (contact == MU_BALL && direction == MU_NORMAL) return mu_fill(rows, -1, MUMACRO_NO_NORMAL_BALL, out);
-    if (contact == MU_SPRING && direction == MU_ACROSS)
-        mu_cases(MU_TABLE, 1, columns, strides, MU_ROWS, rows, 1, &source);
-    else mu_cases_as(MU_TABLE, contact, direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
+    mu_cases_as(MU_TABLE, contact, direction, 1, columns, strides, MU_ROWS, rows, 1, &source);
     bad = mu_first_bad(direction, &in);
     return mu_fill(rows, source, bad == 4 && direction == MU_NORMAL ? MUMACRO_LIFT_OFF : bad, out);
 }
@@ -137,13 +131,11 @@ MUMACRO_API double mumacro_mu_ratio(double v_tilde, double y_tilde) {
 }
 
 MUMACRO_API double mumacro_power(double v_tilde, double y_tilde) {
-    double bound;
-    return mu_held_value(MU_POWER, v_tilde, y_tilde, &bound);
+    return mu_held_value(MU_POWER, v_tilde, y_tilde, NULL);
 }
 
 MUMACRO_API double mumacro_stick_fraction(double v_tilde, double y_tilde) {
-    double bound;
-    return mu_held_value(MU_STICK, v_tilde, y_tilde, &bound);
+    return mu_held_value(MU_STICK, v_tilde, y_tilde, NULL);
 }
 
 MUMACRO_API double mumacro_v_tilde_crit(double y_tilde) { return mu_border_at(MU_TABLE, y_tilde); }

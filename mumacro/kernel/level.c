@@ -5,6 +5,10 @@
 
 static void mu_values_as(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
                          const double *y, double *value, double *bound, int8_t *source) {
+    if (contact == MU_SPRING && direction == MU_ACROSS) {
+        mu_values(data, quantity, n, v, y, value, bound, source);
+        return;
+    }
     for (int64_t i = 0; i < n; ++i) {
         const mu_answer found = mu_answer_as(data, contact, direction, quantity, v[i], y[i]);
         value[i] = found.value;
@@ -88,7 +92,7 @@ static const mumacro_atlas MU_ATLAS = {
 
 extern const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL);
 const mumacro_kernel MU_SYMBOL(MUMACRO_LEVEL) = {
-    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values, mu_slopes_of_points, mu_cases, mu_ratio_alone, mu_one,
-    mu_partials, mu_bends, mu_cases_as, mu_values_as, mu_borders_as, mu_places_of, mu_forms, mu_border_scales,
-    mu_cell_shares, mu_roots, mu_outers, mu_element_steps,
+    MU_NAME(MUMACRO_LEVEL), &MU_ATLAS, mu_about, mu_values_as, mu_slopes_of_points, mu_cases_as, mu_ratio_alone,
+    mu_one, mu_partials, mu_bends, mu_borders_as, mu_places_of, mu_forms, mu_border_scales, mu_cell_shares, mu_roots,
+    mu_outers, mu_element_steps,
 };

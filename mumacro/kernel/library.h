@@ -24,17 +24,19 @@ typedef struct {
     const char *level;
     const mumacro_atlas *atlas;
     const mumacro_quantity *(*quantity)(int code);
-    /* a quantity: value, bound of its error and source; bound and source may be NULL */
-    void (*values)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *value,
-                   double *bound, int8_t *source);
+    /* a quantity: value, bound of its error and source.  contact 1 is a ball, which needs rules; direction 1 is along,
+     * 2 normal, with Fz_amplitude / Fz for y~.  bound and source may be NULL where both are 0 */
+    void (*values)(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
+                   const double *y, double *value, double *bound, int8_t *source);
     /* value, v~ d/d v~, y~ d/d y~, bounds of both slopes: 5 rows of out, stride apart */
     void (*slopes)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *out,
                    int64_t stride);
-    /* dimensional cases: columns mu0, Fz, k, y0, omega, v0, each with a stride of 1, or 0 for one value.  Rows of out,
-     * stride apart: mu_macro, mu_ratio, bound of mu_macro; of 5 also v~, y~; of 17 also d mu_macro / d input, bounds */
-    void (*cases)(const mumacro_data *data, int64_t n, const double *const *columns, const int64_t *strides, int rows,
-                  double *out, int64_t stride, int8_t *source);
-    /* the same alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~,
+    /* dimensional cases: columns mu0, Fz, k, y0 (normal: Fz_amplitude), omega, v0, each with a stride of 1, or 0 for one
+     * value.  Rows of out, stride apart: mu_macro, mu_ratio, bound of mu_macro; of 5 also v~, y~; of 17 also
+     * d mu_macro / d input, bounds */
+    void (*cases)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
+                  const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source);
+    /* of a spring, across, alone, in a fraction of the time: mu~; and one case, whose 7 numbers are mu_macro, mu_ratio, bound, v~,
      * y~, l0 = mu0 Fz / k, source; of 19 also the slopes and their bounds */
     double (*ratio)(const mumacro_data *data, double v, double y);
     void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
@@ -44,12 +46,6 @@ typedef struct {
                      double *along_v, double *along_y);
     void (*bends)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *vv,
                   double *vy, double *yy);
-    /* as cases and values, for contact 1 (ball) and direction 1 (along) or 2 (normal: Fz_amplitude in y0's column, and
-     * Fz_amplitude / Fz for y~); a ball needs rules */
-    void (*cases_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *const *columns,
-                     const int64_t *strides, int rows, double *out, int64_t stride, int8_t *source);
-    void (*values_as)(const mumacro_data *data, int contact, int direction, int quantity, int64_t n, const double *v,
-                      const double *y, double *value, double *bound, int8_t *source);
     /* v~crit(y~) of a contact and direction: 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *y, double *crit);
     /* blocks of points with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them, which tail_fast

@@ -12,6 +12,7 @@ typedef struct {
     double v[MU_CHUNK], y[MU_CHUNK]; /* 1 where a point is not common */
     double crit[MU_CHUNK], ln_y[MU_CHUNK], a[MU_CHUNK], b[MU_CHUNK], base[MU_CHUNK], factor[MU_CHUNK];
     double local[MU_CHUNK]; /* coordinate in the border's cell */
+    double u[MU_CHUNK], w[MU_CHUNK]; /* coordinates in the cell */
     int64_t block[MU_CHUNK];
     int32_t border[MU_CHUNK + MU_LANES], cell[MU_CHUNK];
 } mu_chunk;
@@ -114,14 +115,15 @@ MU_INLINE mu_lanes mu_wholes_of(mu_lanes x) {
     return MU_AS(mu_lanes, MU_AS(mu_whole, mu_select(MU_WHERE(x < 1e9), x, mu_all(1e9))));
 }
 
-/* mu_find for points of the chunk in whole lanes; returns how many points that are. */
-MU_INLINE int mu_pass_cells(const double *blocks, int64_t cells, int n, mu_chunk *c) {
+/* Cells of mu~: mu_find, several points at once.  A point without a cell gets one that means nothing. */
+MU_INLINE void mu_pass_cells(const mumacro_data *data, int n, mu_chunk *c) {
+    const int64_t cells = data->quantities[MU_MU_RATIO].cells;
     const mu_lanes last = mu_all((double)(cells - 1)), zero = mu_all(0.0);
     mu_column column[MU_STEP_B + 1];
     int done = 0;
-    if (n < 2 * MU_LANES) return 0; /* too few for the columns to be fetched */
-    for (int i = 0; i <= MU_STEP_B; ++i) column[i] = mu_column_of(blocks, i);
-    for (; done + MU_LANES <= n; done += MU_LANES) {
+    const int together = n < 2 * MU_LANES ? 0 : n - n % MU_LANES; /* not for few: the columns have to be fetched */
+    for (int i = 0; together && i <= MU_STEP_B; ++i) column[i] = mu_column_of(data->blocks, i);
+    for (; done < together; done += MU_LANES) {
         const mu_lanes a = mu_load(c->a + done), b = mu_load(c->b + done);
         mu_mask block;
         mu_lanes x, z, i, j, cell;
@@ -135,22 +137,29 @@ MU_INLINE int mu_pass_cells(const double *blocks, int64_t cells, int n, mu_chunk
         cell = mu_select(MU_WHERE(cell > 0.0), cell, zero);
         index = MU_AS(mu_whole, mu_select(MU_WHERE(cell < last), cell, last));
         memcpy(c->cell + done, &index, sizeof index);
-        mu_store(c->a + done, 2.0 * (x - i) - 1.0);
-        mu_store(c->b + done, 2.0 * (z - j) - 1.0);
+        mu_store(c->u + done, 2.0 * (x - i) - 1.0);
+        mu_store(c->w + done, 2.0 * (z - j) - 1.0);
     }
-    return done;
+    for (; done < n; ++done) {
+        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[done]), 0, cells, c->a[done], c->b[done]);
+        c->cell[done] = (int32_t)spot.cell;
+        c->u[done] = spot.u;
+        c->w[done] = spot.w;
+    }
 }
-/* Cells and values of mu~.  A point without a cell reads one that means nothing. */
-MU_INLINE void mu_pass_values(const mumacro_data *data, int n, mu_chunk *c, double *value) {
-    const mumacro_cells *cells = &data->quantities[MU_MU_RATIO];
-    for (int i = mu_pass_cells(data->blocks, cells->cells, n, c); i < n; ++i) {
-        const mu_spot spot = mu_find(mu_block_of(data, (int)c->block[i]), 0, cells->cells, c->a[i], c->b[i]);
-        c->cell[i] = (int32_t)spot.cell;
-        c->a[i] = spot.u;
-        c->b[i] = spot.w;
-    }
+
+/* q and its derivatives in the cells: apart from what is made of them, so that the sums of several points overlap. */
+MU_INLINE void mu_pass_slopes(const mumacro_data *data, int n, const mu_chunk *c, mu_slope *slope) {
+    const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
+    for (int i = 0; i < n; ++i) slope[i] = mu_cell_slopes(polynomials + 64 * (int64_t)c->cell[i], c->u[i], c->w[i]);
+}
+
+/* mu~, from q in its cells or from slopes that are known already. */
+MU_INLINE void mu_pass_values(const mumacro_data *data, int n, const mu_chunk *c, const mu_slope *known, double *value) {
+    const double *polynomials = data->quantities[MU_MU_RATIO].polynomials;
     for (int i = 0; i < n; ++i) {
-        const double q = mu_cell_value(cells->polynomials + 64 * (int64_t)c->cell[i], c->a[i], c->b[i]);
+        const double *cell = polynomials + 64 * (int64_t)c->cell[i];
+        const double q = known ? known[i].value : mu_cell_value(cell, c->u[i], c->w[i]);
         value[i] = mu_fma1(c->factor[i], q, c->base[i]);
     }
     for (int i = 0; i < n; ++i) value[i] = mu_min(mu_max(value[i], 0.0), 1.0);
@@ -175,44 +184,42 @@ static mu_answer mu_answer_left(const mumacro_data *data, int quantity, const mu
     return c->block[i] == MU_FAST ? MU_QUANTITY[quantity].fast(data, v, y) : mu_answer_at(data, quantity, v, y);
 }
 
-/* mu~ at up to MU_CHUNK points. */
-static void mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, double *value,
-                               double *bound, int8_t *source) {
+/* mu~ at up to MU_CHUNK points, and where slope is not NULL, q and its derivatives; returns as mu_pass_places. */
+MU_INLINE int mu_chunk_of_ratios(const mumacro_data *data, int n, const double *v, const double *y, mu_chunk *c,
+                                 mu_slope *slope, double *value, double *bound, int8_t *source) {
     const double *errors = data->quantities[MU_MU_RATIO].errors;
-    mu_chunk c;
     int left;
-    mu_pass_borders(data, n, v, y, &c);
-    left = mu_pass_places(n, &c);
-    mu_pass_values(data, n, &c, value);
-    if (bound)
-        for (int i = 0; i < n; ++i) {
-            const double *error = errors + 2 * c.block[i];
-            bound[i] = fabs(c.factor[i]) * error[0] + error[1];
-        }
-    if (source)
-        for (int i = 0; i < n; ++i) source[i] = (int8_t)c.block[i];
-    if (!left) return;
-    for (int i = 0; i < n; ++i) {
-        if (mu_is_left(c.block[i])) {
-            const mu_answer found = mu_answer_left(data, MU_MU_RATIO, &c, i, v[i], y[i]);
+    mu_pass_borders(data, n, v, y, c);
+    left = mu_pass_places(n, c);
+    mu_pass_cells(data, n, c);
+    if (slope) mu_pass_slopes(data, n, c, slope);
+    mu_pass_values(data, n, c, slope, value);
+    for (int i = 0; bound && i < n; ++i) {
+        const double *error = errors + 2 * c->block[i];
+        bound[i] = fabs(c->factor[i]) * error[0] + error[1];
+    }
+    for (int i = 0; source && i < n; ++i) source[i] = (int8_t)c->block[i];
+    for (int i = 0; left && i < n; ++i) {
+        if (mu_is_left(c->block[i])) {
+            const mu_answer found = mu_answer_left(data, MU_MU_RATIO, c, i, v[i], y[i]);
             value[i] = found.value;
             if (bound) bound[i] = found.bound;
             if (source) source[i] = (int8_t)found.source;
         }
     }
+    return left;
 }
 
 /* Another quantity at up to MU_CHUNK points. */
 static void mu_chunk_of_others(const mumacro_data *data, int quantity, int n, const double *v, const double *y,
-                               double *value, double *bound, int8_t *source) {
-    mu_chunk c;
-    mu_pass_borders(data, n, v, y, &c);
-    mu_pass_places(n, &c);
+                               mu_chunk *c, double *value, double *bound, int8_t *source) {
+    mu_pass_borders(data, n, v, y, c);
+    mu_pass_places(n, c);
     for (int i = 0; i < n; ++i) {
         mu_answer found;
-        if (mu_is_left(c.block[i])) found = mu_answer_left(data, quantity, &c, i, v[i], y[i]);
+        if (mu_is_left(c->block[i])) found = mu_answer_left(data, quantity, c, i, v[i], y[i]);
         else {
-            const mu_place at = mu_place_of(data, &c, i, 0);
+            const mu_place at = mu_place_of(data, c, i, 0);
             found = mu_in_block(data, quantity, &at);
         }
         value[i] = found.value;
@@ -227,25 +234,29 @@ static void mu_values(const mumacro_data *data, int quantity, int64_t n, const d
         const int few = mu_few(n - i);
         double *error = bound ? bound + i : NULL;
         int8_t *from = source ? source + i : NULL;
-        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, value + i, error, from);
-        else mu_chunk_of_others(data, quantity, few, v + i, y + i, value + i, error, from);
+        mu_chunk c;
+        if (quantity == MU_MU_RATIO) mu_chunk_of_ratios(data, few, v + i, y + i, &c, NULL, value + i, error, from);
+        else mu_chunk_of_others(data, quantity, few, v + i, y + i, &c, value + i, error, from);
     }
 }
 
 static double mu_ratio_alone(const mumacro_data *data, double v, double y) {
     double mu;
-    mu_chunk_of_ratios(data, 1, &v, &y, &mu, NULL, NULL);
+    mu_values(data, MU_MU_RATIO, 1, &v, &y, &mu, NULL, NULL);
     return mu;
 }
 
-/* Slopes at up to MU_CHUNK points that are handed on one by one to what wants them. */
-MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const mu_chunk *c, int i, double v, double y) {
+/* Slopes at a point of the chunk; slope: of mu_pass_slopes, which counts for mu~ only. */
+MU_INLINE mu_slopes mu_slopes_of(const mumacro_data *data, int quantity, const mu_chunk *c, const mu_slope *slope, int i,
+                                 double v, double y) {
     const mu_form form = MU_QUANTITY[quantity].forms[c->block[i] < MU_CHARTS ? c->block[i] : 0];
     if (c->block[i] < MU_CHARTS && form.factor != MU_NOTHING) {
         const mu_place at = mu_place_of(data, c, i, 1);
-        if (quantity == MU_MU_RATIO && at.block != MU_CORNER)
-            return mu_slopes_in_block(data, quantity, &at, c->base[i], c->factor[i]);
-        return mu_slopes_in_block(data, quantity, &at, mu_base(form.base, &at), mu_factor(form.factor, &at));
+        if (quantity == MU_MU_RATIO && at.block != MU_CORNER) {
+            const mu_spot spot = {c->cell[i], c->u[i], c->w[i]};
+            return mu_slopes_in_block(data, quantity, &at, spot, slope[i], c->base[i], c->factor[i]);
+        }
+        return mu_slopes_at_place(data, quantity, &at);
     }
     return mu_slopes_at(data, quantity, v, y);
 }
@@ -255,10 +266,15 @@ static void mu_slopes_of_points(const mumacro_data *data, int quantity, int64_t 
     for (int64_t i = 0; i < n; i += MU_CHUNK) {
         const int few = mu_few(n - i);
         mu_chunk c;
+        mu_slope slope[MU_CHUNK];
         mu_pass_borders(data, few, v + i, y + i, &c);
         mu_pass_places(few, &c);
+        if (quantity == MU_MU_RATIO) {
+            mu_pass_cells(data, few, &c);
+            mu_pass_slopes(data, few, &c, slope);
+        }
         for (int j = 0; j < few; ++j) {
-            const mu_slopes found = mu_slopes_of(data, quantity, &c, j, v[i + j], y[i + j]);
+            const mu_slopes found = mu_slopes_of(data, quantity, &c, slope, j, v[i + j], y[i + j]);
             out[i + j] = found.value;
             out[stride + i + j] = found.along_v;
             out[2 * stride + i + j] = found.along_y;

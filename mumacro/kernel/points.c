@@ -51,17 +51,15 @@ MU_INLINE double mu_slope_error(const double *errors, double of_factor, double o
     return errors[0] * fabs(of_factor) + errors[1] * fabs(of_a) + errors[2] * fabs(of_b);
 }
 
-/* The slopes in a block, from the place and from base and factor there. */
-MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at, double base,
-                                       double factor) {
+/* The slopes in a block, from the place, its spot in a cell, q there, and base and factor. */
+MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, const mu_place *at, mu_spot spot,
+                                       mu_slope slope, double base, double factor) {
     const mu_quantity *about = &MU_QUANTITY[quantity];
     const mumacro_cells *cells = &data->quantities[quantity];
     const double *block = mu_block_of(data, at->block);
     const mu_turn turn = mu_turn_of(at);
     const mu_form_slopes form = mu_slopes_of_form(about->forms[at->block], at, &turn);
-    const mu_spot spot = mu_find(block, cells->first, cells->cells, at->a, at->b);
     const double *cell = cells->polynomials + 64 * spot.cell, *errors = cells->slope_errors + 3 * spot.cell;
-    const mu_slope slope = mu_cell_slopes(cell, spot.u, spot.w);
     const double scale = fabs(factor), q_a = slope.q_a * 2.0 * block[MU_STEP_A];
     const double q_b = slope.q_b * 2.0 * block[MU_STEP_B];
     double reach = fabs(turn.b_v), ratio, noise;
@@ -109,6 +107,15 @@ MU_INLINE mu_slopes mu_slopes_in_block(const mumacro_data *data, int quantity, c
     return out;
 }
 
+/* The same from the place alone. */
+static mu_slopes mu_slopes_at_place(const mumacro_data *data, int quantity, const mu_place *at) {
+    const mumacro_cells *cells = &data->quantities[quantity];
+    const mu_form form = MU_QUANTITY[quantity].forms[at->block];
+    const mu_spot spot = mu_find(mu_block_of(data, at->block), cells->first, cells->cells, at->a, at->b);
+    const mu_slope slope = mu_cell_slopes(cells->polynomials + 64 * spot.cell, spot.u, spot.w);
+    return mu_slopes_in_block(data, quantity, at, spot, slope, mu_base(form.base, at), mu_factor(form.factor, at));
+}
+
 /* The slopes where the record knows the value in closed form, at the ends of v~ and y~. */
 static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
@@ -130,7 +137,6 @@ static mu_slopes mu_limit_slopes(int quantity, double y, mu_answer known) {
 static mu_slopes mu_slopes_at(const mumacro_data *data, int quantity, double v, double y) {
     const mu_quantity *about = &MU_QUANTITY[quantity];
     mu_slopes out = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    mu_form form;
     mu_place at;
     if (!(0.0 < v && v < HUGE_VAL && 0.0 < y && y < HUGE_VAL)) {
         const mu_answer known = about->limit(v, y);
@@ -138,13 +144,12 @@ static mu_slopes mu_slopes_at(const mumacro_data *data, int quantity, double v, 
     }
     at = mu_locate(data, v == 0.0 ? MU_CREEP : v, y);
     if (at.block == MU_FAST) return about->fast_slopes(data, v, y);
-    form = about->forms[at.block];
-    if (form.factor == MU_NOTHING) {
+    if (about->forms[at.block].factor == MU_NOTHING) {
         if (!about->about.smooth_at_border && at.v <= at.crit * (1.0 + mu_border_error(data)))
             out.bound_v = out.bound_y = HUGE_VAL;
         return out;
     }
-    out = mu_slopes_in_block(data, quantity, &at, mu_base(form.base, &at), mu_factor(form.factor, &at));
+    out = mu_slopes_at_place(data, quantity, &at);
     if (v == 0.0) out.along_v = 0.0;
     return out;
 }

@@ -145,42 +145,38 @@ static void mu_base_slopes(int base, const mu_place *at, mu_form_slopes *out) {
 
 MU_INLINE mu_form_slopes mu_slopes_of_form(mu_form form, const mu_place *at, const mu_turn *turn) {
     static const signed char powers[][2] = {
-        /* twice the powers of v~ and y~, of factors that are products of powers, in their order */
-        {0, 0}, {0, 0}, {0, 2}, {2, 4}, {2, -2}, {4, -2}, {0, -1}, {0, 4},
+        /* twice the powers of v~ and y~ in each factor, in their order */
+        {0, 0}, {0, 0}, {0, 2}, {2, 4}, {2, -2}, {4, -2}, {0, -1}, {0, 4}, {0, 4}, {0, 0}, {2, 4}, {0, 2}, {0, 0}, {2, 0},
     };
-    mu_form_slopes out = {0.0, 0.0, 0.0, 0.0};
+    const signed char *power = powers[(int)form.factor];
+    mu_form_slopes out = {0.0, 0.0, 0.5 * power[0], 0.5 * power[1]};
     double share;
     if (form.base > MU_ONE) mu_base_slopes(form.base, at, &out);
     switch (form.factor) {
     case MU_SLIP_DEFICIT:
-        out.factor_v = -2.0 * mu_speed_share(at->v);
-        out.factor_y = 2.0;
+    case MU_SLIP_POWER:
+        out.factor_v -= 2.0 * mu_speed_share(at->v);
         break;
     case MU_COSINE:
         share = 1.0 / (1.0 + (at->v / at->y) * (at->v / at->y));
-        out.factor_v = share;
-        out.factor_y = -share;
-        break;
-    case MU_SLIP_POWER:
-        out.factor_v = 1.0 - 2.0 * mu_speed_share(at->v);
-        out.factor_y = 2.0;
+        out.factor_v += share;
+        out.factor_y -= share;
         break;
     case MU_SWEPT_POWER:
         share = at->v * at->v * (1.0 / mu_fma1(at->v, at->v, at->y * at->y));
-        out.factor_v = -share;
-        out.factor_y = 1.0 + share;
+        out.factor_v -= share;
+        out.factor_y += share;
         break;
     case MU_PHI:
-        out.factor_v = turn->phi_v;
-        out.factor_y = turn->phi_y;
+        out.factor_v += turn->phi_v;
+        out.factor_y += turn->phi_y;
         break;
     case MU_V_OVER_PHI:
-        out.factor_v = 1.0 - turn->phi_v;
-        out.factor_y = -turn->phi_y;
+        out.factor_v -= turn->phi_v;
+        out.factor_y -= turn->phi_y;
         break;
     default:
-        out.factor_v = 0.5 * powers[(int)form.factor][0];
-        out.factor_y = 0.5 * powers[(int)form.factor][1];
+        break;
     }
     return out;
 }

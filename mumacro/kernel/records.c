@@ -2,24 +2,16 @@
 
 /* --- limits at v~ = 0, y~ = 0 or infinity ----------------------------------------------------------- */
 
-/* What all quantities share: illegal points, y~ = 0 and v~ = infinity; MU_OTHER elsewhere. */
-static mu_answer mu_common_limit(double v, double y, double without_oscillation) {
-    mu_answer out = {NAN, NAN, MU_OTHER};
-    if (!(v >= 0.0 && y >= 0.0)) out.source = -1;
-    else if (y == 0.0 || v == HUGE_VAL) {
-        out.value = without_oscillation;
-        out.bound = 0.0;
-        out.source = y == 0.0 ? MU_NO_OSCILLATION : MU_FAST;
-    }
+static mu_answer mu_limit(double value, double bound, int source) {
+    const mu_answer out = {value, bound, source};
     return out;
 }
 
-static mu_answer mu_limit(double value, double bound, int source) {
-    mu_answer out;
-    out.value = value;
-    out.bound = bound;
-    out.source = source;
-    return out;
+/* What all quantities share: illegal points, y~ = 0 and v~ = infinity; MU_OTHER elsewhere. */
+static mu_answer mu_common_limit(double v, double y, double without_oscillation) {
+    if (!(v >= 0.0 && y >= 0.0)) return mu_limit(NAN, NAN, -1);
+    if (y == 0.0) return mu_limit(without_oscillation, 0.0, MU_NO_OSCILLATION);
+    return v == HUGE_VAL ? mu_limit(without_oscillation, 0.0, MU_FAST) : mu_limit(NAN, NAN, MU_OTHER);
 }
 
 /* The static limit, eq. (16).  The last digit of y~ = y0 k/(mu0 Fz) counts next to y~ = 1, where
@@ -56,9 +48,8 @@ static mu_answer mu_stick_limit(double v, double y) {
 /* --- large speed ------------------------------------------------------------------------------------ */
 
 static mu_answer mu_ratio_fast(const mumacro_data *data, double v, double y) {
-    mu_answer out;
+    mu_answer out = {0.0, 0.0, MU_FAST};
     out.value = mu_fast_ratio(data->outer, v, y, &out.bound);
-    out.source = MU_FAST;
     return out;
 }
 

@@ -73,7 +73,7 @@ static void mu_cases_of(const mumacro_kernel *kernel, const mumacro_data *data, 
         int8_t source[MU_MANY];
         const double *columns[6];
         for (int i = 0; i < 6; ++i) columns[i] = in[i] + start;
-        kernel->cases(data, few, columns, one, order ? 17 : 3, rows, MU_MANY, source);
+        kernel->cases(data, 0, 0, few, columns, one, order ? 17 : 3, rows, MU_MANY, source);
         for (int i = 0; i < (order ? 6 : 1); ++i)
             memcpy(out[i] + start, rows + (order ? 5 + i : 0) * MU_MANY, (size_t)few * sizeof *rows);
     }
@@ -98,7 +98,7 @@ static XLA_FFI_Error *mu_run(const XLA_FFI_CallFrame *frame) {
         else out[i - given] = (double *)((XLA_FFI_Buffer *)buffer)->data;
     }
     if (given == 6) mu_cases_of(kernel, data, (int)order, n, in, out);
-    else if (order == 0) kernel->values(data, (int)code, n, in[0], in[1], out[0], NULL, NULL);
+    else if (order == 0) kernel->values(data, 0, 0, (int)code, n, in[0], in[1], out[0], NULL, NULL);
     else if (order == 1) kernel->partials(data, (int)code, n, in[0], in[1], out[0], out[1]);
     else kernel->bends(data, (int)code, n, in[0], in[1], out[0], out[1], out[2]);
     return NULL;

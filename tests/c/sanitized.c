@@ -62,10 +62,10 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
     double *rows = numbers(5 * (size_t)n);
     int8_t *source = (int8_t *)malloc((size_t)n);
     for (int quantity = 0; quantity < 3; ++quantity) {
-        kernel->values(data, quantity, n, v, y, value, bound, source);
-        kernel->values(data, quantity, n, v, y, again, NULL, NULL);
-        kernel->values(data, quantity, n, v, y, again, NULL, source);
-        kernel->values(data, quantity, n, v, y, again, bound, NULL);
+        kernel->values(data, 0, 0, quantity, n, v, y, value, bound, source);
+        kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, NULL);
+        kernel->values(data, 0, 0, quantity, n, v, y, again, NULL, source);
+        kernel->values(data, 0, 0, quantity, n, v, y, again, bound, NULL);
         kernel->slopes(data, quantity, n, v, y, rows, n);
         for (int64_t i = 0; i < n; ++i)
             if (source[i] < -1 || source[i] >= MU_SOURCES) wrong("a source that there is not");
@@ -75,7 +75,7 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         const int contact = kind / MU_DIRECTIONS, direction = kind % MU_DIRECTIONS;
         kernel->border_as(data, contact, direction, n, y, bound);
         for (int quantity = 0; quantity < 3; ++quantity)
-            kernel->values_as(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value, bound, source);
+            kernel->values(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value, bound, source);
     }
     for (int quantity = 0; quantity < 3; ++quantity) {
         kernel->partials(data, quantity, n, v, y, value, bound);
@@ -92,11 +92,11 @@ static void ask_cases(const mumacro_kernel *kernel, const mumacro_data *data, in
     int8_t *source = (int8_t *)malloc(size);
     int64_t strides[6];
     for (int i = 0; i < 6; ++i) strides[i] = i == single ? 0 : 1;
-    kernel->cases(data, n, (const double *const *)columns, strides, 3, rows[0], n, source);
-    kernel->cases(data, n, (const double *const *)columns, strides, 5, rows[1], n, source);
-    kernel->cases(data, n, (const double *const *)columns, strides, 17, rows[2], n, source);
+    kernel->cases(data, 0, 0, n, (const double *const *)columns, strides, 3, rows[0], n, source);
+    kernel->cases(data, 0, 0, n, (const double *const *)columns, strides, 5, rows[1], n, source);
+    kernel->cases(data, 0, 0, n, (const double *const *)columns, strides, 17, rows[2], n, source);
     for (int kind = 1; kind < MU_CONTACTS * MU_DIRECTIONS; ++kind)
-        kernel->cases_as(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW,
+        kernel->cases(data, kind / MU_DIRECTIONS, kind % MU_DIRECTIONS, n < FEW ? n : FEW,
                          (const double *const *)columns, strides, 17, rows[2], n, source);
     for (int64_t i = 0; i < n; ++i) {
         double x[6], *found = numbers(i % 2 ? 19 : 7);

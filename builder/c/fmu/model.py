@@ -11,8 +11,6 @@ The unit holds its sources, the binary of the machine it is made on, and where z
 Windows for 64-bit Intel and AMD; without any compiler the sources alone.
 """
 
-from __future__ import annotations
-
 import io
 import platform
 import shutil
@@ -29,8 +27,6 @@ from mumacro.table import Table
 from mumacro.version import __version__
 
 from ..source import compiled, header_text, zig
-
-__all__ = ["fmu2", "fmu3"]
 
 _HERE = Path(__file__).parent
 STARTS = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01, AMPLITUDE: 0.0}

@@ -3,27 +3,18 @@
 It needs no C library and imports nothing.  Exported are ``memory`` and the functions of ``module.c``.
 """
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
-from mumacro.errors import MumacroError
 from mumacro.table import Table
 
-from ..source import compiled, header_text, zig
-
-__all__ = ["WasmError", "compiler", "wasm"]
+from ..source import ExportError, compiled, header_text, zig
 
 _HERE = Path(__file__).parent
 _OPTIONS = (
     "-Oz", "-std=c99", "-ffreestanding", "-nostdlib", "-fno-math-errno", "-ffp-contract=off", "-mbulk-memory",
     "-isystem", str(_HERE / "include"), "-Wl,--no-entry", "-Wl,--strip-all", "-Wl,-z,stack-size=262144",
 )  # fmt: skip
-
-
-class WasmError(MumacroError):
-    """There is no compiler for WebAssembly."""
 
 
 def compiler() -> list[str] | None:
@@ -37,10 +28,10 @@ def wasm(table: Table) -> bytes:
 
     Raises
     ------
-    WasmError, CompilerError
+    ExportError
         No compiler is installed, or it fails.
     """
     command = compiler()
     if command is None:
-        raise WasmError("WebAssembly needs zig (pip install ziglang), or clang with lld; neither is installed")
+        raise ExportError("WebAssembly needs zig (pip install ziglang), or clang with lld; neither is installed")
     return compiled({"mumacro.h": header_text(table)}, [*command, *_OPTIONS, str(_HERE / "module.c")])
