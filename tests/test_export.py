@@ -203,8 +203,8 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path, m
         (copy, "csv", "table.nc", ExportError, "is the table itself"),
         (PATH, "csv", "no/such/x.csv", FileNotFoundError, "no/such"),
         (PATH, "c", "no/such/x.h", FileNotFoundError, "no/such"),
-        (PATH, "c", "folder.h", OutputError, "is a folder"),
-        (PATH, "c", "table.nc", OutputError, "is a file"),
+        (PATH, "c", "folder.h", ExportError, "is a folder"),
+        (PATH, "c", "table.nc", ExportError, "is a file"),
     ):
         with pytest.raises(error, match=said):
             export_table(path, kind, tmp_path / out)
