@@ -27,8 +27,6 @@ from mumacro.surrogate import Surrogate
 from mumacro.validity import model_rows
 from mumacro.version import __version__
 
-__all__ = ["main"]
-
 CASE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s"
 FIRST = f"""\
 friction of one case:      mumacro '{CASE}'

@@ -12,8 +12,6 @@ from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.errors import MumacroError
 from mumacro.html import html_table
 
-__all__ = ["Answer", "AnswerWithGradient", "IntervalAnswer", "single"]
-
 #: float for one case; an array of float64 for many, or what holds labels in its place
 if TYPE_CHECKING:
     from typing_extensions import TypeVar

@@ -10,14 +10,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Codes
 from mumacro.library import Data, kernels
-
-__all__ = ["alone", "cases", "derivatives", "share_out", "slopes", "values"]
-
-Array = NDArray[np.float64]
-Codes = NDArray[np.int8]
 
 SLICE = 16_384  # points of a slice: its arrays stay in the second cache
 FEW = 65_536  # points that one thread evaluates before a second one has started

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.cells import border_cells, outer_cells
 from mumacro.charts import SOURCES
 from mumacro.library import BLOCK_COLUMNS, Data, kernels
 from mumacro.table import BorderPiece
-
-__all__ = ["Border"]
-
-Array = NDArray[np.float64]
 
 
 class Border:

@@ -15,31 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from mumacro import charts
+from mumacro.arrays import Array
 from mumacro.charts import Axis
 from mumacro.library import BLOCK_COLUMNS, PIECE_COLUMNS, kernels
 
 if TYPE_CHECKING:
     from mumacro.table import Block, BorderPiece
 
-__all__ = [
-    "WIDTH",
-    "block_rows",
-    "border_cells",
-    "cell_positions",
-    "cell_scale",
-    "cells_1d",
-    "cells_2d",
-    "chebyshev_coefficients",
-    "interpolation_matrix",
-    "nodes",
-    "outer_cells",
-    "quantity_cells",
-]
-
-Array = NDArray[np.float64]
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
 
 # Chebyshev points of one cell and the matrix that takes values there to power-basis coefficients, highest power first

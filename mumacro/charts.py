@@ -15,11 +15,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.library import kernels
 
-Array = NDArray[np.float64]
 _ATLAS = kernels[-1].atlas
 _text = kernels[-1].text
 

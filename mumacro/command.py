@@ -35,12 +35,6 @@ from mumacro.surrogate import Surrogate
 from mumacro.tabular import SEPARATORS
 from mumacro.validity import digits, k_effect
 
-__all__ = [
-    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_format",
-    "add_kind", "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "question",
-    "read_case", "read_values", "run", "write_result",
-]  # fmt: skip
-
 INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
   mu0    Coulomb friction coefficient [-], > 0

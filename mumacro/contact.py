@@ -14,15 +14,12 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.errors import InputError
 from mumacro.inputs import FIELDS
 from mumacro.library import Data
 
-__all__ = ["CONTACTS", "DIRECTIONS", "ContactName", "DirectionName", "Kind", "kind_of", "put_rules", "rules"]
-
-Array = NDArray[np.float64]
 ContactName = Literal["spring", "ball"]
 DirectionName = Literal["across", "along", "normal"]
 #: in the order of the kernel's codes

@@ -18,16 +18,14 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mumacro.arrays import Array
 from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import check_inputs, real
 from mumacro.library import kernels
 
-__all__ = ["Element"]
-
-Array = NDArray[np.float64]
 SPRINGS, MOST_SPRINGS = 32, 100_000  # of a ball, if not said, and at the most
 _KERNEL = kernels[-1]
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-__all__ = ["InputError", "MumacroError", "TableError"]
-
 
 class MumacroError(Exception):
     """Root of every error that this project raises on purpose."""

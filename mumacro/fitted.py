@@ -7,16 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mumacro.arrays import Array
 from mumacro.extras import missing
 from mumacro.html import html_table
 from mumacro.inputs import SI, real
 from mumacro.measured import STD, UNKNOWNS, Measured
 
-__all__ = ["CONFIDENCE", "Fit", "quantile"]
-
-Array = NDArray[np.float64]
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 
 

@@ -15,17 +15,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.errors import InputError
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
 from mumacro.measured import HARDLY, STD, UNKNOWNS, Measured
 from mumacro.surrogate import Surrogate
 
-__all__ = ["fit"]
-
-Array = NDArray[np.float64]
 _PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
 
 

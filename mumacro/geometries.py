@@ -12,8 +12,6 @@ from mumacro.errors import InputError
 from mumacro.inputs import UNITS_OF, Scale, read_quantity, real, unknown_name
 from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch
 
-__all__ = ["ARGUMENTS", "BODIES", "GEOMETRIES", "Argument", "Geometry", "contact_of", "read_argument"]
-
 
 class Argument(NamedTuple):
     """One argument: SI unit, units that a person may write, meaning; its only values, for a choice."""

@@ -15,11 +15,9 @@ from typing import Any
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5l, h5o, h5s, h5t, h5z
-from numpy.typing import NDArray
 
-__all__ = ["Group", "open_image"]
+from mumacro.arrays import Array
 
-Array = NDArray[np.float64]
 Refuse = Callable[[str], Exception]
 
 MOST_ATTRIBUTES = 64  # of a group whose attributes are all read

@@ -5,8 +5,6 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable
 
-__all__ = ["html_table"]
-
 
 def html_table(
     head: Iterable[str], rows: Iterable[Iterable[object]], left_out: int = 0, notes: Iterable[str] = ()

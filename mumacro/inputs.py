@@ -17,19 +17,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Bools
 from mumacro.errors import InputError
-
-__all__ = [
-    "BOUNDS", "FIELDS", "GAP", "LIKE", "MOST_HZ", "NAMES", "PER_UNIT", "PLAIN", "POSITIVE", "RAD_PER_CYCLE", "RIGID",
-    "SI", "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "field_of", "is_rigid", "length_scale",
-    "number_hint",
-    "read_number", "read_quantity", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion",
-    "unit_of", "unknown_name",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 
 #: names that may be given, and the SI unit in words, for errors such as "give metres"
 SI = {
@@ -390,9 +380,9 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
             raise InputError(field, value, bound, i if values.ndim else None)
 
 
-def _bad(name: str, values: Array) -> NDArray[np.bool_]:
+def _bad(name: str, values: Array) -> Bools:
     legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
-    out: NDArray[np.bool_] = ~(legal if name == "k" else legal & np.isfinite(values))
+    out: Bools = ~(legal if name == "k" else legal & np.isfinite(values))
     return out
 
 

@@ -13,14 +13,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Places
 from mumacro.errors import InputError
 from mumacro.inputs import real
 
-__all__ = ["BOUND", "ENDS", "as_ends", "extremes", "middle", "without_interval"]
-
-Array = NDArray[np.float64]
 ENDS = ("k_low", "k_high")  # columns that hold an interval
 BOUND = "two stiffnesses [N/m] with 0 < low <= high, both finite"
 SPACING = 0.1  # of samples, in ln k
@@ -91,7 +88,7 @@ def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, 
 
 
 def extremes(
-    evaluate: Callable[[Array, NDArray[np.intp]], tuple[Array, Array, Array]], low: Array, high: Array
+    evaluate: Callable[[Array, Places], tuple[Array, Array, Array]], low: Array, high: Array
 ) -> tuple[Array, Array, Array]:
     """Smallest and largest mu_macro over [low, high], shapes (n,), and the largest bound of its error met there.
 
@@ -103,14 +100,14 @@ def extremes(
     count = 1 + max(1, math.ceil(largest / SPACING)) if largest > 0.0 else 1
     least, most, bound = np.full(low.size, np.inf), np.full(low.size, -np.inf), np.zeros(low.size)
 
-    def take(k: Array, where: NDArray[np.intp]) -> tuple[Array, Array]:
+    def take(k: Array, where: Places) -> tuple[Array, Array]:
         mu, error, slope = evaluate(k, where)
         least[where] = np.fmin(least[where], mu)
         most[where] = np.fmax(most[where], mu)
         bound[where] = np.fmax(bound[where], error)
         return mu, slope
 
-    def close_in(left: Array, right: Array, sign: Array, where: NDArray[np.intp]) -> None:
+    def close_in(left: Array, right: Array, sign: Array, where: Places) -> None:
         """Takes points ever closer to a turn, left of which the slope has this sign."""
         for _ in range(HALVINGS if where.size else 0):
             half = np.sqrt(left) * np.sqrt(right)

@@ -19,8 +19,6 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(missing("jax", error), name=error.name) from None
 
-__all__ = ["Friction"]
-
 _OPENED: dict[int, Data] = {}
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import closed_forms
 from mumacro.answer import Answer
+from mumacro.arrays import Array
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import FIELDS, POSITIVE
@@ -19,13 +19,6 @@ from mumacro.interval import without_interval
 from mumacro.inverse import Crossing, border_crossings, checked_case
 from mumacro.inverse.rootfinding import Sweep
 from mumacro.surrogate import Surrogate
-
-__all__ = [
-    "APPROXIMATIONS", "BORDERS", "EQUATIONS", "SCALES", "Law", "approximations", "border_speeds", "borders",
-    "friction_law", "sweep_values",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 
 SCALES = ("log", "linear")
 

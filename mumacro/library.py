@@ -14,12 +14,9 @@ from typing import Any
 
 import numpy as np
 from cffi import FFI
-from numpy.typing import NDArray
 
-__all__ = ["BLOCK_COLUMNS", "PIECE_COLUMNS", "Data", "Kernel", "kernels", "open_for_xla", "xla_handler"]
+from mumacro.arrays import Array, Codes
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int8]
 #: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
 BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 

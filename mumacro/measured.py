@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Bools
 from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import NAMES, as_columns, check_inputs, real, unknown_name
 from mumacro.surrogate import Surrogate
 
-__all__ = ["HARDLY", "STD", "UNKNOWNS", "Measured"]
-
-Array = NDArray[np.float64]
 UNKNOWNS = ("k", "mu0")
 HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
 STD = "std"  # the column of standard deviations
@@ -136,7 +133,7 @@ class Measured:
         return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
 
 
-def _refuse(name: str, column: Array, legal: NDArray[np.bool_], bound: str) -> None:
+def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:
     """An error for the first value that is not legal."""
     if not legal.all():
         at = int(np.argmin(legal))

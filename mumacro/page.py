@@ -16,8 +16,6 @@ from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs import BOUNDS, POSITIVE, SI, UNITS_OF, Scale, refusal
 from mumacro.surrogate import Surrogate
 
-__all__ = ["POLICY", "map_of", "names"]
-
 #: the content security policy of the page: no inline script, no inline style, nothing from another host
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "

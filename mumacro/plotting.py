@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from mumacro.law import Law
     from mumacro.surrogate import Surrogate
 
-__all__ = ["ENDINGS", "mark_of", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
-
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
 _SYMBOLS = {

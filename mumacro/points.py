@@ -24,8 +24,6 @@ from mumacro.measured import STD, UNKNOWNS
 from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head
 from mumacro.validity import digits
 
-__all__ = ["FIT", "fit_points", "read_points"]
-
 FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
 columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:

@@ -8,8 +8,6 @@ import os
 import threading
 from contextlib import suppress
 
-__all__ = ["default_threads", "processors"]
-
 
 @functools.cache
 def processors() -> int:

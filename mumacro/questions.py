@@ -27,8 +27,6 @@ from mumacro.inputs import NAMES, field_of, unit_of
 from mumacro.inverse import solve_for
 from mumacro.law import approximations, friction_law, sweep_values
 
-__all__ = ["LAW", "ONE_K", "SOLVE_FOR", "STIFFNESS", "law", "map_", "solve", "stiffness_of"]
-
 LAW = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s 1m/s"
 SOLVE_FOR = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
 STIFFNESS = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"

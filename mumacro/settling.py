@@ -26,15 +26,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.surrogate import Surrogate
-
-__all__ = ["Settling", "settling"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

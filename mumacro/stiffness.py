@@ -35,8 +35,6 @@ from typing import Any
 
 from mumacro.errors import InputError
 
-__all__ = ["AXES", "Contact", "Material", "ball_on_flat", "cylinder_on_flat", "flat_punch", "in_series"]
-
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
 
 

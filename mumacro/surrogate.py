@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mumacro import batch, charts, closed_forms
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
+from mumacro.arrays import Array, Codes, Places
 from mumacro.border import Border
 from mumacro.bundled import bundled_tables
 from mumacro.cells import block_rows, outer_cells, quantity_cells
@@ -25,9 +26,6 @@ from mumacro.library import Data, kernels
 from mumacro.processors import default_threads
 from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
 
-__all__ = ["Surrogate"]
-
-Array = NDArray[np.float64]
 _KERNEL = kernels[-1]
 _ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the bits are the same
 _RATIO = _ONE.ratio
@@ -527,7 +525,7 @@ class Surrogate:
     def evaluate_columns(
         self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None, *,
         contact: str = "spring", direction: str = "across",
-    ) -> tuple[Array, Array, Array, NDArray[np.int8]]:  # fmt: skip
+    ) -> tuple[Array, Array, Array, Codes]:  # fmt: skip
         """(mu_macro, mu~, bound of mu_macro, source code) of columns of float64, each of shape (n,) or (1,).
 
         On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` is the number of
@@ -643,7 +641,7 @@ class Surrogate:
         flat = {name: _flat(column, shape) for name, column in columns.items()}
         data, code = self._data_of(kind), None if kind == SPRING else kind
 
-        def evaluate(k: Array, places: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        def evaluate(k: Array, places: Places) -> tuple[Array, Array, Array]:
             six = [_contiguous(k if name == "k" else column[places]) for name, column in flat.items()]
             rows = batch.cases(data, six, k.size, self.threads, 17, code)[0]
             return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k

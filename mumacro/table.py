@@ -23,16 +23,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import charts, hdf5
+from mumacro.arrays import Array
 from mumacro.cells import nodes
 from mumacro.errors import TableError
 from mumacro.writing import write_whole
-
-__all__ = [
-    "FORMAT_VERSION", "Block", "BorderPiece", "Table", "json_attributes", "parse_table", "read_table", "write_table",
-]  # fmt: skip
 
 FORMAT_VERSION = 3
 # More is refused before memory is taken; of the largest table that the builder makes:
@@ -41,7 +37,6 @@ MOST_NUMBERS = 200_000  # of a variable: 14,641
 MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its square
 MOST_CELLS = 1024  # along an axis: 156
 MOST_PATCHES = 8192  # cells of a block: 646, of 512 bytes each and quantity
-Array = NDArray[np.float64]
 
 _one_at_a_time = threading.Lock()
 

@@ -20,8 +20,6 @@ from mumacro.inputs import (
     unit_of,
 )
 
-__all__ = ["SEPARATORS", "TOO_LARGE", "absent", "find_heads", "meant_by", "read_cell", "read_head"]
-
 #: what may stand between the cells of CSV, by the word for it
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"

@@ -21,8 +21,6 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(missing("torch", error), name=error.name) from None
 
-__all__ = ["Friction"]
-
 _TABLES: dict[int, tuple[Data, int]] = {}  # data and threads
 
 

@@ -21,8 +21,6 @@ from mumacro.measured import HARDLY
 from mumacro.settling import settling
 from mumacro.surrogate import Surrogate
 
-__all__ = ["KNOWN", "ROWS", "Row", "digits", "k_effect", "model_rows"]
-
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (
     "one spring", "k is known", "units", "steady cycle", "Coulomb friction", "constant normal force",

@@ -15,8 +15,6 @@ try:
 except ImportError:  # Windows: two processes are not distinguished
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["BusyError", "alone_in", "put", "sync_folder", "write_whole"]
-
 
 class BusyError(MumacroError):
     """Another process is writing the same output."""

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
 from mumacro.answer import IntervalAnswer
+from mumacro.arrays import Array, Bools, Codes
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
@@ -23,10 +23,6 @@ from mumacro.inputs import GAP, LIKE, SI, Scale, refusal, split_unit
 from mumacro.interval import ENDS
 from mumacro.surrogate import Surrogate
 from mumacro.tabular import TOO_LARGE, absent, find_heads, meant_by, read_cell
-
-__all__ = ["ANSWERS", "REJECTS", "FilesError", "added_fields", "answer", "answer_columns", "find_columns", "numbers"]
-
-Array = NDArray[np.float64]
 
 #: columns that are added
 ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
@@ -171,7 +167,7 @@ def answer_columns(
     return columns, rejects, given
 
 
-def _words(codes: NDArray[np.int8], words: Sequence[str], mask: NDArray[np.bool_] | None) -> pa.Array:
+def _words(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
     return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string()))
 
 

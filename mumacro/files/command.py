@@ -16,8 +16,6 @@ from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
 from mumacro.tabular import SEPARATORS
 
-__all__ = ["main"]
-
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]

@@ -23,8 +23,6 @@ import pyarrow.dataset
 from mumacro.files.answering import FilesError
 from mumacro.tabular import read_head
 
-__all__ = ["ENDINGS", "Block", "ParquetSource", "TextSource", "find_files", "format_of"]
-
 FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
 ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"
 ROWS = 65_536  # of a block, at most: a third of a second of work

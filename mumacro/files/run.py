@@ -31,8 +31,6 @@ from mumacro.surrogate import Surrogate
 from mumacro.version import __version__
 from mumacro.writing import alone_in, put, write_whole
 
-__all__ = ["Summary", "evaluate_files"]
-
 
 @dataclass(frozen=True)
 class Summary:

@@ -14,8 +14,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
 
-__all__ = ["Output", "csv_lines"]
-
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
     """Lines of CSV."""

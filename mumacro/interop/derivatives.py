@@ -9,8 +9,6 @@ from typing import Any
 
 from mumacro.surrogate import Surrogate
 
-__all__ = ["NO_THIRD", "DifferentiableFriction", "slopes_by_groups"]
-
 NO_THIRD = "third derivatives are not tabulated: take differences of the second ones"
 _OPENING = Lock()
 

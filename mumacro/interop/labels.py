@@ -21,8 +21,6 @@ from mumacro.inputs import PER_UNIT
 if TYPE_CHECKING:
     from mumacro.surrogate import Surrogate
 
-__all__ = ["evaluate_labelled"]
-
 _GROUPS = ("v_tilde", "y_tilde", "length_scale")
 _ENDS = ("mu_macro_low", "mu_macro_high")
 #: name -> units and long_name, as xarray and CF write them

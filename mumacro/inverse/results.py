@@ -11,8 +11,6 @@ from mumacro.errors import InputError
 from mumacro.inputs import as_columns, check_inputs
 from mumacro.interval import ENDS
 
-__all__ = ["Crossing", "Reach", "Root", "Solution", "checked_case"]
-
 
 class Root(NamedTuple):
     """One value of the unknown.

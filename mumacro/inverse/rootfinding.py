@@ -16,13 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.answer import Answer
+from mumacro.arrays import Array, Bools, Places
 from mumacro.contact import SPRING, Kind
 from mumacro.surrogate import Surrogate
-
-__all__ = ["TINY", "Curve", "Sweep", "curves_between", "last_double", "samples"]
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 TINY = 5e-324
 _ROUNDING = 2.0**-52
@@ -103,7 +99,7 @@ class Curve:
             out[inside] = self._newton(level[inside], j[inside], going[inside])
         return out
 
-    def _newton(self, level: Array, j: NDArray[np.intp], leave: Bools) -> Array:
+    def _newton(self, level: Array, j: Places, leave: Bools) -> Array:
         """The same for levels between the samples j - 1 and j, (n,)."""
         a, b = self.x[j - 1].copy(), self.x[j].copy()
         fa, fb = self.sign * (self.mu[j - 1] - level), self.sign * (self.mu[j] - level)

@@ -32,20 +32,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mumacro.answer import Answer
+from mumacro.arrays import Array, Bools, Places
 from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import POSITIVE
 from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
 from mumacro.surrogate import Surrogate
-
-__all__ = ["border_crossings", "solve_for"]
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # searched over all their values
 HUGE = 1.7976931348623157e308
@@ -291,7 +287,7 @@ def _enclosures(
 def _where_off(
     sweep: Sweep,
     curve: Curve,
-    i: NDArray[np.intp],
+    i: Places,
     above: Bools,
     bound: Array,
     wanted: Array,
