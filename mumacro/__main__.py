@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from mumacro import command
+from mumacro.answer import BAND
 from mumacro.bundled import bundled_tables
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.contact import SPRING, Kind
@@ -76,7 +77,7 @@ def _one_case(words: Sequence[str]) -> str:
     if chosen.json:
         names = ["mu_macro", "mu_ratio", "regime", "error_bound", "source", "v_tilde", "y_tilde"]
         found = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
-        ends = {name: getattr(answer, name) for name in ("mu_macro_low", "mu_macro_high") if "k_range" in case}
+        ends = {name: getattr(answer, name) for name in BAND if "k_range" in case}
         found |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
         found |= {"model": rows} if chosen.model else {}
         found |= dict(kind.names.items() - SPRING.names.items())

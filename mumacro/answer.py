@@ -25,7 +25,7 @@ else:
 # by code; the last entry is that of -1, an illegal case
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
-_BAND = ("mu_macro_low", "mu_macro_high")
+BAND = ("mu_macro_low", "mu_macro_high")  # of an interval of k
 _ROWS = 10  # of a table in a notebook
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 
@@ -144,7 +144,7 @@ class Answer(Generic[Number]):
 
     def columns(self) -> dict[str, Any]:
         """What is known of each case, by name: mu_macro first, then what was requested beside it."""
-        names = ["mu_macro", *(name for name in _BAND if hasattr(self, name)), "mu_ratio", "regime", "error_bound"]
+        names = ["mu_macro", *(name for name in BAND if hasattr(self, name)), "mu_ratio", "regime", "error_bound"]
         names += ["source", *(("v_tilde", "y_tilde", "length_scale") if self._groups is not None else ())]
         slopes = {f"d_mu_macro_d_{name}": slope for name, slope in (self.gradient or {}).items()}
         return {**{name: getattr(self, name) for name in names}, **slopes}
@@ -179,7 +179,7 @@ class Answer(Generic[Number]):
 
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
-        names += [name for name in IntervalAnswer.__slots__ if hasattr(self, name)]
+        names += [name for name in BAND if hasattr(self, name)]
         names += ["v_tilde", "y_tilde", "length_scale"] if self._groups is not None else []
         names += ["gradient", "gradient_bound"] if self.gradient is not None else []
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
@@ -203,7 +203,7 @@ class IntervalAnswer(AnswerWithGradient[Number]):
         Smallest and largest mu_macro over the interval [-]; ``error_bound`` holds for them, too.
     """
 
-    __slots__ = _BAND
+    __slots__ = BAND
 
     mu_macro_low: Number
     mu_macro_high: Number
@@ -212,7 +212,7 @@ class IntervalAnswer(AnswerWithGradient[Number]):
 def single(answer: Answer[Any]) -> Answer[float]:
     """The answer of one case that an answer of arrays with one element holds."""
     out = copy.copy(answer)
-    for name in ("mu_macro", "mu_ratio", "error_bound", *IntervalAnswer.__slots__):
+    for name in ("mu_macro", "mu_ratio", "error_bound", *BAND):
         if hasattr(out, name):
             setattr(out, name, getattr(out, name).item())
     out.source_code = int(out.source_code.item())

@@ -37,7 +37,7 @@ def share_out(n: int, threads: int, work: Callable[[slice], None], cost: int = 1
 
 
 def values(
-    quantity: int, data: Data, v: Array, y: Array, threads: int, kind: tuple[int, int] | None = None
+    quantity: int, data: Data, v: Array, y: Array, threads: int, kind: tuple[int, int] = (0, 0)
 ) -> tuple[Array, Array, Codes]:
     """A quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
     value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
@@ -45,7 +45,7 @@ def values(
     def work(part: slice) -> None:
         _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part], kind)
 
-    share_out(v.size, threads, work, COST if kind else 1)
+    share_out(v.size, threads, work, COST if any(kind) else 1)
     return value, bound, source
 
 
@@ -63,13 +63,8 @@ def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array
     return rows
 
 
-def derivatives(quantity: int, data: Data, v: Array, y: Array, order: int) -> Array:
-    """First or second derivatives along v~ and y~ at (n,) points, (2, n) or (3, n), on the calling thread."""
-    return (_KERNEL.partials if order == 1 else _KERNEL.bends)(data, quantity, v, y)
-
-
 def cases(
-    data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int, kind: tuple[int, int] | None = None
+    data: Data, columns: Sequence[Array | float], n: int, threads: int, rows: int, kind: tuple[int, int] = (0, 0)
 ) -> tuple[Array, Codes]:
     """Answers to n cases, see :meth:`mumacro.library.Kernel.cases`: rows (3, 5 or 17, n), and sources (n,)."""
     out, source = np.empty((rows, n)), np.empty(n, np.int8)
@@ -78,5 +73,5 @@ def cases(
         six = columns if part.stop - part.start == n else [c if isinstance(c, float) else c[part] for c in columns]
         _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start, kind)
 
-    share_out(n, threads, work, COST if kind else 1)
+    share_out(n, threads, work, COST if any(kind) else 1)
     return out, source

@@ -10,6 +10,7 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -68,19 +69,11 @@ class Kind(NamedTuple):
         """``error`` by the name and the bound that the user knows."""
         if not self.normal or error.field != "y0":
             return error
-        bound = "given [N] for direction normal"
-        if error.value is not None:
-            bound = LIFTS_OFF
+        bound = "given [N] for direction normal" if error.value is None else LIFTS_OFF
         return InputError(AMPLITUDE, error.value, bound, error.index)
 
     def as_six(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Inputs with the amplitude in the place of y0.
-
-        Raises
-        ------
-        InputError
-            An amplitude that does not belong to the direction.
-        """
+        """Inputs with the amplitude in the place of y0; InputError for one that does not belong to the direction."""
         wrong, right = ("y0", AMPLITUDE) if self.normal else (AMPLITUDE, "y0")
         if wrong in inputs:
             word = DIRECTIONS[self.direction]
@@ -100,22 +93,13 @@ del _KINDS["ball", "normal"]
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
-    """The codes of a contact and a direction.
+    """The codes of a contact and a direction; InputError for unknown names and a ball whose normal force oscillates.
 
-    Raises
-    ------
-    InputError
-        A name that is not known; a ball whose normal force oscillates.
-
-    Examples
-    --------
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
     """
-    try:
+    with suppress(KeyError, TypeError):  # the reason follows
         return _KINDS[contact, direction]
-    except (KeyError, TypeError):
-        pass  # the reason follows
     for name, value, known in (("contact", contact, CONTACTS), ("direction", direction, DIRECTIONS)):
         if not isinstance(value, str) or value not in known:
             raise InputError(name, value, f"one of {', '.join(known)}")

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.arrays import Array, Bools
+from mumacro.arrays import Array
 from mumacro.errors import InputError
 
 #: names that may be given, and the SI unit in words, for errors such as "give metres"
@@ -235,17 +235,8 @@ def number_hint(name: str, value: object) -> str:
 def read_number(name: str, text: str) -> float:
     """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an infinite stiffness.
 
-    Raises
-    ------
-    ValueError
-        The text is no number, or in no known unit; the message states what to write.
-
-    Examples
-    --------
-    >>> read_number("y0", "2e-6")
-    2e-06
-    >>> read_number("k", "1 N/um")
-    1000000.0
+    >>> read_number("y0", "2e-6"), read_number("k", "1 N/um")
+    (2e-06, 1000000.0)
     >>> read_number("y0", "2 N")
     Traceback (most recent call last):
     ...
@@ -291,16 +282,29 @@ def read_range(name: str, text: str) -> tuple[float, float]:
 # --- columns --------------------------------------------------------------------------------------------
 
 
+def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset has."""
+    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a query of DuckDB
+        import pyarrow as pa  # its columns come from one reading: a second one may have another order
+
+        cases = pa.table(cases)
+    try:
+        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
+        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
+        return {name: cases[name] for name in names if name in there}
+    except (AttributeError, TypeError, KeyError) as error:
+        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
+        raise InputError(
+            argument, kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
+            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
+        ) from error  # fmt: skip
+
+
 def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
-    """The six inputs as float64 arrays; their values are not checked.
+    """The six inputs as float64 arrays; InputError where one is missing, given twice, or no real number.
 
     ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, None or
     ``rigid``; an array may hold the word, too.
-
-    Raises
-    ------
-    InputError
-        An input is missing, given twice, or not a real number.
     """
     converted: dict[str, Array] = {}
     for name in FIELDS:
@@ -363,27 +367,16 @@ def real(name: str, value: Any) -> Array:
 
 
 def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
-    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega.
-
-    Raises
-    ------
-    InputError
-        Naming field, value, bound and, in an array, the index.
-    """
+    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega."""
     for name, values in columns.items():
-        bad = _bad(name, values)
+        legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
+        bad = ~(legal if name == "k" else legal & np.isfinite(values))
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
             field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
             value = float(told.ravel()[i])
             bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
             raise InputError(field, value, bound, i if values.ndim else None)
-
-
-def _bad(name: str, values: Array) -> Bools:
-    legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
-    out: Bools = ~(legal if name == "k" else legal & np.isfinite(values))
-    return out
 
 
 def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:

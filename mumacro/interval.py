@@ -25,13 +25,7 @@ HALVINGS = 20  # of a spacing, until mu_macro next to an extreme is flat to 1e-1
 
 
 def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Inputs with :data:`ENDS` for ``k_range``, and nothing else that says k.
-
-    Raises
-    ------
-    InputError
-        k beside an interval, half an interval, or what is no pair.
-    """
+    """Inputs with :data:`ENDS` for ``k_range``; InputError for k beside it, half an interval, or what is no pair."""
     given = dict(inputs)
     if "k_range" in given:
         if told := [name for name in ("k", *ENDS) if name in given]:
@@ -49,13 +43,7 @@ def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array]:
-    """Both ends and their geometric middle; NaN where they are no interval.
-
-    Raises
-    ------
-    InputError
-        What is no interval, as a single value or where ``illegal`` is "raise".
-    """
+    """Both ends and their geometric middle; for no interval NaN, or InputError as ``illegal`` and one value ask for."""
     low, high = (real(name, inputs[name]) for name in ENDS)
     try:
         low, high = np.broadcast_arrays(low, high)
@@ -70,13 +58,7 @@ def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array
 
 
 def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """A case with the middle stiffness, and the ends of an interval of it, if there is one.
-
-    Raises
-    ------
-    InputError
-        What is no interval; an interval where k is the swept input ``along``.
-    """
+    """A case with the middle stiffness, and the ends of an interval of it, if any; there is none where k is swept."""
     if all(case.get(name) is None for name in ("k_range", *ENDS)):
         return case, {}
     given = as_ends(case)

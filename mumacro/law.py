@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import closed_forms
-from mumacro.answer import Answer
+from mumacro.answer import BAND, Answer
 from mumacro.arrays import Array
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError
@@ -49,13 +49,7 @@ BORDERS = {
     "large_amplitude": "l0 omega sqrt(y~ / 4.402914), eq. (26) with the exact constant; given for y~ >= 1",
     "blend": "one formula for every y~, within 0.6 percent",
 }
-#: the paper's equation -> the column that holds it, in APPROXIMATIONS or BORDERS
-EQUATIONS = {
-    16: "static", 23: "eq_23", 24: "eq_24", 26: "eq_26", 27: "eq_27", 28: "master_curve", 31: "small_amplitude",
-    32: "critical", 35: "rigid", 37: "rigid", 38: "static", 39: "eq_24", 40: "critical",
-}  # fmt: skip
 _CORNER_REACH, _CORNER_TOP = 0.5, 0.7
-_BAND = ("mu_macro_low", "mu_macro_high")
 #: column of BORDERS -> formula, smallest and largest y~
 _FORMULAS = {
     "eq_23": (closed_forms.border_23, 0.0, 1.0),
@@ -102,13 +96,13 @@ class Law:
     @property
     def band(self) -> tuple[Array, Array] | None:
         """Smallest and largest mu_macro over an interval of k [-], (n,) each; None where k is one number."""
-        low, high = (getattr(self.answer, name, None) for name in _BAND)
+        low, high = (getattr(self.answer, name, None) for name in BAND)
         return None if low is None or high is None else (low, high)
 
     @property
     def columns(self) -> dict[str, Any]:
         """The law as a table: column -> values (n,), the swept input first."""
-        names = ["mu_macro", *(_BAND if self.band else ()), "regime", "error_bound", "source"]
+        names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
         found = {name: getattr(self.answer, name) for name in names}
         return {self.along: self.values, **found, "mu_static": self.mu_static}
 
@@ -147,7 +141,7 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
 
 def friction_law(
     surrogate: Surrogate, along: str, values: Array, case: Mapping[str, Any], *, contact: str = "spring",
-    direction: str = "across", k_range: tuple[float, float] | None = None, refine: bool = False,
+    direction: str = "across", refine: bool = False,
 ) -> Law:  # fmt: skip
     """The friction law: mu_macro over a range of one input.
 
@@ -160,12 +154,10 @@ def friction_law(
     values : ndarray
         Its values [SI], ascending, shape (n,), such as :func:`sweep_values` makes.
     case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``, ``k_range`` for
-        ``k``.
+        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``; ``k_range``, lowest
+        and highest stiffness, for ``k``: the law has a band, see :attr:`Law.band`.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
-    k_range : (float, float), optional
-        Lowest and highest stiffness [N/m] in place of k: the law has a band, see :attr:`Law.band`.
     refine : bool
         Also values where mu_macro bends, for pictures: at the borders, and where a straight line between neighbours
         would be wrong by more than a thousandth of the law's height.
@@ -189,7 +181,7 @@ def friction_law(
     ([0.2238, 0.24, 0.2957], 0.07105)
     """
     kind = kind_of(contact, direction)
-    case, ends = without_interval(case if k_range is None else {**case, "k_range": k_range}, along)
+    case, ends = without_interval(case, along)
     known = checked_case(case, along, kind)
     sweep = Sweep(surrogate, known, along, kind)
     border = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]), **kind.names)

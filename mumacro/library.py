@@ -29,6 +29,7 @@ _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
 _SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
 _NOTHING: Any = _FFI.NULL
+_new, _unpack = _FFI.new, _FFI.unpack
 
 
 def _numbers(array: Array | None) -> Any:
@@ -51,7 +52,7 @@ class Data:
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
-        self.pointer = _FFI.new("mumacro_data *")
+        self.pointer = _new("mumacro_data *")
         self._kept: list[Any] = []
         #: points (nodes, 2) and errors (2, 8) of the pieces of a ball, see ``mumacro_rule``; none until they are put
         self.rules: list[tuple[Array, Array]] = []
@@ -113,7 +114,7 @@ class Kernel:
 
     def values(
         self, data: Data, quantity: int, v: Array, y: Array, value: Array, bound: Array | None, source: Codes | None,
-        kind: tuple[int, int] | None = None,
+        kind: tuple[int, int] = (0, 0),
     ) -> None:  # fmt: skip
         """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where wanted.
 
@@ -121,14 +122,14 @@ class Kernel:
         """
         codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
         arrays = v.size, _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
-        if kind is None:
-            self._values(data.pointer, quantity, *arrays)
-        else:
+        if any(kind):
             self._found.values_as(data.pointer, *kind, quantity, *arrays)
+        else:
+            self._values(data.pointer, quantity, *arrays)
 
     def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
         """A quantity at one point in plain numbers, its bound and the source."""
-        point, code = _FFI.new(_POINT, (v, y)), _FFI.new(_CODE)
+        point, code = _new(_POINT, (v, y)), _new(_CODE)
         self._values(data.pointer, quantity, 1, point, point + 1, point + 2, point + 3, code)
         return point[2], point[3], code[0]
 
@@ -139,14 +140,14 @@ class Kernel:
 
     def cases(
         self, data: Data, n: int, columns: Sequence[Array | float], rows: Array, source: Codes, start: int = 0,
-        kind: tuple[int, int] | None = None,
+        kind: tuple[int, int] = (0, 0),
     ) -> None:  # fmt: skip
         """Cases ``start`` to ``start`` + n: fill ``rows`` (3, 5 or 17, N) and ``source`` (n,).
 
         ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~, y~; slopes by input
         and their bounds.  ``kind``: another contact and direction, see :class:`mumacro.contact.Kind`.
         """
-        constants, strides, pointers = _FFI.new(_SIX), _FFI.new(_STRIDES), _FFI.new(_COLUMNS)
+        constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
         kept = []
         for i, column in enumerate(columns):
             if isinstance(column, float):
@@ -157,30 +158,26 @@ class Kernel:
                 kept.append(pointer)
         out = _numbers(rows.reshape(-1)[start:] if start else rows)
         codes = _FFI.from_buffer(_CODES, source)
-        if kind is None:
-            self._cases(data.pointer, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
+        given = n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
+        if any(kind):
+            self._found.cases_as(data.pointer, *kind, *given)
         else:
-            self._found.cases_as(
-                data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
-            )  # fmt: skip
+            self._cases(data.pointer, *given)
 
     def one(self, data: Data, six: tuple[float, ...], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
-        out = _FFI.new(_CASE)
+        out = _new(_CASE)
         self._one(data.pointer, *six, numbers, out)
-        found: list[float] = _FFI.unpack(out, numbers)
-        return found
+        return _unpack(out, numbers)  # type: ignore[no-any-return]
 
-    def partials(self, data: Data, quantity: int, v: Array, y: Array) -> Array:
-        """d/dv~ and d/dy~ of a quantity at points (n,), one-sided at v~ = 0: (2, n)."""
-        out = np.empty((2, v.size))
-        self._found.partials(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1])))
-        return out
+    def derivatives(self, data: Data, quantity: int, v: Array, y: Array, order: int) -> Array:
+        """Of a quantity at points (n,), (2, n) or (3, n): d/dv~ and d/dy~; d2/dv~2, d2/dv~ dy~ and d2/dy~2.
 
-    def bends(self, data: Data, quantity: int, v: Array, y: Array) -> Array:
-        """d2/dv~2, d2/dv~ dy~, d2/dy~2 of a quantity at points (n,), NaN at v~ = 0: (3, n)."""
-        out = np.empty((3, v.size))
-        self._found.bends(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1], out[2])))
+        The first ones are one-sided at v~ = 0, the second ones NaN there.
+        """
+        out = np.empty((order + 1, v.size))
+        ask = self._found.partials if order == 1 else self._found.bends
+        ask(data.pointer, quantity, v.size, *map(_numbers, (v, y, *out)))
         return out
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, overload
 
@@ -13,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from mumacro import batch, charts, closed_forms
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
-from mumacro.arrays import Array, Codes, Places
+from mumacro.arrays import Array, Places
 from mumacro.border import Border
 from mumacro.bundled import bundled_tables
 from mumacro.cells import block_rows, outer_cells, quantity_cells
 from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
 from mumacro.errors import InputError, TableError
 from mumacro.html import html_table
-from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, real
+from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, picked, real
 from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
 from mumacro.processors import default_threads
@@ -49,11 +50,11 @@ class Surrogate:
     (0.240012, 'stick_slip')
     """
 
-    def __init__(self, table: Table, path: str | Path, threads: int | None = None, image: bytes | None = None) -> None:
+    def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
         if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
             raise InputError("threads", threads, "None or a whole number from 1 to 1024")
         self._asked_threads = threads
-        self._image = image
+        self._image: bytes | None = None
         self.path = Path(path)
         self.table = table
         self.attributes = json_attributes(table)
@@ -98,15 +99,19 @@ class Surrogate:
         'mumacro-1e-10'
         """
         path = Path(table) if isinstance(table, (str, Path)) else _bundled(table)
-        image = read_image(path)
-        return cls(parse_table(image, path), path, threads, image)
+        return cls._of_image(read_image(path), path, threads)
+
+    @classmethod
+    def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Surrogate:
+        found = cls(parse_table(image, path), path, threads)
+        found._image = image
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle small: a bundled table by name and checksum, valid on another machine, too; another with its bytes."""
-        if self.path.resolve() in (path.resolve() for path in bundled_tables()):
-            return _reopen, (self.path.name, self.checksum, self._asked_threads, None)
-        image = read_image(self.path) if self._image is None else self._image
-        return _reopen, (str(self.path), self.checksum, self._asked_threads, image)
+        bundled = self.path.resolve() in (path.resolve() for path in bundled_tables())
+        path, image = (self.path.name, None) if bundled else (str(self.path), self._image or read_image(self.path))
+        return _reopen, (path, self.checksum, self._asked_threads, image)
 
     def __repr__(self) -> str:
         return f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most {self.max_abs_error:.1e}>"
@@ -160,8 +165,8 @@ class Surrogate:
     @property
     def memory(self) -> int:
         """Bytes of the cells that an evaluation of mu~ reads."""
-        arrays = self._data.border, self._data.pieces, self._data.blocks, *self._data.quantities[charts.MU]
-        return sum(array.nbytes for array in arrays)
+        data = self._data
+        return sum(array.nbytes for array in (data.border, data.pieces, data.blocks, *data.quantities[charts.MU]))
 
     def self_check(self) -> None:
         """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
@@ -206,7 +211,7 @@ class Surrogate:
         v, y, shape = _points(v_tilde, y_tilde)
         found = batch.alone(charts.MU, self._data, v, y, self.threads)
         if not shape and math.isnan(found[0]):
-            _refuse_illegal(-1, v, y, "finite and >= 0")
+            raise _illegal(v, y)
         return _shaped(found, shape)
 
     def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any, Any]:
@@ -307,20 +312,18 @@ class Surrogate:
         >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
         '-1.000e-05'
         """
-        if of not in self.table.quantities:
-            raise InputError("of", of, f"one of {', '.join(self.table.quantities)}")
-        v, y, shape = _points(v_tilde, y_tilde)
-        rows = batch.slopes(_CODES[of], self._with(of), v, y, self.threads)
+        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
+        rows = batch.slopes(_CODES[of], data, v, y, self.threads)
         if not shape and math.isnan(rows[0, 0]):
-            _refuse_illegal(-1, v, y, "finite and >= 0")
+            raise _illegal(v, y)
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
 
-    def _with(self, quantity: str) -> Data:
+    def _with(self, quantity: str, argument: str = "name") -> Data:
         """What the kernel reads, with the cells of a quantity; they are cut on first use."""
-        code = _CODES[quantity]
+        code = _CODES.get(quantity)
         if code not in self._data.quantities:
-            if quantity not in self.table.quantities:
-                raise TableError(self.path, f"holds no {quantity}: build it anew, python -m builder build")
+            if code is None or quantity not in self.table.quantities:
+                raise InputError(argument, quantity, f"one of {', '.join(self.table.quantities)}, which the table has")
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
@@ -337,12 +340,10 @@ class Surrogate:
         >>> [round(x, 6) for x in Surrogate.open().derivatives(0.1, 0.5)]
         [0.108351, -0.250146]
         """
-        if of not in self.table.quantities:
-            raise InputError("of", of, f"one of {', '.join(self.table.quantities)}")
         if order not in (1, 2):
             raise InputError("order", order, "1 or 2")
-        v, y, shape = _points(v_tilde, y_tilde)
-        return tuple(_shaped(row, shape) for row in batch.derivatives(_CODES[of], self._with(of), v, y, order))
+        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
+        return tuple(_shaped(row, shape) for row in _KERNEL.derivatives(data, _CODES[of], v, y, order))
 
     def prepared(self) -> Data:
         """What the kernel reads, with the cells of every quantity."""
@@ -365,25 +366,19 @@ class Surrogate:
         >>> round(power, 6), bound < 1e-12, int(source)
         (0.012142, True, 5)
         """
-        if name not in charts.QUANTITY_NAMES:
-            raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
-        kind = kind_of(contact, direction)
+        data, kind = self._with(name), kind_of(contact, direction)
         if kind == SPRING and type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
-            try:
-                one = _ONE.value(self._with(name), _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
-            except OverflowError:  # a whole number beyond double range
-                one = None
-            if one is not None and one[2] >= 0:
-                return one
+            with suppress(OverflowError):  # a whole number beyond double range
+                one = _ONE.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                if one[2] >= 0:
+                    return one
         if kind.normal and name == "power":
             raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
-        self._data_of(kind)
         v, y, shape = _points(v_tilde, y_tilde)
-        code = None if kind == SPRING else kind
-        value, bound, source = batch.values(_CODES[name], self._with(name), v, y, self.threads, code)
-        if not shape:
+        value, bound, source = batch.values(_CODES[name], self._data_of(kind), v, y, self.threads, kind)
+        if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
-            _refuse_illegal(int(source[0]), v, y, ">= 0 and < 1" if kind.normal else finite)
+            raise _illegal(v, y, ">= 0 and < 1" if kind.normal else finite)
         return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
     # --- dimensional ----------------------------------------------------------------------------------
@@ -501,45 +496,15 @@ class Surrogate:
             return self._evaluate(cases, inputs, gradient, groups, illegal, kind_of(contact, direction))
         six = _six(inputs) if cases is None and len(inputs) == 6 else None
         if six is not None and illegal in ("nan", "raise"):
-            kinds = set(map(type, six))
-            if kinds <= _NUMBERS:
+            if _NUMBERS.issuperset(map(type, six)):
                 answer: Any = self._one(six, gradient)
                 if answer is not None:
                     return answer
-            elif illegal == "nan" and kinds <= _NUMBERS_OR_ARRAY:
+            elif illegal == "nan" and _NUMBERS_OR_ARRAY.issuperset(map(type, six)):
                 arrays = [x for x in six if type(x) is np.ndarray]
                 if len({x.shape for x in arrays}) == 1 and arrays[0].ndim and {x.dtype for x in arrays} == {_FLOAT}:
                     return self._arrays(six, arrays[0].shape, gradient, gradient or groups)
         return self._evaluate(cases, inputs, gradient, groups, illegal)
-
-    def evaluate_case(
-        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
-    ) -> tuple[float, float, float, int]:
-        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats, k = inf for rigid contact.
-
-        An illegal case gives NaN and -1.
-        """
-        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
-        return mu_macro, mu_ratio, bound, int(source)
-
-    def evaluate_columns(
-        self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None, *,
-        contact: str = "spring", direction: str = "across",
-    ) -> tuple[Array, Array, Array, Codes]:  # fmt: skip
-        """(mu_macro, mu~, bound of mu_macro, source code) of columns of float64, each of shape (n,) or (1,).
-
-        On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` is the number of
-        cases where all columns have length 1.  For direction "normal" ``y0`` is the amplitude of the force [N].
-        """
-        kind = kind_of(contact, direction)
-        columns = [_contiguous(c) for c in (mu0, Fz, k, y0, omega, v0)]
-        if n is None:
-            n = max(c.size for c in columns) if all(c.size for c in columns) else 0
-        if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
-            raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
-        given = [c if c.size == n else float(c[0]) for c in columns]
-        rows, source = batch.cases(self._data_of(kind), given, n, 1, 3, None if kind == SPRING else kind)
-        return rows[0], rows[1], rows[2], source
 
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
         """The answer to one case; None where it is illegal."""
@@ -556,6 +521,16 @@ class Surrogate:
             answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
         return answer
 
+    def evaluate_case(
+        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
+    ) -> tuple[float, float, float, int]:
+        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats, k = inf for rigid contact.
+
+        An illegal case gives NaN and -1.
+        """
+        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
+        return mu_macro, mu_ratio, bound, int(source)
+
     def _evaluate(
         self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str, kind: Kind = SPRING
     ) -> Any:
@@ -565,10 +540,10 @@ class Surrogate:
         if unknown:
             raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(kind.fields)} or f")
         if cases is not None:
-            picked = _picked(cases, kind.columns)
-            if twice := picked.keys() & inputs.keys():
+            found = picked("cases", cases, (*kind.columns, *ENDS))
+            if twice := found.keys() & inputs.keys():
                 raise InputError(min(twice), inputs[min(twice)], "given once: in the cases or as a keyword")
-            inputs = {**picked, **inputs}
+            inputs = {**found, **inputs}
         inputs = kind.as_six({name: _from_arrow(x) for name, x in inputs.items()})
         interval = not inputs.keys().isdisjoint(("k_range", *ENDS))
         if interval:
@@ -617,9 +592,8 @@ class Surrogate:
             float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape) for c in columns
         ]
         found, source = batch.cases(
-            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3,
-            None if kind == SPRING else kind,
-        )  # fmt: skip
+            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3, kind
+        )
         rows = found.reshape(len(found), *shape)
         answer: Answer[Array] = (AnswerWithGradient if gradient else Answer)(
             rows[0], rows[1], rows[2], source.reshape(shape)
@@ -639,11 +613,10 @@ class Surrogate:
         """``answer`` for the middle of an interval of k, and the extremes over it."""
         shape = answer.mu_macro.shape
         flat = {name: _flat(column, shape) for name, column in columns.items()}
-        data, code = self._data_of(kind), None if kind == SPRING else kind
 
         def evaluate(k: Array, places: Places) -> tuple[Array, Array, Array]:
             six = [_contiguous(k if name == "k" else column[places]) for name, column in flat.items()]
-            rows = batch.cases(data, six, k.size, self.threads, 17, code)[0]
+            rows = batch.cases(self._data_of(kind), six, k.size, self.threads, 17, kind)[0]
             return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k
 
         low, high, bound = extremes(evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends))
@@ -707,28 +680,16 @@ def _bundled(tolerance: float | None) -> Path:
     return tables[max(fit)]
 
 
+@functools.cache  # a worker gets the same surrogate with every task
 def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
     """Unpickle: from the bytes, or from the bundled table of that name."""
-    key = path, checksum, threads
-    if key not in _reopened:  # a worker gets the same surrogate with every task
-        _reopened[key] = _reopen_anew(path, checksum, threads, image)
-    return _reopened[key]
-
-
-_reopened: dict[tuple[str, str, int | None], Surrogate] = {}
-
-
-def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
     if image is not None:
-        return Surrogate(parse_table(image, path), path, threads, image)
-    found = next((table for table in bundled_tables() if table.name == path), Path(path))
-    surrogate = Surrogate.open(found, threads)
-    if surrogate.checksum != checksum:
-        raise TableError(
-            found, f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}: "
-            "install the same release on both sides"
-        )  # fmt: skip
-    return surrogate
+        return Surrogate._of_image(image, Path(path), threads)
+    found = Surrogate.open(next((table for table in bundled_tables() if table.name == path), path), threads)
+    if found.checksum != checksum:
+        told = f"holds {found.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
+        raise TableError(found.path, f"{told}: install the same release on both sides")
+    return found
 
 
 def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
@@ -741,25 +702,6 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
         )  # fmt: skip
     except (KeyError, TypeError, OverflowError):
         return None
-
-
-def _picked(cases: Any, columns: Sequence[str]) -> dict[str, Any]:
-    """The inputs among the columns of a mapping, a data frame, an Arrow table or stream, or a Dataset."""
-    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a query of DuckDB
-        import pyarrow as pa  # its columns come from one reading: a second one may have another order
-
-        cases = pa.table(cases)
-    try:
-        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
-        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
-        picked = {name: cases[name] for name in (*columns, *ENDS) if name in there}
-    except (AttributeError, TypeError, KeyError) as error:
-        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
-        raise InputError(
-            "cases", kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
-            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
-        ) from error  # fmt: skip
-    return picked
 
 
 _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
@@ -780,11 +722,9 @@ def _from_arrow(x: Any) -> Any:
     return np.asarray(x) if arrow and not _labels(x) else x
 
 
-def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:
-    if source == -1:
-        if not v[0] >= 0.0:
-            raise InputError("v_tilde", float(v[0]), ">= 0")
-        raise InputError("y_tilde", float(y[0]), bound)
+def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
+    """The error of a single point; ``bound`` is that of y~."""
+    return InputError("y_tilde", float(y[0]), bound) if v[0] >= 0.0 else InputError("v_tilde", float(v[0]), ">= 0")
 
 
 def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
@@ -807,9 +747,7 @@ def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
 def _common_shape(arrays: Sequence[Array]) -> tuple[int, ...]:
     """The shape to which arrays broadcast; ValueError where they do not."""
     shapes = {array.shape for array in arrays} - {()}
-    if len(shapes) > 1:
-        return np.broadcast_shapes(*shapes)
-    return shapes.pop() if shapes else ()
+    return np.broadcast_shapes(*shapes) if len(shapes) > 1 else shapes.pop() if shapes else ()
 
 
 def _contiguous(a: Array) -> Array:

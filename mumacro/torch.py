@@ -10,7 +10,7 @@ from mumacro import batch
 from mumacro.charts import QUANTITY_NAMES
 from mumacro.extras import missing
 from mumacro.interop.derivatives import NO_THIRD, DifferentiableFriction, slopes_by_groups
-from mumacro.library import Data
+from mumacro.library import Data, kernels
 from mumacro.surrogate import Surrogate
 
 try:
@@ -103,7 +103,7 @@ def _on_host(x: Any, table: int, code: int, order: int) -> Any:
     elif order == 0:
         found = batch.alone(code, data, rows[0], rows[1], threads)
     else:
-        found = batch.derivatives(code, data, rows[0], rows[1], order)
+        found = kernels[-1].derivatives(data, code, rows[0], rows[1], order)
     return torch.from_numpy(found.reshape(found.shape[:-1] + shape)).to(x.device)
 
 

@@ -42,10 +42,7 @@ def put(growing: Path, path: Path) -> None:
 def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
     """Write a file under another name beside its place, to the disk, and rename it.
 
-    Raises
-    ------
-    OSError
-        No such folder, no permission, no space; nothing is left behind, and an older file stays.
+    OSError leaves nothing behind, and an older file stays.
     """
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".growing")
     try:
@@ -60,16 +57,9 @@ def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Make a folder and have it to oneself; one that is empty at the end goes away.
+    """Make a folder and have it to oneself, or BusyError; one that is empty at the end goes away.
 
     The system releases it when the process ends, in any way.
-
-    Raises
-    ------
-    BusyError
-        Another process has it.
-    OSError
-        The folder cannot be made.
     """
     while True:
         folder.mkdir(exist_ok=True)

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mumacro.answer import IntervalAnswer
+from mumacro.answer import BAND
 from mumacro.arrays import Array, Bools, Codes
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
@@ -26,7 +26,6 @@ from mumacro.tabular import TOO_LARGE, absent, find_heads, meant_by, read_cell
 
 #: columns that are added
 ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
-BAND = IntervalAnswer.__slots__  # beside mu_macro, of an interval of k
 #: of a row without a result: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema([("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())])
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mumacro.answer import Answer, IntervalAnswer
+from mumacro.answer import BAND, Answer, IntervalAnswer
 from mumacro.charts import REGIMES
 from mumacro.contact import AMPLITUDE, Kind
 from mumacro.errors import InputError
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from mumacro.surrogate import Surrogate
 
 _GROUPS = ("v_tilde", "y_tilde", "length_scale")
-_ENDS = ("mu_macro_low", "mu_macro_high")
 #: name -> units and long_name, as xarray and CF write them
 _ABOUT = {
     "mu_macro": ("1", "macroscopic friction coefficient"),
@@ -80,7 +79,7 @@ def evaluate_labelled(
             raise InputError(name, type(value).__name__, "a Dask array: .to_dask_array(lengths=True)")
     gradient, groups = options["gradient"], options["groups"] or options["gradient"]
     slopes = [f"d_mu_macro_d_{name}{end}" for end in ("", "_bound") for name in kind.fields] if gradient else []
-    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(_ENDS if interval else ())]
+    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(BAND if interval else ())]
     names += [*(_GROUPS if groups else ()), *slopes]
 
     def chunk(*values: Any) -> list[Any]:
@@ -102,7 +101,7 @@ def evaluate_labelled(
 
     mu_macro, mu_ratio, bound, code = (found[name] for name in names[:4])
     answer: Any = (IntervalAnswer if interval else Answer)(mu_macro, mu_ratio, bound, code, look_up=look_up)
-    for name in _ENDS if interval else ():
+    for name in BAND if interval else ():
         setattr(answer, name, found[name])
     if groups:
         answer._groups, answer._certain = (found["v_tilde"], found["y_tilde"], found["length_scale"]), certain
@@ -111,7 +110,7 @@ def evaluate_labelled(
         answer.gradient_bound = {name: found[f"d_mu_macro_d_{name}_bound"] for name in kind.fields}
     if kinds[""] not in ("pandas", "xarray"):
         return answer
-    shown = ("mu_macro", *(_ENDS if interval else ()), "mu_ratio", "regime", "error_bound", "source")
+    shown = ("mu_macro", *(BAND if interval else ()), "mu_ratio", "regime", "error_bound", "source")
     columns = {name: getattr(answer, name) for name in shown}
     whole = importlib.import_module(kinds[""])
     return whole.DataFrame(columns) if library == "pandas" else whole.Dataset(columns)

@@ -97,15 +97,9 @@ class Crossing:
 
 
 def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
-    """The five known inputs [SI]; an infinite ``k`` is rigid contact.
+    """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an infinite ``k`` is rigid.
 
-    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.  The amplitude is
-    ``Fz_amplitude`` [N] for direction normal, ``y0`` [m] otherwise.
-
-    Raises
-    ------
-    InputError
-        A value is missing, not one number, out of bounds, given twice, or given for the unknown; an interval of k.
+    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.
     """
     if without not in kind.fields:
         raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")

@@ -40,8 +40,7 @@ class Sweep:
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""
-        out: Array = self.answer(x).mu_macro
-        return out
+        return np.asarray(self.answer(x).mu_macro)
 
     def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
         """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
@@ -76,8 +75,7 @@ class Curve:
     def holds(self, level: Array) -> Bools:
         """Which of the levels (n,) lie between the ends of the piece, these included."""
         low, high = sorted((float(self.mu[0]), float(self.mu[-1])))
-        out: Bools = (level >= low) & (level <= high)
-        return out
+        return np.asarray((level >= low) & (level <= high))
 
     def end(self) -> float:
         """Where the piece first has its last value: at its end, or where the plateau begins that ends it."""
@@ -172,15 +170,8 @@ def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
     """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
 
     For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like the integers
-    with the same bits, so this ends at two neighbours, whatever the scale.
-
-    Parameters
-    ----------
-    below : callable
-        Array (n, m) in, array of bool (n, m) out, row i for bracket i; true at ``low``, false at ``high``, monotone
-        in between.
-    low, high : array_like
-        Ends of the brackets, >= 0, shape (n,).
+    with the same bits, so this ends at two neighbours, whatever the scale.  ``below`` maps (n, m) values, row i for
+    bracket i, to bool; from true at ``low`` (n,) to false at ``high`` it changes once.
     """
     a, b = _ordered(low).copy(), _ordered(high).copy()
     rows = np.arange(a.size)
