@@ -146,16 +146,6 @@ def block_rows(blocks: Sequence[Block]) -> Array:
     return rows
 
 
-@functools.cache
-def _older() -> Array:
-    """What the errors of slopes of an older table are multiplied by to stand for those of cells (3,).
-
-    They hold for q and its derivatives together, anywhere in a block; of a cell's errors derivatives have a share.
-    """
-    least = min(share.min() for share in kernels[-1].cell_shares(np.linspace(-1.0, 1.0, 201)))
-    return np.array([1.0, 1.0 / least, 1.0 / least])
-
-
 def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
     """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors in every cell."""
     name, errors = charts.QUANTITY_NAMES[quantity], np.zeros((len(charts.SOURCES) + 1, 2))
@@ -166,11 +156,10 @@ def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array
         patches.append(
             np.zeros((cells, WIDTH, WIDTH)) if nodes is None else cells_2d(chart.a, chart.b, nodes, block.cells)
         )
-        value, *of_slopes = block.errors[name]
-        error[0] = value
+        error[0] = block.errors[name][0]
         if quantity == charts.MU:
             error += chart.rounding, chart.floor
-        in_cells.append(block.cell_errors.get(name, np.full((cells, 3), max(of_slopes)) * _older()))
+        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))  # none where it is zero
     return _joined(patches), errors, np.concatenate(in_cells)
 
 

@@ -48,7 +48,6 @@ _PLAIN = {
     "error_estimate": ("estimated absolute error of mu_ratio", ("v_tilde", "y_tilde")),
     "v_tilde_crit": ("border of continuous sliding: smallest dimensionless speed without stick", ("y_tilde",)),
 }  # fmt: skip
-FIRST_QUANTITIES = "mu_ratio power stick_fraction"  # of a file that does not name its quantities
 CELL_AXES = ("quantity", "cell", "derivative")
 _NAMED = {quantity.name: quantity for quantity in charts.QUANTITIES}
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
@@ -74,9 +73,9 @@ class Block:
         Node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity is zero.
     errors : dict of str to ndarray
         By quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a and b, over the whole
-        block.  In older tables the last two bound what all three together do to a slope along ln v~ and ln y~.
+        block.
     cell_errors : dict of str to ndarray
-        The same for every cell (cells, 3), in the order of the cells, for slopes; older tables have none.
+        The same for every cell (cells, 3), in the order of the cells, for slopes.
     max_abs_error, max_rel_error : float
         The largest errors of mu~ found.
     """
@@ -116,7 +115,7 @@ class Table:
 
 
 def _names(attributes: dict[str, Any]) -> list[str]:
-    return str(attributes.get("quantities", FIRST_QUANTITIES)).split()
+    return str(attributes.get("quantities")).split()
 
 
 def _digest(table: Table) -> str:
@@ -125,11 +124,8 @@ def _digest(table: Table) -> str:
 
     def put(*parts: object) -> None:
         for part in parts:
-            h.update(
-                np.ascontiguousarray(part, dtype="<f8").tobytes()
-                if isinstance(part, np.ndarray)
-                else repr(part).encode()
-            )
+            is_array = isinstance(part, np.ndarray)
+            h.update(np.ascontiguousarray(part, dtype="<f8").tobytes() if is_array else repr(part).encode())
 
     put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
     put(*(getattr(table, name) for name in _PLAIN))
@@ -213,10 +209,7 @@ def _fill(root: Any, table: Table) -> None:
 def write_table(table: Table, path: str | Path) -> str:
     """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
 
-    Raises
-    ------
-    TableError
-        When the folder does not exist or cannot be written, or the disk is full; nothing is left behind.
+    TableError where the folder does not exist or cannot be written, or the disk is full; nothing is left behind.
     """
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
@@ -282,10 +275,11 @@ def _error(group: hdf5.Group, name: str) -> float:
     return float(_errors(group, name, group.numbers(name, 1))[0])
 
 
-def _check_same(group: hdf5.Group, name: str, wanted: object) -> None:
+def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
     found = group.attribute(name)
-    if not np.array_equal(found, np.asarray(wanted)):
-        raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {wanted!r}")
+    if not np.array_equal(found, wanted):
+        told = wanted.tolist() if isinstance(wanted, np.ndarray) else wanted
+        raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {told!r}")
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
@@ -320,7 +314,7 @@ def _border_piece(group: hdf5.Group, axis: charts.Axis) -> BorderPiece:
 
 def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
     for name, wanted in _geometry(chart).items():
-        _check_same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
+        _check_same(group, name, wanted)
     a, b = _nodes(group, chart.a), _nodes(group, chart.b)
     quantities = [_NAMED[name] for name in names if chart.holds(_NAMED[name])]
     found = {one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities}
@@ -333,9 +327,6 @@ def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
 
 
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
-    """The errors in every cell, which older tables have for whole blocks only."""
-    if not group.holds("cell_errors"):
-        return
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
     found = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
     for name, errors in zip(names, _errors(group, "cell_errors", found), strict=True):
@@ -364,20 +355,6 @@ def _read(root: hdf5.Group) -> Table:
     return Table(border=border, blocks=blocks, attributes=attributes, **plain)
 
 
-def parse_table(image: bytes, path: str | Path) -> Table:
-    """Read and check the bytes of a table file; ``path`` names it in errors.  See :func:`read_table`."""
-    try:
-        table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
-        digest = _digest(table)
-    except TableError:
-        raise
-    except Exception as error:  # h5py raises nearly any exception
-        raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
-    if digest != table.attributes["content_sha256"]:
-        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
-    return table
-
-
 def read_table(path: str | Path) -> Table:
     """Read and check a table file; several threads may do so at once.
 
@@ -390,14 +367,22 @@ def read_table(path: str | Path) -> Table:
     return parse_table(read_image(path), path)
 
 
-def read_image(path: str | Path) -> bytes:
-    """The bytes of a table file.
+def parse_table(image: bytes, path: str | Path) -> Table:
+    """As :func:`read_table`, from the bytes of the file; ``path`` names it in errors."""
+    try:
+        table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
+        digest = _digest(table)
+    except TableError:
+        raise
+    except Exception as error:  # h5py raises nearly any exception
+        raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
+    if digest != table.attributes["content_sha256"]:
+        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
+    return table
 
-    Raises
-    ------
-    TableError
-        Missing, unreadable, or larger than any table.
-    """
+
+def read_image(path: str | Path) -> bytes:
+    """The bytes of a table file; TableError where it is missing, unreadable, or larger than any table."""
     path = Path(path)
     try:
         if not path.is_file():
