@@ -4,8 +4,6 @@ Exit codes: 0 done, 1 no result is possible (a table, a file, a package, a targe
 arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
 """
 
-from __future__ import annotations
-
 import difflib
 import importlib
 import os

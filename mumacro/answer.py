@@ -1,7 +1,5 @@
 """The result of the surrogate for one case or many."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic

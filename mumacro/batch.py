@@ -4,8 +4,6 @@ The kernel releases the interpreter's lock, so several threads can work at once.
 forked process works and no call waits for another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 

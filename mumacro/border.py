@@ -1,7 +1,5 @@
 """The border of continuous sliding, v~crit(y~): the stored curve inside, its limits at both ends."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The bundled tables: inside the package when installed, in ``tables/`` of a checkout."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent

@@ -6,8 +6,6 @@ into cells; each cell holds a polynomial of degree 7 in both local coordinates u
 coefficients.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence
@@ -125,7 +123,7 @@ def _joined(patches: Sequence[Array]) -> Array:
     return np.concatenate(patches, out=raw[skip : skip + math.prod(shape)].reshape(shape))
 
 
-def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
+def border_cells(pieces: Sequence["BorderPiece"]) -> tuple[Array, Array]:
     """The stored border for evaluation: coefficients (cells, WIDTH) and pieces (3, PIECE_COLUMNS)."""
     coefficients, rows, first = [], np.zeros((len(pieces), PIECE_COLUMNS)), 0
     worst = max(piece.max_rel_error for piece in pieces)
@@ -136,7 +134,7 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     return np.concatenate(coefficients), rows
 
 
-def block_rows(blocks: Sequence[Block]) -> Array:
+def block_rows(blocks: Sequence["Block"]) -> Array:
     """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
     rows, first = np.zeros((len(charts.SOURCES) + 1, BLOCK_COLUMNS)), 0
     for row, chart, block in zip(rows, charts.CHARTS, blocks, strict=False):
@@ -146,7 +144,7 @@ def block_rows(blocks: Sequence[Block]) -> Array:
     return rows
 
 
-def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
+def quantity_cells(blocks: Sequence["Block"], quantity: int) -> tuple[Array, Array, Array]:
     """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors in every cell."""
     name, errors = charts.QUANTITY_NAMES[quantity], np.zeros((len(charts.SOURCES) + 1, 2))
     patches, in_cells = [], []

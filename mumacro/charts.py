@@ -7,8 +7,6 @@ Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0
 The stick fraction f is the share of the period during which the contact sticks.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -94,6 +92,20 @@ class Axis:
 
 
 @dataclass(frozen=True)
+class Quantity:
+    """One tabulated quantity: name, variable in a block of a table file, meaning.
+
+    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a jump there.
+    """
+
+    name: str
+    variable: str
+    meaning: str
+    while_sliding: bool
+    smooth_at_border: bool
+
+
+@dataclass(frozen=True)
 class Chart:
     """One block: name, regime, coordinates with their ranges, and what its nodes hold for mu~.
 
@@ -134,20 +146,6 @@ class Chart:
     def holds(self, quantity: Quantity) -> bool:
         """Whether the block tabulates a quantity; elsewhere it is zero."""
         return self.regime != CONTINUOUS or quantity.while_sliding
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One tabulated quantity: name, variable in a block of a table file, meaning.
-
-    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a jump there.
-    """
-
-    name: str
-    variable: str
-    meaning: str
-    while_sliding: bool
-    smooth_at_border: bool
 
 
 def _axis(found: Any) -> Axis:

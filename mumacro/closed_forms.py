@@ -13,8 +13,6 @@ References
 Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations", Friction (2018).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

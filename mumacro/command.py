@@ -1,7 +1,5 @@
 """What all commands share: one look of the arguments, exit codes, cases and tables as a person writes them."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

@@ -7,8 +7,6 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 ``kernel/directions.c``; here are the names, and the rules of quadrature, which grow with the table's tolerance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Literal, NamedTuple

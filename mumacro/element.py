@@ -11,11 +11,9 @@ V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics a
 J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert space", J. Differ. Equ. 26 (1977) 347.
 """
 
-from __future__ import annotations
-
 import copy
 import math
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -155,7 +153,7 @@ class Element:
         """Relax all springs: no force."""
         self._forces[...] = 0.0
 
-    def copy(self) -> Element:
+    def copy(self) -> Self:
         """Another element with the same parameters and its own state."""
         return copy.deepcopy(self)
 

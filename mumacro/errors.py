@@ -1,7 +1,5 @@
 """The exceptions of the project.  They are independent of HTTP."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

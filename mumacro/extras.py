@@ -1,7 +1,5 @@
 """What to install when a package is missing that only one part of the project needs."""
 
-from __future__ import annotations
-
 _OURS = ("mumacro", "builder", "service")
 
 

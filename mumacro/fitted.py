@@ -1,7 +1,5 @@
 """What measured points say about a contact: the result of :func:`mumacro.fit`, and its picture."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

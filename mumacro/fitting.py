@@ -5,8 +5,6 @@ every minimum, the limits of a soft and of a rigid contact, and the ranges that 
 refined by :func:`scipy.optimize.least_squares`.  Needs scipy, a plot matplotlib.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import warnings

@@ -3,8 +3,6 @@
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 

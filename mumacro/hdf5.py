@@ -5,8 +5,6 @@ unpacks data beyond their declared size.  Here only the requested parts are read
 memory is taken, and numbers are unpacked up to the size that they have.
 """
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Callable
@@ -25,14 +23,6 @@ MOST_TEXT = 65_536  # bytes of an attribute
 MOST_ITEMS = 64  # numbers of an attribute
 MOST_GROUPS = 256  # in a group whose groups are listed
 _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
-
-
-def open_image(image: bytes, refuse: Refuse) -> Group:
-    """The root of a file in memory; ``refuse`` makes the exception that is raised from a reason.
-
-    h5py raises nearly any exception where the bytes are no HDF5.
-    """
-    return Group(h5g.open(h5f.open_file_image(image), b"/"), "/", len(image), refuse)
 
 
 class Group:
@@ -54,7 +44,7 @@ class Group:
             raise self.refuse(f"{name!r} in {self.path} is no {what}")
         return found
 
-    def group(self, name: str) -> Group:
+    def group(self, name: str) -> "Group":
         """A group in this one."""
         path = f"{self.path.rstrip('/')}/{name}"
         return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
@@ -143,3 +133,11 @@ class Group:
         if h5z.FILTER_SHUFFLE in filters:
             raw = np.ascontiguousarray(raw.reshape(8, -1).T)
         return raw.view(np.dtype("<f8")).reshape(found.shape).astype(np.float64)
+
+
+def open_image(image: bytes, refuse: Refuse) -> Group:
+    """The root of a file in memory; ``refuse`` makes the exception that is raised from a reason.
+
+    h5py raises nearly any exception where the bytes are no HDF5.
+    """
+    return Group(h5g.open(h5f.open_file_image(image), b"/"), "/", len(image), refuse)

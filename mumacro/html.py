@@ -1,7 +1,5 @@
 """Small tables for notebooks."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Iterable
 

@@ -7,8 +7,6 @@ is always said: a number, or rigid contact by infinity, by the word ``rigid``, o
 **A gap is never rigid**: an empty cell, null or NaN in a column ``k`` makes its case illegal, see :data:`GAP`.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 import re

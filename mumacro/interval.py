@@ -6,8 +6,6 @@ changes its sign between two samples, bisection finds them.  Both turns begin in
 y~ = 9.72 v~, so they may stand between two samples, which the cubic through these then shows.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Friction inside JAX programs: the compiled kernel, called by XLA itself.  Needs the extra ``jax``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

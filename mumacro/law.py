@@ -1,7 +1,5 @@
 """The friction law: mu_macro over a range of v0, or of any one input, with its marks and the paper's approximations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel
 processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path

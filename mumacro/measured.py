@@ -1,7 +1,5 @@
 """Measured points of friction: their columns, checked, and the model at them; for :mod:`mumacro.fitting`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ The service serves it, and ``python -m builder.export_page`` writes it into a fo
 ``service/static/page``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

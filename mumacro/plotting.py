@@ -1,25 +1,21 @@
 """Pictures of a law, of the map of mu~ and of answers, by matplotlib, which is loaded at the first of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mumacro.answer import Answer
 from mumacro.charts import REGIMES
 from mumacro.contact import AMPLITUDE, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
 from mumacro.extras import missing
 from mumacro.inputs import unit_of
-
-if TYPE_CHECKING:
-    from mumacro.answer import Answer
-    from mumacro.inverse import Crossing
-    from mumacro.law import Law
-    from mumacro.surrogate import Surrogate
+from mumacro.inverse import Crossing
+from mumacro.law import Law
+from mumacro.surrogate import Surrogate
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding

@@ -1,7 +1,5 @@
 """``mumacro fit``: k and mu0 from measured points in a file."""
 
-from __future__ import annotations
-
 import csv
 import math
 import sys

@@ -1,7 +1,5 @@
 """How many processors there are for this process, and how many threads a call may start by default."""
 
-from __future__ import annotations
-
 import functools
 import multiprocessing
 import os

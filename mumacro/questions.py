@@ -1,7 +1,5 @@
 """The commands that answer more than one case: ``mumacro law``, ``solve-for``, ``map`` and ``stiffness``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict

@@ -19,8 +19,6 @@ Both are tabulated, with bounds.  The springs of a ball are independent, and S r
 (60 rays from y~/v~ = 1e-4 to 1e6), so the middle one is the slowest: that of the smallest k, two thirds of the mean.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -27,8 +27,6 @@ K. L. Johnson, "Contact Mechanics", Cambridge University Press (1985), Secs. 4.2
 V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2, 8.2; its G* is four times the one here.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,13 +1,11 @@
 """The surrogate for users.  Value, regime, source, gradient, power and stick fraction, each with its bound."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,7 +67,7 @@ class Surrogate:
         self._pointer = self._data.pointer
 
     @classmethod
-    def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Surrogate:
+    def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Self:
         """Read, check and prepare a table.
 
         Parameters
@@ -102,7 +100,7 @@ class Surrogate:
         return cls._of_image(read_image(path), path, threads)
 
     @classmethod
-    def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Surrogate:
+    def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Self:
         found = cls(parse_table(image, path), path, threads)
         found._image = image
         return found
@@ -127,7 +125,7 @@ class Surrogate:
 
         return plot_map(self, axes, **more)
 
-    def on_one_thread(self) -> Surrogate:
+    def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__, _asked_threads=1)

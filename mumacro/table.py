@@ -12,8 +12,6 @@ The netCDF library writes, and is not thread-safe: a lock is held while it works
 ``mumacro.hdf5``.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tempfile

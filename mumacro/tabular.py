@@ -1,7 +1,5 @@
 """Tables with a head: separator and decimal sign of CSV, which column is which input, its unit, cells as numbers."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

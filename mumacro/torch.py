@@ -1,7 +1,5 @@
 """Friction inside PyTorch programs: a custom operator on the compiled kernel.  Needs the extra ``torch``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

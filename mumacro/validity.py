@@ -5,8 +5,6 @@ question, and mostly the larger one.  Two assumptions cannot be judged from the 
 quasi-static contact, which needs masses, and a stiff drive.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, TypedDict

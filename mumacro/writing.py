@@ -1,7 +1,5 @@
 """Files that are either complete or absent, and folders that one process has locked."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 Columns that are named like a missing input are refused.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

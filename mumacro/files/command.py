@@ -1,7 +1,5 @@
 """``mumacro eval``: files of cases from the command line."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 import tempfile

@@ -3,8 +3,6 @@
 Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else stays text.
 """
 
-from __future__ import annotations
-
 import csv
 import glob
 import gzip

@@ -6,8 +6,6 @@ the note itself.  Pieces that fit their notes are kept; what follows them is don
 ``OUT.run.json`` stays: it tells what the output was made of, so that the same command finds it complete.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Evaluated batches as pieces of a file: CSV, NDJSON, or Arrow streams, of which a Parquet file is made at the end."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io

@@ -1,7 +1,5 @@
 """What the classes for JAX and PyTorch share: the quantities by name, open tables, mu_macro as a function of groups."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from threading import Lock

@@ -3,12 +3,10 @@
 The inputs of one call come from one of these libraries, with plain numbers and NumPy arrays beside them.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +15,7 @@ from mumacro.charts import REGIMES
 from mumacro.contact import AMPLITUDE, Kind
 from mumacro.errors import InputError
 from mumacro.inputs import PER_UNIT
-
-if TYPE_CHECKING:
-    from mumacro.surrogate import Surrogate
+from mumacro.surrogate import Surrogate
 
 _GROUPS = ("v_tilde", "y_tilde", "length_scale")
 #: name -> units and long_name, as xarray and CF write them

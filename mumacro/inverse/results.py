@@ -1,7 +1,5 @@
 """The results of the inverse problem, and the case that it is solved for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -6,8 +6,6 @@ bracket, that has no finite slope (plateaus, the cusp of the static limit at y~ 
 step is replaced by halving the bracket: by its geometric mean, so that any scale is reached.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

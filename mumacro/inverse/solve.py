@@ -24,8 +24,6 @@ springs slide all the time.  There mu_macro falls with k and rises with Fz (alon
 How a level is found on a monotone piece: :mod:`mumacro.inverse.rootfinding`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace
