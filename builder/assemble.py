@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.border import Border
+from mumacro.cells import Border
 from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
 from mumacro.table import Block, Table, write_table
 from mumacro.version import __version__

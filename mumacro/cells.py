@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from mumacro import charts
 from mumacro.arrays import Array
 from mumacro.charts import Axis
-from mumacro.library import BLOCK_COLUMNS, PIECE_COLUMNS, kernels
+from mumacro.library import BLOCK_COLUMNS, PIECE_COLUMNS, Data, kernels
 
 if TYPE_CHECKING:
     from mumacro.table import Block, BorderPiece
@@ -169,3 +169,24 @@ def outer_cells() -> Array:
     r = np.sqrt(np.expm1((np.arange(cells)[:, None] + 0.5 + 0.5 * LOCAL) * top / cells))
     f, g, slope, _, _ = kernel.outer_expansion(r.ravel()).T
     return np.stack([_to_powers(x.reshape(cells, WIDTH)) for x in (f, g + 0.5 * slope)], axis=1)
+
+
+class Border:
+    """The border of continuous sliding, v~crit(y~): the stored curve inside, its limits at both ends.
+
+    Attributes
+    ----------
+    arrays : tuple of ndarray
+        What the kernel reads: coefficients (cells, 8) and pieces (3, PIECE_COLUMNS).
+    max_rel_error : float
+        Verified bound of the stored curve's relative error.
+    """
+
+    def __init__(self, pieces: Sequence["BorderPiece"]) -> None:
+        self.arrays: tuple[Array, Array] = border_cells(pieces)
+        self.max_rel_error = max(piece.max_rel_error for piece in pieces)
+        self._data = Data(*self.arrays, np.zeros((len(charts.SOURCES) + 1, BLOCK_COLUMNS)), outer_cells())
+
+    def __call__(self, y: Array) -> Array:
+        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN for what is no amplitude."""
+        return kernels[-1].border(self._data, np.ascontiguousarray(y).reshape(-1)).reshape(y.shape)

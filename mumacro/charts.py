@@ -152,9 +152,9 @@ def _axis(found: Any) -> Axis:
     return Axis(_text(found.name), found.low, found.high)
 
 
-def _quantity(found: Any) -> Quantity:
-    name, variable, meaning = map(_text, (found.name, found.variable, found.meaning))
-    return Quantity(name, variable, meaning, bool(found.while_sliding), bool(found.smooth_at_border))
+def _quantity(q: Any) -> Quantity:
+    said = _text(q.name), _text(q.variable), _text(q.meaning)
+    return Quantity(*said, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
 #: a block's place in this list is the source code of its values

@@ -83,7 +83,7 @@ class Element:
             shapes = {name: column.shape for name, column in columns.items()}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         self.contact, self.springs, self.shape = contact, springs, k_.shape
-        self._mu0, self._k = np.ascontiguousarray(mu0_).reshape(-1), np.ascontiguousarray(k_).reshape(-1)
+        self._mu0, self._k = mu0_.ravel(), k_.ravel()
         self._limit = self._limits(Fz_)
         self._forces = np.zeros((self._k.size, springs, 2))
 
@@ -112,7 +112,6 @@ class Element:
         --------
         The mean over a period is mu_macro Fz; the table has 2.7246 N for this case:
 
-        >>> import numpy as np
         >>> contact, omega, n = Element(mu0=0.3, Fz=10.0, k=1e6), 1.3e5, 1000
         >>> dt = 2 * np.pi / omega / n
         >>> dy = 2e-6 * np.diff(np.sin(omega * dt * np.arange(n + 1)))
@@ -178,7 +177,7 @@ class Element:
             return np.full(self._k.size, value)
         given = real(name, value)
         try:
-            array = np.ascontiguousarray(np.broadcast_to(given, self.shape)).reshape(-1)
+            array = np.broadcast_to(given, self.shape).ravel()
         except ValueError as error:
             raise InputError(name, given.shape, f"of a shape that broadcasts to the contacts' {self.shape}") from error
         if not np.isfinite(array).all():

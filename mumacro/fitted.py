@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.arrays import Array
-from mumacro.extras import missing
-from mumacro.html import html_table
 from mumacro.inputs import SI, real
 from mumacro.measured import STD, UNKNOWNS, Measured
 
@@ -81,11 +79,9 @@ class Fit:
 
         There is a curve for each set of the other inputs; more than 8 of them have no legend.
         """
-        try:
-            from matplotlib import pyplot as plt
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
-        ax = plt.subplots()[1] if ax is None else ax
+        from mumacro.plotting import own
+
+        ax = own(ax)
         given = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(given, key=lambda name: (np.unique(given[name]).size, name == "v0"))
         x, names = given[along], [name for name in self._problem.columns if name != along]
@@ -113,11 +109,6 @@ class Fit:
     def _told(self) -> list[str]:
         units = {"k": " N/m", "mu0": ""}
         return [f"{name} = {x:.4g} ± {self.std[name]:.2g}{units[name]}" for name, x in self.values.items()]
-
-    def _repr_html_(self) -> str:
-        ends = {name: f"{low:.6g} to {high:.6g}" for name, (low, high) in self.interval.items()}
-        rows = [(name, x, self.std[name], ends[name]) for name, x in self.values.items()]
-        return html_table(("", "value", "standard deviation", "95 %"), rows, notes=self.warnings)
 
     def __repr__(self) -> str:
         given = STD in self.points

@@ -25,14 +25,9 @@ _PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
 
 
 def fit(
-    data: Any,
-    unknowns: str | Sequence[str] = UNKNOWNS,
-    *,
-    contact: str = "spring",
-    direction: str = "across",
-    surrogate: Surrogate | None = None,
-    **fixed: Any,
-) -> Fit:
+    data: Any, unknowns: str | Sequence[str] = UNKNOWNS, *, contact: str = "spring", direction: str = "across",
+    surrogate: Surrogate | None = None, **fixed: Any,
+) -> Fit:  # fmt: skip
     """k and mu0 of a contact, or one of them, from measured friction.
 
     Parameters
@@ -52,7 +47,7 @@ def fit(
     Returns
     -------
     Fit
-        Values with covariance, every solution, and warnings, which are also issued by ``warnings``.
+        Its warnings are also issued by ``warnings``.
 
     Raises
     ------

@@ -25,11 +25,7 @@ class Friction(DifferentiableFriction):
 
     See :class:`mumacro.interop.derivatives.DifferentiableFriction` for arguments and accuracy.  Programs run on the
     CPU.  Where a slope is infinite (v0 = 0 at y~ = 1, and for rigid contact), ``jacfwd`` gives NaN along every input.
-
-    Raises
-    ------
-    MumacroError
-        When a function is called while JAX has no double precision.
+    A call raises MumacroError while JAX has no double precision.
 
     Examples
     --------

@@ -112,12 +112,9 @@ class Law:
 
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
-    """``points`` values from ``start`` to ``stop``, both included exactly.
+    """``points`` values from ``start`` to ``stop``, both included exactly, even on a ``scale`` "log" or "linear".
 
-    Raises
-    ------
-    InputError
-        Ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
+    InputError for ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
     """
     if along not in (*FIELDS, AMPLITUDE):
         raise InputError("along", along, f"one of {', '.join(FIELDS)}, {AMPLITUDE}")
@@ -146,7 +143,6 @@ def friction_law(
     Parameters
     ----------
     surrogate : Surrogate
-        The table to evaluate.
     along : str
         The swept input: mu0, Fz, k, y0, omega or v0; for direction normal Fz_amplitude in place of y0.
     values : ndarray
@@ -159,11 +155,6 @@ def friction_law(
     refine : bool
         Also values where mu_macro bends, for pictures: at the borders, and where a straight line between neighbours
         would be wrong by more than a thousandth of the law's height.
-
-    Returns
-    -------
-    Law
-        The results with the static limit and the borders of continuous sliding and reverse slip.
 
     Raises
     ------
@@ -196,10 +187,7 @@ def friction_law(
 def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the stated range.
 
-    Raises
-    ------
-    InputError
-        The law of a ball, or of an oscillation along or normal: the article has one spring, across.
+    InputError for a ball, and an oscillation along or normal: the article has one spring, across.
     """
     inputs = _of_one_spring(law)
     mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
@@ -215,15 +203,12 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
         share, fit_share = (np.where(v > 0.0, v / at, 0.0) for at in (border, fit_border))
         static, critical, top = closed_forms.static_limit(y), closed_forms.critical(y), surrogate.mu_ratio(border, y)
         rigid = np.where(elastic, closed_forms.outer(np.where(v > 0.0, y / v, math.inf)), law.answer.mu_ratio)
-        corner = closed_forms.corner_root(v, y - 1.0)
+        corner, limit = closed_forms.corner_root(v, y - 1.0), closed_forms.master_curve_limit(share)
         found = {
             "static": (law.mu_static, True),
             "creep": (creep, creep <= mu0),
             "master_curve": (mu0 * (static + (critical - static) * closed_forms.master_curve(fit_share)), low),
-            "master_curve_limit": (
-                mu0 * (static + (top - static) * closed_forms.master_curve_limit(share)),
-                low & (v <= border),
-            ),
+            "master_curve_limit": (mu0 * (static + (top - static) * limit), low & (v <= border)),
             "critical": (mu0 * critical, low),
             "small_amplitude": (mu0 * closed_forms.small_amplitude(v, y), low & slides),
             "continuous": (mu0 * closed_forms.continuous(v, y), slides),
@@ -236,8 +221,6 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
 def borders(y: Array) -> dict[str, Array]:
     """v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN outside the stated range.
 
-    Examples
-    --------
     >>> found = borders(np.array([0.5, 2.0]))
     >>> found["eq_24"].round(4).tolist(), found["eq_26"].round(4).tolist()
     ([0.1124, nan], [nan, 0.6667])

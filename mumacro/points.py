@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import command
-from mumacro.command import ImpossibleError, UsageError, as_json, in_columns, kind_in, open_table
+from mumacro.command import ImpossibleError, UsageError, as_json, in_columns, open_table
 from mumacro.contact import AMPLITUDE
 from mumacro.errors import InputError
 from mumacro.fitted import Fit
@@ -47,7 +47,7 @@ def fit_points(words: Sequence[str]) -> str:
     unknown, more = ([x for x in chosen.unknown if ("=" in x) == given] for given in (False, True))
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
-    kind = kind_in(chosen)
+    kind = command.kind_in(chosen)
     text = sys.stdin.read() if chosen.points == "-" else Path(chosen.points).read_text("utf-8-sig", "replace")
     points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
     there = [*unknown, *(name for name in points if name in kind.columns)]

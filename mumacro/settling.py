@@ -58,24 +58,14 @@ class Settling:
 
 
 def settling(
-    surrogate: Surrogate,
-    *,
-    mu0: ArrayLike,
-    Fz: ArrayLike,
-    k: ArrayLike | None,
-    y0: ArrayLike,
-    omega: ArrayLike,
-    v0: ArrayLike,
-    remaining: float = 0.01,
-    contact: str = "spring",
-    direction: str = "across",
-) -> Settling:
+    surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike | None, y0: ArrayLike, omega: ArrayLike,
+    v0: ArrayLike, remaining: float = 0.01, contact: str = "spring", direction: str = "across",
+) -> Settling:  # fmt: skip
     """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.
 
     Parameters
     ----------
     surrogate : Surrogate
-        The table that gives mu~ and the oscillation power.
     mu0, Fz, k, y0, omega, v0 : array_like
         The case [-, N, N/m, m, rad/s, m/s], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
@@ -83,19 +73,13 @@ def settling(
     contact : str
         "spring"; or "ball", whose slowest spring is answered for.
     direction : str
-        "across" only: the decay is not derived for the other directions.
+        "across" only, else InputError: the decay is not derived for the other directions.
 
     Returns
     -------
     Settling
         Infinite where nothing slips (v0 = 0 with y~ <= 1, or with omega = 0): a disturbance stays.  Zero for
-        rigid contact, whose friction follows at once.  NaN at an illegal case of an array, if the surrogate lets it
-        pass.
-
-    Raises
-    ------
-    InputError
-        An input out of bounds, another direction.
+        rigid contact, whose friction follows at once.  NaN at an illegal case of an array.
 
     Notes
     -----

@@ -44,17 +44,8 @@ def _positive(**values: float) -> None:
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic elastic body.
+    """An isotropic elastic body: Young's modulus E [Pa] > 0, ``math.inf`` if rigid; Poisson's ratio -1 < nu <= 0.5.
 
-    Parameters
-    ----------
-    E : float
-        Young's modulus [Pa], > 0; ``math.inf`` for a rigid body.
-    nu : float
-        Poisson's ratio [-], -1 < nu <= 0.5.
-
-    Examples
-    --------
     >>> steel = Material(E=210e9, nu=0.3)
     >>> round(steel.G / 1e9, 2)
     80.77
@@ -88,7 +79,7 @@ class Contact:
     half_width : float
         Radius of a circular contact, half width of a line contact [m].
     pressure : float
-        Largest pressure [Pa]: Hertz's, or the mean one under a flat punch.
+        Largest pressure [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge.
     contact : str
         The kind of contact that ``evaluate`` computes with this k: "spring" or "ball".
     """
@@ -131,14 +122,9 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     radius : float
         Radius of the ball [m]; of two balls 1/(1/R1 + 1/R2).
     Fz : float
-        Normal force [N].
+        Normal force [N]; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
     first, second : Material
         The two bodies.
-
-    Returns
-    -------
-    Contact
-        A "ball"; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
 
     Notes
     -----
@@ -172,11 +158,6 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
         Normal force [N]; sets the pressure only, k does not depend on it.
     first, second : Material
         The two bodies; exact for a rigid punch on a half-space.
-
-    Returns
-    -------
-    Contact
-        ``pressure`` is the mean one; at the edge it is singular in elasticity.
 
     Examples
     --------
@@ -213,11 +194,6 @@ def cylinder_on_flat(
         The two bodies.
     oscillation : str
         "across" or "along" the cylinder's axis: how the contact oscillates, whichever way it slides.
-
-    Returns
-    -------
-    Contact
-        k in the direction of the oscillation.
 
     Raises
     ------
@@ -273,12 +249,8 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
 
 
 def in_series(*stiffnesses: float) -> float:
-    """Stiffness [N/m] of springs in series, such as contact, roughness and holder: 1/k = sum of 1/k_i.
+    """Stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder; ``math.inf`` is a rigid part.
 
-    A stiffness is > 0; ``math.inf`` is a rigid part.
-
-    Examples
-    --------
     >>> round(in_series(3e6, 6e6))
     2000000
     """

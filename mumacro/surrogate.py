@@ -13,12 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from mumacro import batch, charts, closed_forms
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
 from mumacro.arrays import Array, Places
-from mumacro.border import Border
 from mumacro.bundled import bundled_tables
-from mumacro.cells import block_rows, outer_cells, quantity_cells
+from mumacro.cells import Border, block_rows, outer_cells, quantity_cells
 from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
 from mumacro.errors import InputError, TableError
-from mumacro.html import html_table
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, picked, real
 from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
@@ -114,11 +112,6 @@ class Surrogate:
     def __repr__(self) -> str:
         return f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most {self.max_abs_error:.1e}>"
 
-    def _repr_html_(self) -> str:
-        errors = f"{self.max_abs_error:.1e} absolute, {self.max_rel_error:.1e} relative"
-        rows = [("table", self.id), ("tolerance of mu~", f"{self.tolerance:g}"), ("verified error", errors)]
-        return html_table((), rows)
-
     def plot(self, axes: Any = None, **more: Any) -> Any:
         """The map of mu~, see ``mumacro.plotting.plot_map``; needs matplotlib."""
         from mumacro.plotting import plot_map
@@ -213,28 +206,14 @@ class Surrogate:
         return _shaped(found, shape)
 
     def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any, Any]:
-        """mu~ [-], the bound of its absolute error [-], and the source code (index into SOURCES).
-
-        Arguments, shapes and errors as in :meth:`mu_ratio`; ``contact`` and ``direction`` as in :meth:`quantity`.
-
-        Examples
-        --------
-        >>> mu, bound, source = Surrogate.open().ratio_with_bound(0.1, 0.5)
-        >>> round(mu, 6), bound < 1e-12, int(source)
-        (0.942004, True, 5)
-        """
+        """:meth:`quantity` of mu~: the value, the bound of its absolute error, and the source code."""
         return self.quantity("mu_ratio", v_tilde, y_tilde, **kind)
 
     def v_tilde_crit(self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across") -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
 
-        Scalar in, float out; infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.
-        For a ball all springs slide from there on; along and normal it is the amplitude itself, for normal below 1.
-
-        Raises
-        ------
-        InputError
-            A negative scalar or NaN; in an array it gives NaN.
+        Infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.  For a ball all springs slide
+        from there on; along and normal it is the amplitude itself, for normal below 1.
 
         Examples
         --------
@@ -251,34 +230,22 @@ class Surrogate:
         return _shaped(found, shape)
 
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
-        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
+        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega: :meth:`quantity` without bound.
 
-        Slip turns v~ mu~ plus this power into heat.  Arguments and errors as in :meth:`mu_ratio`; an infinite amplitude
-        gives infinite power.  The first call prepares the cells.  ``contact`` and ``direction`` as in :meth:`quantity`.
-
-        Examples
-        --------
-        >>> round(Surrogate.open().power(0.1, 0.5), 6)
-        0.012142
+        Slip turns v~ mu~ plus this power into heat.  An infinite amplitude gives infinite power.
         """
         return self.power_with_bound(v_tilde, y_tilde, **kind)[0]
 
     def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
-        """Share of the period during which the contact sticks [-], 0 to 1; arguments and errors as :meth:`power`.
-
-        Examples
-        --------
-        >>> round(Surrogate.open().stick_fraction(0.1, 0.5), 6)
-        0.224881
-        """
+        """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without bound."""
         return self.stick_fraction_with_bound(v_tilde, y_tilde, **kind)[0]
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
-        """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
+        """:meth:`power` and the bound of its absolute error."""
         return self.quantity("power", v_tilde, y_tilde, **kind)[:2]
 
     def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
-        """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
+        """:meth:`stick_fraction` and the bound of its absolute error.
 
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
@@ -522,10 +489,7 @@ class Surrogate:
     def evaluate_case(
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
     ) -> tuple[float, float, float, int]:
-        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats, k = inf for rigid contact.
-
-        An illegal case gives NaN and -1.
-        """
+        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1 if illegal."""
         mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
         return mu_macro, mu_ratio, bound, int(source)
 

@@ -39,14 +39,9 @@ def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
 
 
 def answer(
-    batch: pa.RecordBatch,
-    surrogate: Surrogate | None = None,
-    *,
-    rigid: bool = False,
-    include: Sequence[str] = (),
-    contact: str = "spring",
-    direction: str = "across",
-) -> tuple[pa.RecordBatch, pa.RecordBatch]:
+    batch: pa.RecordBatch, surrogate: Surrogate | None = None, *, rigid: bool = False, include: Sequence[str] = (),
+    contact: str = "spring", direction: str = "across",
+) -> tuple[pa.RecordBatch, pa.RecordBatch]:  # fmt: skip
     """Evaluate every case of a batch.
 
     Parameters
@@ -77,8 +72,6 @@ def answer(
     ------
     FilesError
         A column is missing, has a wrong name or no numbers.
-    InputError
-        An unknown contact or direction.
 
     Examples
     --------

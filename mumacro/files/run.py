@@ -43,20 +43,12 @@ class Summary:
 
 
 def evaluate_files(
-    given: Sequence[str | Path],
-    out: str | Path,
-    surrogate: Surrogate,
-    *,
-    rigid: bool = False,
-    include: Sequence[str] = (),
-    sep: str = ",",
-    decimal: str = ".",
-    contact: str = "spring",
-    direction: str = "across",
-    force: bool = False,
+    given: Sequence[str | Path], out: str | Path, surrogate: Surrogate, *, rigid: bool = False,
+    include: Sequence[str] = (), sep: str = ",", decimal: str = ".", contact: str = "spring",
+    direction: str = "across", force: bool = False,
     progress: Callable[[float, int, int], None] = lambda _share, _rows, _rejected: None,
     say: Callable[[str], None] = lambda _text: None,
-) -> Summary:
+) -> Summary:  # fmt: skip
     """Evaluate every case of some files.
 
     Parameters
@@ -67,7 +59,6 @@ def evaluate_files(
         A file, whose ending sets the format.  Rows keep their order; a rejected row is not in it, but in
         ``OUT.rejects.csv``.
     surrogate : Surrogate
-        The table.
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
     sep, decimal : str
@@ -79,17 +70,10 @@ def evaluate_files(
     say : callable
         Called with one line about what a resumed run found.
 
-    Returns
-    -------
-    Summary
-        What was done.
-
     Raises
     ------
     FilesError
         An input or output that cannot be used, or an input that changed meanwhile; names it, with the remedy.
-    InputError
-        An unknown contact or direction.
     BusyError
         Another run writes the same output.
 

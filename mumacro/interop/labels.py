@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import BAND, Answer, IntervalAnswer
+from mumacro.answer import BAND, GROUPS, Answer, IntervalAnswer
 from mumacro.charts import REGIMES
 from mumacro.contact import AMPLITUDE, Kind
 from mumacro.errors import InputError
 from mumacro.inputs import PER_UNIT
 from mumacro.surrogate import Surrogate
 
-_GROUPS = ("v_tilde", "y_tilde", "length_scale")
 #: name -> units and long_name, as xarray and CF write them
 _ABOUT = {
     "mu_macro": ("1", "macroscopic friction coefficient"),
@@ -48,17 +47,10 @@ def evaluate_labelled(
 ) -> Any:
     """:meth:`mumacro.Surrogate.evaluate` for labelled inputs, ``options`` are its other keywords.
 
-    Returns
-    -------
-    Answer, DataFrame of pandas or Dask, or xarray.Dataset
-        An answer whose attributes are Series, DataArrays or Dask arrays, by their names, for xarray with ``units`` and
-        ``long_name``; for a DataFrame or Dataset of cases one of these, with the columns mu_macro, mu_ratio, regime,
-        error_bound and source (regime and source of pandas as categories).
-
-    Raises
-    ------
-    InputError
-        Series whose indexes differ, objects of two libraries in one call, and what ``evaluate`` refuses.
+    An answer whose attributes are Series, DataArrays or Dask arrays, by their names, for xarray with ``units`` and
+    ``long_name``; for a DataFrame or Dataset of cases one of these, with the columns mu_macro, mu_ratio, regime,
+    error_bound and source (regime and source of pandas as categories).  InputError for Series whose indexes differ,
+    objects of two libraries in one call, and what ``evaluate`` refuses.
     """
     given = {name: math.inf if name == "k" and value is None else value for name, value in inputs.items()}
     kinds = {name: type(value).__module__.partition(".")[0] for name, value in {"": cases, **given}.items()}
@@ -76,7 +68,7 @@ def evaluate_labelled(
     gradient, groups = options["gradient"], options["groups"] or options["gradient"]
     slopes = [f"d_mu_macro_d_{name}{end}" for end in ("", "_bound") for name in kind.fields] if gradient else []
     names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(BAND if interval else ())]
-    names += [*(_GROUPS if groups else ()), *slopes]
+    names += [*(GROUPS if groups else ()), *slopes]
 
     def chunk(*values: Any) -> list[Any]:
         found = table.evaluate(dict(zip(given, values, strict=True)), **options)

@@ -57,21 +57,14 @@ _Y_CLOSEST = 1.290791
 
 
 def solve_for(
-    surrogate: Surrogate,
-    unknown: str,
-    targets: ArrayLike,
-    case: Mapping[str, float | None],
-    within: tuple[float, float] | None = None,
-    *,
-    contact: str = "spring",
-    direction: str = "across",
-) -> Solution:
+    surrogate: Surrogate, unknown: str, targets: ArrayLike, case: Mapping[str, float | None],
+    within: tuple[float, float] | None = None, *, contact: str = "spring", direction: str = "across",
+) -> Solution:  # fmt: skip
     """Every value of one input at which mu_macro has the wanted value.
 
     Parameters
     ----------
     surrogate : Surrogate
-        What is solved; a root is as good as its error bound, see :class:`Root`.
     unknown : str
         One of mu0, Fz, k, y0, omega, v0; for direction normal Fz_amplitude in place of y0.
     targets : array_like
@@ -83,11 +76,6 @@ def solve_for(
         where the contact is so soft that it does not matter to where it is as good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
-
-    Returns
-    -------
-    Solution
-        All roots of every target, ascending, each with its interval from the error bound; and the reachable range.
 
     Raises
     ------
@@ -283,14 +271,7 @@ def _enclosures(
 
 
 def _where_off(
-    sweep: Sweep,
-    curve: Curve,
-    i: Places,
-    above: Bools,
-    bound: Array,
-    wanted: Array,
-    value: Array,
-    slope: Array,
+    sweep: Sweep, curve: Curve, i: Places, above: Bools, bound: Array, wanted: Array, value: Array, slope: Array
 ) -> Array:
     """Where, above or below the roots ``i``, mu_macro is off its target by ``bound``, each (m,)."""
     sign = np.where(above, 1.0, -1.0)
