@@ -119,17 +119,10 @@ def _table(words: Sequence[str]) -> str:
     command.add_table(parser)
     chosen = parser.parse_args(words)
     surrogate = open_table(chosen.table)
-    found = {
-        "id": surrogate.id,
-        "path": str(surrogate.path),
-        "tolerance": surrogate.tolerance,
-        "verified_max_abs_error": surrogate.max_abs_error,
-        "verified_max_rel_error": surrogate.max_rel_error,
-        "checksum": surrogate.checksum,
-        "format_version": surrogate.attributes.get("format_version"),
-        "product_version": surrogate.attributes.get("product_version"),
-        "bytes": surrogate.path.stat().st_size,
-    }
+    names = ("verified_max_abs_error", "verified_max_rel_error", "content_sha256", "format_version", "product_version")
+    told = {name: surrogate.attributes.get(name) for name in names}
+    told["checksum"] = told.pop("content_sha256")
+    found = {**command.about(surrogate), "path": str(surrogate.path), **told, "bytes": surrogate.path.stat().st_size}
     bundled = [str(path) for path in bundled_tables()]
     if chosen.json:
         return as_json({**found, "bundled": bundled})

@@ -174,12 +174,7 @@ def outer_cells() -> Array:
 class Border:
     """The border of continuous sliding, v~crit(y~): the stored curve inside, its limits at both ends.
 
-    Attributes
-    ----------
-    arrays : tuple of ndarray
-        What the kernel reads: coefficients (cells, 8) and pieces (3, PIECE_COLUMNS).
-    max_rel_error : float
-        Verified bound of the stored curve's relative error.
+    ``arrays`` are what the kernel reads, see :func:`border_cells`; ``max_rel_error`` bounds the stored curve's error.
     """
 
     def __init__(self, pieces: Sequence["BorderPiece"]) -> None:

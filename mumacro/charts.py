@@ -70,8 +70,7 @@ class Axis:
             return x
         low = np.arcsin(np.minimum(x, math.sqrt(0.5)))
         high = 0.5 * math.pi - np.arcsin(np.clip(SQRT2 - x, 0.0, math.sqrt(0.5)))
-        out: Array = 2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high)
-        return out
+        return np.asarray(2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high))
 
     def to_evaluation(self, x: Array) -> Array:
         """Evaluation's coordinate at the table file's ``x`` (n,)."""
@@ -79,8 +78,7 @@ class Axis:
             return np.asarray(np.tan(0.25 * np.pi * x), dtype=np.float64)
         if self.name != "s":
             return x
-        out: Array = np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
-        return out
+        return np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
 
     def amplitude(self, x: Array) -> Array:
         """y~ at the table file's coordinate ``x``, if this is an axis of amplitudes."""

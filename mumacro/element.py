@@ -11,9 +11,8 @@ V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics a
 J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert space", J. Differ. Equ. 26 (1977) 347.
 """
 
-import copy
 import math
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,12 +100,7 @@ class Element:
         Returns
         -------
         Fx, Fy : float, or ndarray of the contacts' shape
-            Force after the step [N]; Fx > 0 where the contact is dragged along x.
-
-        Raises
-        ------
-        InputError
-            A motion or force out of bounds or of another shape; ``Fz`` for a ball.  Nothing is moved then.
+            Force after the step [N]; Fx > 0 where the contact is dragged along x.  InputError moves nothing.
 
         Examples
         --------
@@ -151,10 +145,6 @@ class Element:
     def reset(self) -> None:
         """Relax all springs: no force."""
         self._forces[...] = 0.0
-
-    def copy(self) -> Self:
-        """Another element with the same parameters and its own state."""
-        return copy.deepcopy(self)
 
     def __repr__(self) -> str:
         springs = f", {self.springs} springs" if self.contact == "ball" else ""

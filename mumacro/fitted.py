@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mumacro.arrays import Array
-from mumacro.inputs import SI, real
+from mumacro.inputs import real, unit_of
 from mumacro.measured import STD, UNKNOWNS, Measured
 
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
@@ -100,8 +100,7 @@ class Fit:
             ax.fill_between(curve, mu - width * off, mu + width * off, color=color, alpha=0.25, lw=0)
         if low < x.max() / 10.0:
             ax.set_xscale("symlog", linthresh=low) if (x == 0.0).any() else ax.set_xscale("log")
-        unit = SI[along][0] if along in SI else "N"
-        ax.set(xlabel=f"{along} [{unit}]", ylabel="mu_macro [-]", title=", ".join(self._told()))
+        ax.set(xlabel=f"{along} [{unit_of(along)}]", ylabel="mu_macro [-]", title=", ".join(self._told()))
         if sets.shape[1] <= 8:
             ax.legend()
         return ax

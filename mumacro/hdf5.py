@@ -21,7 +21,6 @@ Refuse = Callable[[str], Exception]
 MOST_ATTRIBUTES = 64  # of a group whose attributes are all read
 MOST_TEXT = 65_536  # bytes of an attribute
 MOST_ITEMS = 64  # numbers of an attribute
-MOST_GROUPS = 256  # in a group whose groups are listed
 _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
 
 
@@ -48,12 +47,6 @@ class Group:
         """A group in this one."""
         path = f"{self.path.rstrip('/')}/{name}"
         return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
-
-    def groups(self) -> list[str]:
-        """The names of all members that are not variables."""
-        if self._id.get_num_objs() > MOST_GROUPS:
-            raise self.refuse(f"{self.path} holds more than {MOST_GROUPS} parts")
-        return [name.decode() for name in self._id if h5o.get_info(self._id, name).type != h5o.TYPE_DATASET]
 
     # --- attributes ---------------------------------------------------------------------------------
 

@@ -62,34 +62,15 @@ _FORMULAS = {
 
 @dataclass(frozen=True)
 class Law:
-    """A sweep of one input.
+    """A sweep of one input."""
 
-    Attributes
-    ----------
-    along : str
-        The swept input.
-    values : ndarray
-        Its values [SI], ascending, shape (n,).
-    answer : Answer[Any]
-        The surrogate's results, arrays (n,); of an interval of k those at its geometric middle, and
-        ``mu_macro_low`` and ``mu_macro_high``.
-    mu_static : ndarray
-        Static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,).
-    border : tuple of Crossing
-        Where in the range continuous sliding, or along reverse slip, begins or ends.
-    case : dict of str to float
-        The other five inputs [SI], checked; an interval of k by its middle.
-    kind : Kind
-        Contact and direction; ``kind.names`` has them in words.
-    """
-
-    along: str
-    values: Array
-    answer: Answer[Any]
-    mu_static: Array
-    border: tuple[Crossing, ...]
-    case: dict[str, float]
-    kind: Kind = SPRING
+    along: str  #: the swept input
+    values: Array  #: its values [SI], ascending, shape (n,)
+    answer: Answer[Any]  #: the results, arrays (n,); of an interval of k those at its geometric middle, and the band
+    mu_static: Array  #: static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,)
+    border: tuple[Crossing, ...]  #: where in the range continuous sliding, or along reverse slip, begins or ends
+    case: dict[str, float]  #: the other five inputs [SI], checked; an interval of k by its middle
+    kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
 
     @property
     def band(self) -> tuple[Array, Array] | None:

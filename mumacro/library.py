@@ -37,16 +37,9 @@ def _numbers(array: Array | None) -> Any:
 class Data:
     """A table as the kernel reads it.
 
-    Parameters
-    ----------
-    border : ndarray
-        Polynomials of v~crit (cells, 8), highest power first.
-    pieces : ndarray
-        (3, PIECE_COLUMNS): first cell, offset, step, relative error.
-    blocks : ndarray
-        (sources + 1, BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no cells.
-    outer : ndarray
-        The two terms of large speed, (cells, 2, 8).
+    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3, PIECE_COLUMNS): first cell,
+    offset, step, relative error.  ``blocks`` (sources + 1, BLOCK_COLUMNS): first cell, cells along b, offset and step
+    along a, along b; zero where no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:

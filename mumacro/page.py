@@ -56,16 +56,11 @@ def map_of(surrogate: Surrogate) -> dict[str, Any]:
     ratio = surrogate.mu_ratio(v[None, :], y[:, None])
     amplitudes = np.geomspace(y[0], y[-1], 4 * y.size)
     rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
-    border = _line(surrogate.v_tilde_crit(amplitudes), amplitudes)
+    border = np.column_stack((surrogate.v_tilde_crit(amplitudes), amplitudes)).tolist()
+    border = [[float(f"{x:.6g}") for x in place] for place in border]
     return {**axes, "unit": _UNIT, "mu_ratio": rounded, "border": border}
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:
     """The factor and the divisor of each unit."""
     return {unit: [scale.times, scale.over] for unit, scale in units.items()}
-
-
-def _line(v: Any, y: Any) -> list[Any]:
-    """Points (v~, y~) of a curve, in six digits; without those at which it is not defined."""
-    places = np.column_stack((v, y))[np.isfinite(v)]
-    return [[float(f"{x:.6g}") for x in place] for place in places.tolist()]

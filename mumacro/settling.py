@@ -33,28 +33,15 @@ from mumacro.surrogate import Surrogate
 
 @dataclass(frozen=True)
 class Settling:
-    """How fast a disturbance decays; floats for scalar inputs, arrays of the broadcast shape otherwise.
+    """How fast a disturbance decays; floats for scalar inputs, arrays of the broadcast shape otherwise."""
 
-    Attributes
-    ----------
-    periods : float or ndarray
-        Periods [-] until a small disturbance has fallen to ``remaining``; in stick-slip at most as many.
-    periods_any : float or ndarray
-        Periods [-] after which any disturbance has, whatever its size: twice ``periods``.
-    time : float or ndarray
-        ``periods`` in seconds; finite without oscillation, too.
-    slip_path : float or ndarray
-        Path of the foot per period [l0], of a ball that of its middle spring [1.5 l0].  exp(-slip_path) is the
-        multiplier of a small disturbance per period.
-    error_bound : float or ndarray
-        Bound of the error of ``periods`` that comes from the table [-]; NaN from a table without bounds of the power.
-    """
-
-    periods: Any
-    periods_any: Any
-    time: Any
+    periods: Any  #: periods [-] until a small disturbance has fallen to ``remaining``; in stick-slip at most as many
+    periods_any: Any  #: periods [-] after which any disturbance has, whatever its size: twice ``periods``
+    time: Any  #: ``periods`` in seconds; finite without oscillation, too
+    #: path of the foot per period [l0], of a ball that of its middle spring [1.5 l0]; exp(-slip_path) is the multiplier
+    #: of a small disturbance per period
     slip_path: Any
-    error_bound: Any
+    error_bound: Any  #: bound of the error of ``periods`` that comes from the table [-]
 
 
 def settling(

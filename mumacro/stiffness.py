@@ -68,27 +68,13 @@ class Material:
 
 @dataclass(frozen=True)
 class Contact:
-    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its ``contact``.
+    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its ``contact``."""
 
-    Attributes
-    ----------
-    k : float
-        Tangential stiffness [N/m] while it sticks everywhere: the input of the model.
-    k_normal : float
-        Normal stiffness [N/m].
-    half_width : float
-        Radius of a circular contact, half width of a line contact [m].
-    pressure : float
-        Largest pressure [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge.
-    contact : str
-        The kind of contact that ``evaluate`` computes with this k: "spring" or "ball".
-    """
-
-    k: float
-    k_normal: float
-    half_width: float
-    pressure: float
-    contact: str = "spring"
+    k: float  #: tangential stiffness [N/m] while it sticks everywhere: the input of the model
+    k_normal: float  #: normal stiffness [N/m]
+    half_width: float  #: radius of a circular contact, half width of a line contact [m]
+    pressure: float  #: the largest [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge
+    contact: str = "spring"  #: the kind that ``evaluate`` computes with this k: "spring" or "ball"
 
     def keys(self) -> tuple[str, ...]:
         """What is passed on: k, and the kind of contact where it is not the usual one."""

@@ -77,11 +77,6 @@ class Surrogate:
             Threads that large arrays are divided among; 1 never starts one.  Left out: all processors when called from
             the main thread of a program; one in other threads and in child processes, where work is already divided.
 
-        Returns
-        -------
-        Surrogate
-            Ready for use.
-
         Raises
         ------
         TableError
@@ -255,21 +250,10 @@ class Surrogate:
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
     ) -> tuple[Any, ...]:
-        """A quantity, and its slopes v~ d/d v~ and y~ d/d y~ [-].
+        """The quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~ d/d y~ [-].
 
-        Parameters
-        ----------
-        v_tilde, y_tilde : float or array_like
-            As in :meth:`mu_ratio`.
-        of : str
-            "mu_ratio", "power" or "stick_fraction".
-        bounds : bool
-            Also return the bounds of the two slopes' absolute errors.
-
-        Returns
-        -------
-        tuple of float or ndarray
-            Value, slope along ln v~, slope along ln y~, and with ``bounds`` the bounds of both.
+        With ``bounds`` also those of the two slopes' absolute errors.  Arguments, shapes and errors as in
+        :meth:`mu_ratio`.
 
         Examples
         --------
@@ -321,7 +305,7 @@ class Surrogate:
     ) -> tuple[Any, Any, Any]:
         """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
 
-        ``name`` is one of ``table.quantities``; the other arguments, shapes and errors are those of :meth:`mu_ratio`.
+        ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as in :meth:`mu_ratio`.
         Of a ball the stick fraction is a share of the load, too.  For direction "normal" ``y_tilde`` is Fz_amplitude/Fz
         [-], below 1; it has no power, because the model does not know how far the load moves.
 
@@ -430,9 +414,8 @@ class Surrogate:
         Returns
         -------
         Answer
-            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k (:class:`mumacro.answer.IntervalAnswer`).
-            Or the container of the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
-            (see :mod:`mumacro.interop.labels`).  Arrow and Polars give an answer of arrays.
+            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Or the container of the inputs: pandas
+            objects give a DataFrame, xarray objects a Dataset, Dask stays lazy (:mod:`mumacro.interop.labels`).
 
         Raises
         ------

@@ -25,11 +25,7 @@ _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
 def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | None:
-    """The options to give, where a file is not as they say; None where it is.
-
-    >>> _advice("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
-    "the columns are separated by ';' and the decimal sign is ',': give --sep ';' --decimal ','"
-    """
+    """The options to give, where a file is not as they say; None where it is."""
     found, sign = _recognised(header, rows, sep, decimal)
     if (found, sign) == (sep, decimal):
         return None
@@ -58,8 +54,9 @@ def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tup
 def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[str]:
     """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it ask for other options.
 
-    >>> read_head("v0 [mm/s],note", ["1.5,a"], ",", ".")
-    ['v0 [mm/s]', 'note']
+    >>> read_head("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
+    Traceback (most recent call last):
+    ValueError: the columns are separated by ';' and the decimal sign is ',': give --sep ';' --decimal ','
     """
     try:
         cells = next(csv.reader([line], delimiter=sep, strict=True), [])

@@ -58,7 +58,7 @@ GROUPS = [*(f"border/{name}" for name, *_ in BORDER_PIECES), *(f"border/blocks/{
 OF_BLOCK = ("cells", "errors", "verified_max_abs_error", "verified_max_rel_error")
 #: what is changed in the file, without a new checksum -> why it is refused
 EDITS: dict[str, tuple[Edit, str]] = {
-    **{f"no group {path}": (group_renamed(path), r"group '\w+' is missing in /border|block 'elsewhere' is unknown")
+    **{f"no group {path}": (group_renamed(path), r"group '\w+' is missing in /border")
        for path in GROUPS},
     **{f"no {name}": (lambda root, name=name: root.renameVariable(name, "renamed"),
                       f"variable '{name}' (is missing in /|in / is no float64 array)") for name in PLAIN},
@@ -138,7 +138,7 @@ ATLASES = {
     "moved seam": (replace(MID, a=replace(MID.a, high=MID.a.high * 1.25)), "stick_slip_mid: range_of_a is"),
     "another quantity": (replace(MID, quantity="mu_ratio^2"), "stick_slip_mid: quantity is 'mu_ratio.2'"),
     "another regime": (replace(MID, regime=1 - MID.regime), "stick_slip_mid: regime is 'continuous'"),
-    "another name": (replace(MID, name="middle"), "block 'middle' is unknown"),
+    "another name": (replace(MID, name="middle"), "group 'stick_slip_mid' is missing in /border/blocks"),
     "another axis": (replace(MID, b=replace(MID.b, name="inverse_y")), "variable .* is missing"),
 }
 

@@ -52,7 +52,7 @@ def answer(
         rigid contact.  A null, a NaN or an empty cell is missing, in k as elsewhere.  ``k_low`` and ``k_high`` may
         stand for k; ``Fz_amplitude`` [N] stands for y0 in direction normal.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
-        The table; left out, the tightest one that comes with the library.
+        Left out, the tightest table that comes with the library.
     rigid : bool
         All contacts are rigid and there is no column k.
     include : sequence of str

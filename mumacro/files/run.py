@@ -56,8 +56,7 @@ def evaluate_files(
     given : sequence of path
         Files, folders or patterns; all of one format.
     out : path
-        A file, whose ending sets the format.  Rows keep their order; a rejected row is not in it, but in
-        ``OUT.rejects.csv``.
+        Its ending sets the format.  Rows keep their order; a rejected row is not in it, but in ``OUT.rejects.csv``.
     surrogate : Surrogate
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
@@ -65,10 +64,8 @@ def evaluate_files(
         Between the cells of CSV, and within its numbers, read and written.
     force : bool
         Replace an output that exists, and delete the parts of another run.
-    progress : callable
-        Called with the share that is done, rows read and rows rejected.
-    say : callable
-        Called with one line about what a resumed run found.
+    progress, say : callable
+        Called with the share that is done, rows read and rejected; with one line about what a resumed run found.
 
     Raises
     ------

@@ -11,47 +11,26 @@ from mumacro.interval import ENDS
 
 
 class Root(NamedTuple):
-    """One value of the unknown.
+    """One value of the unknown."""
 
-    Attributes
-    ----------
-    value : float
-        The unknown [SI].
-    low, high : float
-        Between them, and on the root's side of the next turning point, mu_macro is within the surrogate's error bound
-        of the target: the true root cannot be distinguished from any of these values [SI].
-    mu_macro : float
-        The surrogate's value there [-].
-    regime : str
-        One of :data:`mumacro.REGIMES`.
-    """
-
-    value: float
+    value: float  #: the unknown [SI]
+    #: between them, and on the root's side of the next turning point, mu_macro is within the surrogate's error bound of
+    #: the target: the true root cannot be distinguished from any of these values [SI]
     low: float
     high: float
-    mu_macro: float
-    regime: str
+    mu_macro: float  #: the surrogate's value there [-]
+    regime: str  #: one of :data:`mumacro.REGIMES`
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Which mu_macro is reachable in a range of the unknown.
+    """Which mu_macro is reachable in a range of the unknown."""
 
-    Attributes
-    ----------
-    low, high : float
-        The range of the unknown [SI].
-    mu_min, mu_max : float
-        Smallest and largest mu_macro in it [-].
-    min_included, max_included : bool
-        False where that value is approached and never reached.
-    """
-
-    low: float
+    low: float  #: the range of the unknown [SI]
     high: float
-    mu_min: float
+    mu_min: float  #: smallest and largest mu_macro in it [-]
     mu_max: float
-    min_included: bool
+    min_included: bool  #: False where that value is approached and never reached
     max_included: bool
 
     def holds(self, target: float) -> bool:
@@ -62,27 +41,13 @@ class Reach:
 
 @dataclass(frozen=True)
 class Solution:
-    """All roots of every target.
+    """All roots of every target."""
 
-    Attributes
-    ----------
-    unknown : str
-        The input that was solved for.
-    targets : tuple of float
-        The wanted mu_macro [-].
-    roots : tuple of tuple of Root
-        The roots of each target, ascending; empty where it is not reachable.
-    reach : Reach
-        What is reachable in the range that was searched.
-    constant : bool
-        True when the unknown has no influence on mu_macro, such as v0 without oscillation.
-    """
-
-    unknown: str
-    targets: tuple[float, ...]
-    roots: tuple[tuple[Root, ...], ...]
-    reach: Reach
-    constant: bool
+    unknown: str  #: the input that was solved for
+    targets: tuple[float, ...]  #: the wanted mu_macro [-]
+    roots: tuple[tuple[Root, ...], ...]  #: of each target, ascending; empty where it is not reachable
+    reach: Reach  #: what is reachable in the range that was searched
+    constant: bool  #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
 
 
 @dataclass(frozen=True)

@@ -155,8 +155,7 @@ def _middle(a: Array, b: Array) -> Array:
     """A double between ``a`` and ``b``, in the middle of their logarithms; ``a`` where they are neighbours."""
     middle = np.sqrt(np.maximum(a, TINY)) * np.sqrt(b)
     # the square roots of subnormal numbers keep fewer digits than the numbers have
-    out: Array = np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
-    return out
+    return np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
 
 
 def _ordered(x: ArrayLike) -> NDArray[np.int64]:

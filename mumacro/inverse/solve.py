@@ -219,8 +219,7 @@ def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[flo
     inside = (places > 0) & (places < x.size - 1)
     places, sign = places[inside], sign[inside]
     _, turns = last_double(lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1])
-    found: list[float] = turns.tolist()
-    return found
+    return [*map(float, turns)]
 
 
 def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]]:
