@@ -196,8 +196,9 @@ def single(answer: Answer[Any]) -> Answer[float]:
         if hasattr(out, name):
             setattr(out, name, getattr(out, name).item())
     out.source_code = int(out.source_code.item())
-    if answer._groups is not None:
-        out._groups = tuple(group.item() for group in answer._groups)
+    if out._groups is not None:
+        v, y, length = out._groups
+        out._groups = v.item(), y.item(), length.item()
     for name in ("gradient", "gradient_bound"):
         if (slopes := getattr(out, name)) is not None:
             setattr(out, name, {field: slope.item() for field, slope in slopes.items()})

@@ -43,7 +43,7 @@ def values(
     def work(part: slice) -> None:
         _KERNEL.values(data, quantity, v[part], y[part], value[part], bound[part], source[part], kind)
 
-    share_out(v.size, threads, work, COST if any(kind) else 1)
+    share_out(v.size, threads, work, COST if kind != (0, 0) else 1)
     return value, bound, source
 
 
@@ -71,5 +71,5 @@ def cases(
         six = columns if part.stop - part.start == n else [c if isinstance(c, float) else c[part] for c in columns]
         _KERNEL.cases(data, part.stop - part.start, six, out, source[part], part.start, kind)
 
-    share_out(n, threads, work, COST if any(kind) else 1)
+    share_out(n, threads, work, COST if kind != (0, 0) else 1)
     return out, source

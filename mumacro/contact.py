@@ -8,7 +8,6 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 """
 
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -96,8 +95,10 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
     """
-    with suppress(KeyError, TypeError):  # the reason follows
+    try:
         return _KINDS[contact, direction]
+    except (KeyError, TypeError):
+        pass  # the reason follows
     for name, value, known in (("contact", contact, CONTACTS), ("direction", direction, DIRECTIONS)):
         if not isinstance(value, str) or value not in known:
             raise InputError(name, value, f"one of {', '.join(known)}")

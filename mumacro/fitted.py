@@ -35,8 +35,8 @@ class Fit:
     covariance : ndarray
         (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points it is scaled
         by the scatter about the fit.
-    interval : dict of (low, high)
-        95 % intervals; low = 0 or high = inf where there is no bound on that side.
+    interval : dict of tuple
+        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.
     residuals : ndarray
         Measured mu_macro minus the fit's [-], (n,).
     chi2, reduced_chi2 : float

@@ -113,7 +113,7 @@ class Kernel:
         """
         codes = _NOTHING if source is None else _FFI.from_buffer(_CODES, source)
         arrays = v.size, _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
-        if any(kind):
+        if kind != (0, 0):
             self._found.values_as(data.pointer, *kind, quantity, *arrays)
         else:
             self._values(data.pointer, quantity, *arrays)
@@ -150,15 +150,15 @@ class Kernel:
         out = _numbers(rows.reshape(-1)[start:] if start else rows)
         codes = _FFI.from_buffer(_CODES, source)
         given = n, pointers, strides, rows.shape[0], out, rows.shape[1], codes
-        if any(kind):
+        if kind != (0, 0):
             self._found.cases_as(data.pointer, *kind, *given)
         else:
             self._cases(data.pointer, *given)
 
-    def one(self, data: Data, six: tuple[float, ...], numbers: int) -> list[float]:
+    def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
         out = _new(_CASE)
-        self._one(data.pointer, *six, numbers, out)
+        self._one(pointer, *six, numbers, out)
         return _unpack(out, numbers)  # type: ignore[no-any-return]
 
     def derivatives(self, data: Data, quantity: int, v: Array, y: Array, order: int) -> Array:

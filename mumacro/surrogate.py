@@ -3,7 +3,6 @@
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, Self, overload
 
@@ -317,10 +316,12 @@ class Surrogate:
         """
         data, kind = self._with(name), kind_of(contact, direction)
         if kind == SPRING and type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
-            with suppress(OverflowError):  # a whole number beyond double range
+            try:
                 one = _ONE.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
                 if one[2] >= 0:
                     return one
+            except OverflowError:  # a whole number beyond double range
+                pass
         if kind.normal and name == "power":
             raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
         v, y, shape = _points(v_tilde, y_tilde)
@@ -444,11 +445,12 @@ class Surrogate:
             return self._evaluate(cases, inputs, gradient, groups, illegal, kind_of(contact, direction))
         six = _six(inputs) if cases is None and len(inputs) == 6 else None
         if six is not None and illegal in ("nan", "raise"):
-            if _NUMBERS.issuperset(map(type, six)):
+            kinds = set(map(type, six))
+            if kinds <= _NUMBERS:
                 answer: Any = self._one(six, gradient)
                 if answer is not None:
                     return answer
-            elif illegal == "nan" and _NUMBERS_OR_ARRAY.issuperset(map(type, six)):
+            elif illegal == "nan" and kinds <= _NUMBERS_OR_ARRAY:
                 arrays = [x for x in six if type(x) is np.ndarray]
                 if len({x.shape for x in arrays}) == 1 and arrays[0].ndim and {x.dtype for x in arrays} == {_FLOAT}:
                     return self._arrays(six, arrays[0].shape, gradient, gradient or groups)
@@ -457,7 +459,7 @@ class Surrogate:
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
         """The answer to one case; None where it is illegal."""
         try:
-            found = _ONE.one(self._data, six, 19 if gradient else 7)
+            found = _ONE.one(self._pointer, six, 19 if gradient else 7)
         except OverflowError:  # a whole number beyond double range
             return None
         if found[6] < 0.0:
@@ -473,7 +475,7 @@ class Surrogate:
         self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
     ) -> tuple[float, float, float, int]:
         """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1 if illegal."""
-        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
+        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._pointer, (mu0, Fz, k, y0, omega, v0), 7)
         return mu_macro, mu_ratio, bound, int(source)
 
     def _evaluate(
