@@ -1,13 +1,6 @@
 """The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on reading.
 
-Layout (all quantities dimensionless, units "1"):
-
-* root: the plain log-spaced grid for plots, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
-  ``error_estimate`` and ``v_tilde_crit(y_tilde)``, and the provenance as attributes;
-* group ``border``: one sub-group a piece of v~crit (:data:`mumacro.charts.BORDER_PIECES`);
-* group ``border/blocks``: one sub-group a block (:data:`mumacro.charts.CHARTS`): node coordinates, node values of
-  mu~, power and stick fraction, the chart by name and range, the number of cells, the verified errors.
-
+docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``, the blocks inside.
 The netCDF library writes, and is not thread-safe: a lock is held while it works.  For reading see
 ``mumacro.hdf5``.
 """
