@@ -16,7 +16,7 @@ from mumacro import Surrogate, batch, contact
 from mumacro.contact import put_rules, rules
 from tests.cases import TOLERANCES, Array, opened
 
-KINDS = {"spring": None, "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
+KINDS = {"spring": (0, 0), "ball": (1, 0), "along": (0, 1), "normal": (0, 2), "ball along": (1, 1)}
 
 
 def costs() -> None:

@@ -232,7 +232,7 @@ def test_tables_with_fewer_quantities_open(tmp_path: Path, sound: Table) -> None
     for name in opened.table.quantities:
         for ours, theirs in zip(opened.quantity(name, v, y), now.quantity(name, v, y), strict=True):
             np.testing.assert_array_equal(ours, theirs)
-        np.testing.assert_array_equal(*(table.slopes(v, y, name, bounds=True) for table in (opened, now)))
+        np.testing.assert_array_equal(opened.slopes(v, y, name, bounds=True), now.slopes(v, y, name, bounds=True))
     with pytest.raises(InputError, match="name must be one of mu_ratio, stick_fraction"):
         opened.power(0.1, 0.5)
     with pytest.raises(InputError, match="of must be one of mu_ratio, stick_fraction"):
