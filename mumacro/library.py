@@ -157,8 +157,8 @@ class Kernel:
 
     def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
-        out = _new(_CASE)
-        self._one(pointer, *six, numbers, out)
+        out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer
+        self._one(pointer, mu0, Fz, k, y0, omega, v0, numbers, out)
         return _unpack(out, numbers)  # type: ignore[no-any-return]
 
     def derivatives(self, data: Data, quantity: int, v: Array, y: Array, order: int) -> Array:

@@ -268,7 +268,7 @@ class Surrogate:
 
     def _with(self, quantity: str, argument: str = "name") -> Data:
         """What the kernel reads, with the cells of a quantity; they are cut on first use."""
-        code = _CODES.get(quantity)
+        code = _CODES[quantity] if quantity in charts.QUANTITY_NAMES else None
         if code not in self._data.quantities:
             if code is None or quantity not in self.table.quantities:
                 raise InputError(argument, quantity, f"one of {', '.join(self.table.quantities)}, which the table has")
