@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import MumacroError, Surrogate
-from mumacro.border import Border
+from mumacro.cells import Border
 from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
 from mumacro.table import Block, Table, write_table
 from mumacro.version import __version__

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import charts
-from mumacro.border import Border
-from mumacro.cells import LOCAL, WIDTH, cell_scale, chebyshev_coefficients, interpolation_matrix, nodes
+from mumacro.cells import LOCAL, WIDTH, Border, cell_scale, chebyshev_coefficients, interpolation_matrix, nodes
 from mumacro.charts import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
 from mumacro.library import kernels
 from mumacro.table import Block, BorderPiece

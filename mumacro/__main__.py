@@ -4,8 +4,6 @@ Exit codes: 0 done, 1 no result is possible (a table, a file, a package, a targe
 arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
 """
 
-from __future__ import annotations
-
 import difflib
 import importlib
 import os
@@ -16,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from mumacro import command
+from mumacro.answer import BAND
 from mumacro.bundled import bundled_tables
 from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.contact import SPRING, Kind
@@ -26,8 +25,6 @@ from mumacro.questions import LAW, SOLVE_FOR, STIFFNESS, law, map_, solve, stiff
 from mumacro.surrogate import Surrogate
 from mumacro.validity import model_rows
 from mumacro.version import __version__
-
-__all__ = ["main"]
 
 CASE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz v0=1cm/s"
 FIRST = f"""\
@@ -78,7 +75,7 @@ def _one_case(words: Sequence[str]) -> str:
     if chosen.json:
         names = ["mu_macro", "mu_ratio", "regime", "error_bound", "source", "v_tilde", "y_tilde"]
         found = {name: getattr(answer, name) for name in names + ["gradient"] * chosen.gradient}
-        ends = {name: getattr(answer, name) for name in ("mu_macro_low", "mu_macro_high") if "k_range" in case}
+        ends = {name: getattr(answer, name) for name in BAND if "k_range" in case}
         found |= {"inputs": middle, "k_range": {"k": case["k_range"], **ends} if ends else None}
         found |= {"model": rows} if chosen.model else {}
         found |= dict(kind.names.items() - SPRING.names.items())
@@ -122,17 +119,10 @@ def _table(words: Sequence[str]) -> str:
     command.add_table(parser)
     chosen = parser.parse_args(words)
     surrogate = open_table(chosen.table)
-    found = {
-        "id": surrogate.id,
-        "path": str(surrogate.path),
-        "tolerance": surrogate.tolerance,
-        "verified_max_abs_error": surrogate.max_abs_error,
-        "verified_max_rel_error": surrogate.max_rel_error,
-        "checksum": surrogate.checksum,
-        "format_version": surrogate.attributes.get("format_version"),
-        "product_version": surrogate.attributes.get("product_version"),
-        "bytes": surrogate.path.stat().st_size,
-    }
+    names = ("verified_max_abs_error", "verified_max_rel_error", "content_sha256", "format_version", "product_version")
+    told = {name: surrogate.attributes.get(name) for name in names}
+    told["checksum"] = told.pop("content_sha256")
+    found = {**command.about(surrogate), "path": str(surrogate.path), **told, "bytes": surrogate.path.stat().st_size}
     bundled = [str(path) for path in bundled_tables()]
     if chosen.json:
         return as_json({**found, "bundled": bundled})

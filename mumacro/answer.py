@@ -1,7 +1,5 @@
 """The result of the surrogate for one case or many."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic
@@ -10,9 +8,6 @@ import numpy as np
 
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.errors import MumacroError
-from mumacro.html import html_table
-
-__all__ = ["Answer", "AnswerWithGradient", "IntervalAnswer", "single"]
 
 #: float for one case; an array of float64 for many, or what holds labels in its place
 if TYPE_CHECKING:
@@ -27,8 +22,8 @@ else:
 # by code; the last entry is that of -1, an illegal case
 _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
-_BAND = ("mu_macro_low", "mu_macro_high")
-_ROWS = 10  # of a table in a notebook
+BAND = ("mu_macro_low", "mu_macro_high")  # of an interval of k
+GROUPS = ("v_tilde", "y_tilde", "length_scale")
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
 
 
@@ -67,15 +62,10 @@ class Answer(Generic[Number]):
     gradient_bound: dict[str, Number] | None
 
     def __init__(
-        self,
-        mu_macro: Number,
-        mu_ratio: Number,
-        error_bound: Number,
-        source_code: Any,
-        groups: tuple[Number, Number, Number] | None = None,
-        certain: Callable[[Any, Any], Any] | None = None,
+        self, mu_macro: Number, mu_ratio: Number, error_bound: Number, source_code: Any,
+        groups: tuple[Number, Number, Number] | None = None, certain: Callable[[Any, Any], Any] | None = None,
         look_up: Callable[[str, Any, Any], Any] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.mu_macro = mu_macro
         self.mu_ratio = mu_ratio
         self.error_bound = error_bound
@@ -85,25 +75,25 @@ class Answer(Generic[Number]):
         self._look_up = look_up
         self.gradient = self.gradient_bound = None
 
-    def _group(self, place: int, name: str) -> Number:
+    def _group(self, place: int) -> Number:
         if self._groups is None:
-            raise AttributeError(f"{name} was not requested: evaluate(..., groups=True)")
+            raise AttributeError(f"{GROUPS[place]} was not requested: evaluate(..., groups=True)")
         return self._groups[place]
 
     @property
     def v_tilde(self) -> Number:
         """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient were requested."""
-        return self._group(0, "v_tilde")
+        return self._group(0)
 
     @property
     def y_tilde(self) -> Number:
         """Dimensionless amplitude y0 k/(mu0 Fz), for direction normal Fz_amplitude/Fz [-]; as v_tilde."""
-        return self._group(1, "y_tilde")
+        return self._group(1)
 
     @property
     def length_scale(self) -> Number:
         """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde."""
-        return self._group(2, "length_scale")
+        return self._group(2)
 
     def _by_source(self, name: str, table: Any) -> Any:
         """``table`` (sources + 1,) looked up at the source code; its last entry is that of -1."""
@@ -146,21 +136,14 @@ class Answer(Generic[Number]):
 
     def columns(self) -> dict[str, Any]:
         """What is known of each case, by name: mu_macro first, then what was requested beside it."""
-        names = ["mu_macro", *(name for name in _BAND if hasattr(self, name)), "mu_ratio", "regime", "error_bound"]
-        names += ["source", *(("v_tilde", "y_tilde", "length_scale") if self._groups is not None else ())]
+        names = ["mu_macro", *(name for name in BAND if hasattr(self, name)), "mu_ratio", "regime", "error_bound"]
+        names += ["source", *(GROUPS if self._groups is not None else ())]
         slopes = {f"d_mu_macro_d_{name}": slope for name, slope in (self.gradient or {}).items()}
         return {**{name: getattr(self, name) for name in names}, **slopes}
 
     def to_frame(self) -> Any:
-        """The columns as a DataFrame of pandas, one row a case, in the order of ``ravel``.
+        """The columns as a DataFrame of pandas, one row a case, in the order of ``ravel``; MumacroError without pandas.
 
-        Raises
-        ------
-        MumacroError
-            pandas is not installed.
-
-        Examples
-        --------
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3)
         >>> Surrogate.open().evaluate(**case, v0=np.array([0.0, 0.01])).to_frame()["regime"].tolist()
@@ -174,15 +157,10 @@ class Answer(Generic[Number]):
         return pandas.DataFrame({name: x if hasattr(x, "index") and hasattr(x, "dtype") else np.ravel(x)
                                  for name, x in columns})  # fmt: skip
 
-    def _repr_html_(self) -> str:
-        columns = self.columns()
-        rows = zip(*(np.ravel(column)[:_ROWS] for column in columns.values()), strict=True)
-        return html_table(columns, rows, np.size(columns["mu_macro"]) - _ROWS)
-
     def __repr__(self) -> str:
         names = ["mu_macro", "mu_ratio", "error_bound", "regime", "source"]
-        names += [name for name in IntervalAnswer.__slots__ if hasattr(self, name)]
-        names += ["v_tilde", "y_tilde", "length_scale"] if self._groups is not None else []
+        names += [name for name in BAND if hasattr(self, name)]
+        names += GROUPS if self._groups is not None else ()
         names += ["gradient", "gradient_bound"] if self.gradient is not None else []
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
 
@@ -205,7 +183,7 @@ class IntervalAnswer(AnswerWithGradient[Number]):
         Smallest and largest mu_macro over the interval [-]; ``error_bound`` holds for them, too.
     """
 
-    __slots__ = _BAND
+    __slots__ = BAND
 
     mu_macro_low: Number
     mu_macro_high: Number
@@ -214,7 +192,7 @@ class IntervalAnswer(AnswerWithGradient[Number]):
 def single(answer: Answer[Any]) -> Answer[float]:
     """The answer of one case that an answer of arrays with one element holds."""
     out = copy.copy(answer)
-    for name in ("mu_macro", "mu_ratio", "error_bound", *IntervalAnswer.__slots__):
+    for name in ("mu_macro", "mu_ratio", "error_bound", *BAND):
         if hasattr(out, name):
             setattr(out, name, getattr(out, name).item())
     out.source_code = int(out.source_code.item())

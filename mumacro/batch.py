@@ -4,20 +4,13 @@ The kernel releases the interpreter's lock, so several threads can work at once.
 forked process works and no call waits for another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Codes
 from mumacro.library import Data, kernels
-
-__all__ = ["alone", "cases", "derivatives", "share_out", "slopes", "values"]
-
-Array = NDArray[np.float64]
-Codes = NDArray[np.int8]
 
 SLICE = 16_384  # points of a slice: its arrays stay in the second cache
 FEW = 65_536  # points that one thread evaluates before a second one has started
@@ -66,11 +59,6 @@ def slopes(quantity: int, data: Data, v: Array, y: Array, threads: int) -> Array
     rows = np.empty((5, v.size))
     share_out(v.size, threads, lambda part: _KERNEL.slopes(data, quantity, v[part], y[part], rows, part.start))
     return rows
-
-
-def derivatives(quantity: int, data: Data, v: Array, y: Array, order: int) -> Array:
-    """First or second derivatives along v~ and y~ at (n,) points, (2, n) or (3, n), on the calling thread."""
-    return (_KERNEL.partials if order == 1 else _KERNEL.bends)(data, quantity, v, y)
 
 
 def cases(

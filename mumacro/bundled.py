@@ -1,24 +1,13 @@
 """The bundled tables: inside the package when installed, in ``tables/`` of a checkout."""
 
-from __future__ import annotations
-
 from pathlib import Path
-
-__all__ = ["bundled_tables"]
 
 _PACKAGE = Path(__file__).resolve().parent
 
 
 def bundled_tables() -> list[Path]:
-    """Return the table files that come with the library, by name.
+    """The table files that come with the library, by name: of the installed wheel, else of the checkout.
 
-    Returns
-    -------
-    list of Path
-        ``mumacro/data/*.nc`` of an installed wheel, else ``tables/*.nc`` of the checkout; empty where there is neither.
-
-    Examples
-    --------
     >>> sorted(path.name for path in bundled_tables())[0]
     'mumacro-1e-10.nc'
     """

@@ -6,8 +6,6 @@ into cells; each cell holds a polynomial of degree 7 in both local coordinates u
 coefficients.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence
@@ -15,31 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from mumacro import charts
+from mumacro.arrays import Array
 from mumacro.charts import Axis
-from mumacro.library import BLOCK_COLUMNS, PIECE_COLUMNS, kernels
+from mumacro.library import BLOCK_COLUMNS, PIECE_COLUMNS, Data, kernels
 
 if TYPE_CHECKING:
     from mumacro.table import Block, BorderPiece
 
-__all__ = [
-    "WIDTH",
-    "block_rows",
-    "border_cells",
-    "cell_positions",
-    "cell_scale",
-    "cells_1d",
-    "cells_2d",
-    "chebyshev_coefficients",
-    "interpolation_matrix",
-    "nodes",
-    "outer_cells",
-    "quantity_cells",
-]
-
-Array = NDArray[np.float64]
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
 
 # Chebyshev points of one cell and the matrix that takes values there to power-basis coefficients, highest power first
@@ -141,7 +123,7 @@ def _joined(patches: Sequence[Array]) -> Array:
     return np.concatenate(patches, out=raw[skip : skip + math.prod(shape)].reshape(shape))
 
 
-def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
+def border_cells(pieces: Sequence["BorderPiece"]) -> tuple[Array, Array]:
     """The stored border for evaluation: coefficients (cells, WIDTH) and pieces (3, PIECE_COLUMNS)."""
     coefficients, rows, first = [], np.zeros((len(pieces), PIECE_COLUMNS)), 0
     worst = max(piece.max_rel_error for piece in pieces)
@@ -152,7 +134,7 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
     return np.concatenate(coefficients), rows
 
 
-def block_rows(blocks: Sequence[Block]) -> Array:
+def block_rows(blocks: Sequence["Block"]) -> Array:
     """The geometry of the blocks for evaluation, (sources + 1, BLOCK_COLUMNS)."""
     rows, first = np.zeros((len(charts.SOURCES) + 1, BLOCK_COLUMNS)), 0
     for row, chart, block in zip(rows, charts.CHARTS, blocks, strict=False):
@@ -162,17 +144,7 @@ def block_rows(blocks: Sequence[Block]) -> Array:
     return rows
 
 
-@functools.cache
-def _older() -> Array:
-    """What the errors of slopes of an older table are multiplied by to stand for those of cells (3,).
-
-    They hold for q and its derivatives together, anywhere in a block; of a cell's errors derivatives have a share.
-    """
-    least = min(share.min() for share in kernels[-1].cell_shares(np.linspace(-1.0, 1.0, 201)))
-    return np.array([1.0, 1.0 / least, 1.0 / least])
-
-
-def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array, Array]:
+def quantity_cells(blocks: Sequence["Block"], quantity: int) -> tuple[Array, Array, Array]:
     """What :meth:`mumacro.library.Data.put` wants of a quantity: polynomials, errors, errors in every cell."""
     name, errors = charts.QUANTITY_NAMES[quantity], np.zeros((len(charts.SOURCES) + 1, 2))
     patches, in_cells = [], []
@@ -182,11 +154,10 @@ def quantity_cells(blocks: Sequence[Block], quantity: int) -> tuple[Array, Array
         patches.append(
             np.zeros((cells, WIDTH, WIDTH)) if nodes is None else cells_2d(chart.a, chart.b, nodes, block.cells)
         )
-        value, *of_slopes = block.errors[name]
-        error[0] = value
+        error[0] = block.errors[name][0]
         if quantity == charts.MU:
             error += chart.rounding, chart.floor
-        in_cells.append(block.cell_errors.get(name, np.full((cells, 3), max(of_slopes)) * _older()))
+        in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))  # none where it is zero
     return _joined(patches), errors, np.concatenate(in_cells)
 
 
@@ -198,3 +169,19 @@ def outer_cells() -> Array:
     r = np.sqrt(np.expm1((np.arange(cells)[:, None] + 0.5 + 0.5 * LOCAL) * top / cells))
     f, g, slope, _, _ = kernel.outer_expansion(r.ravel()).T
     return np.stack([_to_powers(x.reshape(cells, WIDTH)) for x in (f, g + 0.5 * slope)], axis=1)
+
+
+class Border:
+    """The border of continuous sliding, v~crit(y~): the stored curve inside, its limits at both ends.
+
+    ``arrays`` are what the kernel reads, see :func:`border_cells`; ``max_rel_error`` bounds the stored curve's error.
+    """
+
+    def __init__(self, pieces: Sequence["BorderPiece"]) -> None:
+        self.arrays: tuple[Array, Array] = border_cells(pieces)
+        self.max_rel_error = max(piece.max_rel_error for piece in pieces)
+        self._data = Data(*self.arrays, np.zeros((len(charts.SOURCES) + 1, BLOCK_COLUMNS)), outer_cells())
+
+    def __call__(self, y: Array) -> Array:
+        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN for what is no amplitude."""
+        return kernels[-1].border(self._data, np.ascontiguousarray(y).reshape(-1)).reshape(y.shape)

@@ -7,19 +7,16 @@ Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0
 The stick fraction f is the share of the period during which the contact sticks.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.library import kernels
 
-Array = NDArray[np.float64]
 _ATLAS = kernels[-1].atlas
 _text = kernels[-1].text
 
@@ -73,8 +70,7 @@ class Axis:
             return x
         low = np.arcsin(np.minimum(x, math.sqrt(0.5)))
         high = 0.5 * math.pi - np.arcsin(np.clip(SQRT2 - x, 0.0, math.sqrt(0.5)))
-        out: Array = 2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high)
-        return out
+        return np.asarray(2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high))
 
     def to_evaluation(self, x: Array) -> Array:
         """Evaluation's coordinate at the table file's ``x`` (n,)."""
@@ -82,8 +78,7 @@ class Axis:
             return np.asarray(np.tan(0.25 * np.pi * x), dtype=np.float64)
         if self.name != "s":
             return x
-        out: Array = np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
-        return out
+        return np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
 
     def amplitude(self, x: Array) -> Array:
         """y~ at the table file's coordinate ``x``, if this is an axis of amplitudes."""
@@ -92,6 +87,20 @@ class Axis:
         if self.name == "ln_y":
             return np.asarray(np.exp(x), dtype=np.float64)
         return np.asarray(1.0 / x if self.name == "inverse_y" else x.copy(), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One tabulated quantity: name, variable in a block of a table file, meaning.
+
+    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a jump there.
+    """
+
+    name: str
+    variable: str
+    meaning: str
+    while_sliding: bool
+    smooth_at_border: bool
 
 
 @dataclass(frozen=True)
@@ -137,27 +146,13 @@ class Chart:
         return self.regime != CONTINUOUS or quantity.while_sliding
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """One tabulated quantity: name, variable in a block of a table file, meaning.
-
-    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a jump there.
-    """
-
-    name: str
-    variable: str
-    meaning: str
-    while_sliding: bool
-    smooth_at_border: bool
-
-
 def _axis(found: Any) -> Axis:
     return Axis(_text(found.name), found.low, found.high)
 
 
-def _quantity(found: Any) -> Quantity:
-    name, variable, meaning = map(_text, (found.name, found.variable, found.meaning))
-    return Quantity(name, variable, meaning, bool(found.while_sliding), bool(found.smooth_at_border))
+def _quantity(q: Any) -> Quantity:
+    said = _text(q.name), _text(q.variable), _text(q.meaning)
+    return Quantity(*said, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
 #: a block's place in this list is the source code of its values

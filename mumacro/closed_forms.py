@@ -13,22 +13,13 @@ References
 Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations", Friction (2018).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mumacro.arrays import Array
 from mumacro.library import kernels
-
-__all__ = [
-    "BORDER_CONSTANT", "agm", "border_23", "border_24", "border_26", "border_27", "border_blend",
-    "border_large_amplitude", "border_small_amplitude", "continuous", "corner_root", "critical", "critical_next",
-    "master_curve", "master_curve_limit", "outer", "second_order", "small_amplitude", "small_angle", "static_limit",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 
 BORDER_CONSTANT = 4.402914  # lim y~ / v~crit^2; the paper rounds it to 4.5 in eq. (26)
 # The blend has both ends of the border built in; this number makes its largest error, y~ from 1e-4 to 1e8, smallest.

@@ -1,7 +1,5 @@
 """What all commands share: one look of the arguments, exit codes, cases and tables as a person writes them."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json
@@ -34,12 +32,6 @@ from mumacro.inputs import (
 from mumacro.surrogate import Surrogate
 from mumacro.tabular import SEPARATORS
 from mumacro.validity import digits, k_effect
-
-__all__ = [
-    "INPUTS", "ImpossibleError", "OneLineParser", "UsageError", "about", "add_case", "add_form", "add_format",
-    "add_kind", "add_table", "as_json", "format_for", "in_columns", "kind_in", "middle_of", "open_table", "question",
-    "read_case", "read_values", "run", "write_result",
-]  # fmt: skip
 
 INPUTS = """\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:

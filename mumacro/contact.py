@@ -7,22 +7,17 @@ direction, ``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The f
 ``kernel/directions.c``; here are the names, and the rules of quadrature, which grow with the table's tolerance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.errors import InputError
 from mumacro.inputs import FIELDS
 from mumacro.library import Data
 
-__all__ = ["CONTACTS", "DIRECTIONS", "ContactName", "DirectionName", "Kind", "kind_of", "put_rules", "rules"]
-
-Array = NDArray[np.float64]
 ContactName = Literal["spring", "ball"]
 DirectionName = Literal["across", "along", "normal"]
 #: in the order of the kernel's codes
@@ -71,19 +66,11 @@ class Kind(NamedTuple):
         """``error`` by the name and the bound that the user knows."""
         if not self.normal or error.field != "y0":
             return error
-        bound = "given [N] for direction normal"
-        if error.value is not None:
-            bound = LIFTS_OFF
+        bound = "given [N] for direction normal" if error.value is None else LIFTS_OFF
         return InputError(AMPLITUDE, error.value, bound, error.index)
 
     def as_six(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Inputs with the amplitude in the place of y0.
-
-        Raises
-        ------
-        InputError
-            An amplitude that does not belong to the direction.
-        """
+        """Inputs with the amplitude in the place of y0; InputError for one that does not belong to the direction."""
         wrong, right = ("y0", AMPLITUDE) if self.normal else (AMPLITUDE, "y0")
         if wrong in inputs:
             word = DIRECTIONS[self.direction]
@@ -103,15 +90,8 @@ del _KINDS["ball", "normal"]
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
-    """The codes of a contact and a direction.
+    """The codes of a contact and a direction; InputError for unknown names and a ball whose normal force oscillates.
 
-    Raises
-    ------
-    InputError
-        A name that is not known; a ball whose normal force oscillates.
-
-    Examples
-    --------
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
     """

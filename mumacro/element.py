@@ -11,23 +11,18 @@ V. L. Popov, M. Hess, "Method of Dimensionality Reduction in Contact Mechanics a
 J. J. Moreau, "Evolution problem associated with a moving convex set in a Hilbert space", J. Differ. Equ. 26 (1977) 347.
 """
 
-from __future__ import annotations
-
-import copy
 import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mumacro.arrays import Array
 from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import check_inputs, real
 from mumacro.library import kernels
 
-__all__ = ["Element"]
-
-Array = NDArray[np.float64]
 SPRINGS, MOST_SPRINGS = 32, 100_000  # of a ball, if not said, and at the most
 _KERNEL = kernels[-1]
 
@@ -87,7 +82,7 @@ class Element:
             shapes = {name: column.shape for name, column in columns.items()}
             raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
         self.contact, self.springs, self.shape = contact, springs, k_.shape
-        self._mu0, self._k = np.ascontiguousarray(mu0_).reshape(-1), np.ascontiguousarray(k_).reshape(-1)
+        self._mu0, self._k = mu0_.ravel(), k_.ravel()
         self._limit = self._limits(Fz_)
         self._forces = np.zeros((self._k.size, springs, 2))
 
@@ -105,18 +100,12 @@ class Element:
         Returns
         -------
         Fx, Fy : float, or ndarray of the contacts' shape
-            Force after the step [N]; Fx > 0 where the contact is dragged along x.
-
-        Raises
-        ------
-        InputError
-            A motion or force out of bounds or of another shape; ``Fz`` for a ball.  Nothing is moved then.
+            Force after the step [N]; Fx > 0 where the contact is dragged along x.  InputError moves nothing.
 
         Examples
         --------
         The mean over a period is mu_macro Fz; the table has 2.7246 N for this case:
 
-        >>> import numpy as np
         >>> contact, omega, n = Element(mu0=0.3, Fz=10.0, k=1e6), 1.3e5, 1000
         >>> dt = 2 * np.pi / omega / n
         >>> dy = 2e-6 * np.diff(np.sin(omega * dt * np.arange(n + 1)))
@@ -157,10 +146,6 @@ class Element:
         """Relax all springs: no force."""
         self._forces[...] = 0.0
 
-    def copy(self) -> Element:
-        """Another element with the same parameters and its own state."""
-        return copy.deepcopy(self)
-
     def __repr__(self) -> str:
         springs = f", {self.springs} springs" if self.contact == "ball" else ""
         return f"<Element {self.contact}{springs}, {self._k.size} contacts of shape {self.shape}, force {self.force}>"
@@ -182,7 +167,7 @@ class Element:
             return np.full(self._k.size, value)
         given = real(name, value)
         try:
-            array = np.ascontiguousarray(np.broadcast_to(given, self.shape)).reshape(-1)
+            array = np.broadcast_to(given, self.shape).ravel()
         except ValueError as error:
             raise InputError(name, given.shape, f"of a shape that broadcasts to the contacts' {self.shape}") from error
         if not np.isfinite(array).all():

@@ -1,11 +1,7 @@
 """The exceptions of the project.  They are independent of HTTP."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
-
-__all__ = ["InputError", "MumacroError", "TableError"]
 
 
 class MumacroError(Exception):
@@ -13,25 +9,13 @@ class MumacroError(Exception):
 
 
 class InputError(MumacroError, ValueError):
-    """One input value is outside the range of the model.
-
-    Attributes
-    ----------
-    field : str
-        Name of the input, e.g. ``"mu0"``.
-    value : object
-        The value as it was given.
-    bound : str
-        What the value must satisfy, e.g. ``"finite and > 0"``.
-    index : int or None
-        Position in the flattened, broadcast input; None for a scalar call.
-    """
+    """One input value is outside the range of the model."""
 
     def __init__(self, field: str, value: object, bound: str, index: int | None = None) -> None:
-        self.field = field
-        self.value = value
-        self.bound = bound
-        self.index = index
+        self.field = field  #: name of the input, e.g. ``"mu0"``
+        self.value = value  #: as it was given
+        self.bound = bound  #: what the value must satisfy, e.g. ``"finite and > 0"``
+        self.index = index  #: position in the flattened, broadcast input; None for a scalar call
         where = "" if index is None else f" at index {index}"
         super().__init__(f"{field}{where} must be {bound}, got {_shown(value)}")
 
@@ -41,19 +25,11 @@ class InputError(MumacroError, ValueError):
 
 
 class TableError(MumacroError):
-    """A table file cannot be used.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    reason : str
-        Why it is refused: missing, another format version, a wrong checksum, ...
-    """
+    """A table file cannot be used."""
 
     def __init__(self, path: str | Path, reason: str) -> None:
-        self.path = Path(path)
-        self.reason = reason
+        self.path = Path(path)  #: the file
+        self.reason = reason  #: why it is refused: missing, another format version, a wrong checksum, ...
         super().__init__(f"{self.path}: {reason}")
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,22 +1,13 @@
 """What to install when a package is missing that only one part of the project needs."""
 
-from __future__ import annotations
-
-__all__ = ["missing"]
-
 _OURS = ("mumacro", "builder", "service")
 
 
 def missing(extra: str, error: ImportError) -> str:
     """What to install, in one line, where an import raised ``error``; ``extra`` is empty for the library itself.
 
-    Raises
-    ------
-    ImportError
-        ``error`` itself when one of the project's own modules is missing: a fault that must not be hidden.
+    Raises ``error`` itself when one of the project's own modules is missing: a fault that must not be hidden.
 
-    Examples
-    --------
     >>> missing("files", ModuleNotFoundError("No module named 'pyarrow'", name="pyarrow"))
     "pyarrow is not installed: pip install 'mumacro[files]' (in a checkout: pip install -e '.[files]')"
     """

@@ -1,22 +1,16 @@
 """What measured points say about a contact: the result of :func:`mumacro.fit`, and its picture."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mumacro.extras import missing
-from mumacro.html import html_table
-from mumacro.inputs import SI, real
+from mumacro.arrays import Array
+from mumacro.inputs import real, unit_of
 from mumacro.measured import STD, UNKNOWNS, Measured
 
-__all__ = ["CONFIDENCE", "Fit", "quantile"]
-
-Array = NDArray[np.float64]
 CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 
 
@@ -41,8 +35,8 @@ class Fit:
     covariance : ndarray
         (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points it is scaled
         by the scatter about the fit.
-    interval : dict of (low, high)
-        95 % intervals; low = 0 or high = inf where there is no bound on that side.
+    interval : dict of tuple
+        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.
     residuals : ndarray
         Measured mu_macro minus the fit's [-], (n,).
     chi2, reduced_chi2 : float
@@ -85,11 +79,9 @@ class Fit:
 
         There is a curve for each set of the other inputs; more than 8 of them have no legend.
         """
-        try:
-            from matplotlib import pyplot as plt
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
-        ax = plt.subplots()[1] if ax is None else ax
+        from mumacro.plotting import own
+
+        ax = own(ax)
         given = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(given, key=lambda name: (np.unique(given[name]).size, name == "v0"))
         x, names = given[along], [name for name in self._problem.columns if name != along]
@@ -108,8 +100,7 @@ class Fit:
             ax.fill_between(curve, mu - width * off, mu + width * off, color=color, alpha=0.25, lw=0)
         if low < x.max() / 10.0:
             ax.set_xscale("symlog", linthresh=low) if (x == 0.0).any() else ax.set_xscale("log")
-        unit = SI[along][0] if along in SI else "N"
-        ax.set(xlabel=f"{along} [{unit}]", ylabel="mu_macro [-]", title=", ".join(self._told()))
+        ax.set(xlabel=f"{along} [{unit_of(along)}]", ylabel="mu_macro [-]", title=", ".join(self._told()))
         if sets.shape[1] <= 8:
             ax.legend()
         return ax
@@ -117,11 +108,6 @@ class Fit:
     def _told(self) -> list[str]:
         units = {"k": " N/m", "mu0": ""}
         return [f"{name} = {x:.4g} ± {self.std[name]:.2g}{units[name]}" for name, x in self.values.items()]
-
-    def _repr_html_(self) -> str:
-        ends = {name: f"{low:.6g} to {high:.6g}" for name, (low, high) in self.interval.items()}
-        rows = [(name, x, self.std[name], ends[name]) for name, x in self.values.items()]
-        return html_table(("", "value", "standard deviation", "95 %"), rows, notes=self.warnings)
 
     def __repr__(self) -> str:
         given = STD in self.points

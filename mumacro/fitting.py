@@ -5,8 +5,6 @@ every minimum, the limits of a soft and of a rigid contact, and the ranges that 
 refined by :func:`scipy.optimize.least_squares`.  Needs scipy, a plot matplotlib.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import warnings
@@ -15,29 +13,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.errors import InputError
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
 from mumacro.measured import HARDLY, STD, UNKNOWNS, Measured
 from mumacro.surrogate import Surrogate
 
-__all__ = ["fit"]
-
-Array = NDArray[np.float64]
 _PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
 
 
 def fit(
-    data: Any,
-    unknowns: str | Sequence[str] = UNKNOWNS,
-    *,
-    contact: str = "spring",
-    direction: str = "across",
-    surrogate: Surrogate | None = None,
-    **fixed: Any,
-) -> Fit:
+    data: Any, unknowns: str | Sequence[str] = UNKNOWNS, *, contact: str = "spring", direction: str = "across",
+    surrogate: Surrogate | None = None, **fixed: Any,
+) -> Fit:  # fmt: skip
     """k and mu0 of a contact, or one of them, from measured friction.
 
     Parameters
@@ -57,7 +47,7 @@ def fit(
     Returns
     -------
     Fit
-        Values with covariance, every solution, and warnings, which are also issued by ``warnings``.
+        Its warnings are also issued by ``warnings``.
 
     Raises
     ------

@@ -3,16 +3,12 @@
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
 from mumacro.inputs import UNITS_OF, Scale, read_quantity, real, unknown_name
 from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch
-
-__all__ = ["ARGUMENTS", "BODIES", "GEOMETRIES", "Argument", "Geometry", "contact_of", "read_argument"]
 
 
 class Argument(NamedTuple):
@@ -56,22 +52,10 @@ GEOMETRIES = {
 
 
 def contact_of(geometry: str, /, **given: Any) -> Contact:
-    """The contact of a named geometry.
+    """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
 
-    Parameters
-    ----------
-    geometry : str
-        One of :data:`GEOMETRIES`.
-    **given
-        Its arguments and those of the bodies in SI, by the names of :data:`ARGUMENTS`; E2 and nu2 may be left out.
+    InputError for an unknown geometry, and an argument that is missing, unknown, no number or out of bounds.
 
-    Raises
-    ------
-    InputError
-        An unknown geometry; an argument that is missing, unknown, no number or out of bounds.
-
-    Examples
-    --------
     >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
     'ball'
     """
@@ -93,15 +77,8 @@ def contact_of(geometry: str, /, **given: Any) -> Contact:
 
 
 def read_argument(name: str, text: str) -> Any:
-    """The value of an argument from text: a number in SI or with a unit, in SI; ``rigid`` is an infinite modulus.
+    """The value of an argument in SI from text, as :func:`read_quantity`; ``rigid`` is an infinite modulus.
 
-    Raises
-    ------
-    ValueError
-        No number, or in no known unit; the message states what to write.
-
-    Examples
-    --------
     >>> read_argument("E", "210 GPa"), read_argument("radius", "5mm"), read_argument("E2", "rigid")
     (210000000000.0, 0.005, inf)
     """

@@ -5,8 +5,6 @@ unpacks data beyond their declared size.  Here only the requested parts are read
 memory is taken, and numbers are unpacked up to the size that they have.
 """
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Callable
@@ -15,26 +13,15 @@ from typing import Any
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5l, h5o, h5s, h5t, h5z
-from numpy.typing import NDArray
 
-__all__ = ["Group", "open_image"]
+from mumacro.arrays import Array
 
-Array = NDArray[np.float64]
 Refuse = Callable[[str], Exception]
 
 MOST_ATTRIBUTES = 64  # of a group whose attributes are all read
 MOST_TEXT = 65_536  # bytes of an attribute
 MOST_ITEMS = 64  # numbers of an attribute
-MOST_GROUPS = 256  # in a group whose groups are listed
 _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
-
-
-def open_image(image: bytes, refuse: Refuse) -> Group:
-    """The root of a file in memory; ``refuse`` makes the exception that is raised from a reason.
-
-    h5py raises nearly any exception where the bytes are no HDF5.
-    """
-    return Group(h5g.open(h5f.open_file_image(image), b"/"), "/", len(image), refuse)
 
 
 class Group:
@@ -56,16 +43,10 @@ class Group:
             raise self.refuse(f"{name!r} in {self.path} is no {what}")
         return found
 
-    def group(self, name: str) -> Group:
+    def group(self, name: str) -> "Group":
         """A group in this one."""
         path = f"{self.path.rstrip('/')}/{name}"
         return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
-
-    def groups(self) -> list[str]:
-        """The names of all members that are not variables."""
-        if self._id.get_num_objs() > MOST_GROUPS:
-            raise self.refuse(f"{self.path} holds more than {MOST_GROUPS} parts")
-        return [name.decode() for name in self._id if h5o.get_info(self._id, name).type != h5o.TYPE_DATASET]
 
     # --- attributes ---------------------------------------------------------------------------------
 
@@ -145,3 +126,11 @@ class Group:
         if h5z.FILTER_SHUFFLE in filters:
             raw = np.ascontiguousarray(raw.reshape(8, -1).T)
         return raw.view(np.dtype("<f8")).reshape(found.shape).astype(np.float64)
+
+
+def open_image(image: bytes, refuse: Refuse) -> Group:
+    """The root of a file in memory; ``refuse`` makes the exception that is raised from a reason.
+
+    h5py raises nearly any exception where the bytes are no HDF5.
+    """
+    return Group(h5g.open(h5f.open_file_image(image), b"/"), "/", len(image), refuse)

@@ -7,8 +7,6 @@ is always said: a number, or rigid contact by infinity, by the word ``rigid``, o
 **A gap is never rigid**: an empty cell, null or NaN in a column ``k`` makes its case illegal, see :data:`GAP`.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 import re
@@ -17,19 +15,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.errors import InputError
-
-__all__ = [
-    "BOUNDS", "FIELDS", "GAP", "LIKE", "MOST_HZ", "NAMES", "PER_UNIT", "PLAIN", "POSITIVE", "RAD_PER_CYCLE", "RIGID",
-    "SI", "UNITS", "UNITS_OF", "Scale", "as_columns", "check_inputs", "field_of", "is_rigid", "length_scale",
-    "number_hint",
-    "read_number", "read_quantity", "read_range", "real", "refusal", "scale_of", "split_unit", "suggestion",
-    "unit_of", "unknown_name",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 
 #: names that may be given, and the SI unit in words, for errors such as "give metres"
 SI = {
@@ -245,17 +233,8 @@ def number_hint(name: str, value: object) -> str:
 def read_number(name: str, text: str) -> float:
     """The value of an input from text, a number in SI or with a unit, in SI; ``rigid`` is an infinite stiffness.
 
-    Raises
-    ------
-    ValueError
-        The text is no number, or in no known unit; the message states what to write.
-
-    Examples
-    --------
-    >>> read_number("y0", "2e-6")
-    2e-06
-    >>> read_number("k", "1 N/um")
-    1000000.0
+    >>> read_number("y0", "2e-6"), read_number("k", "1 N/um")
+    (2e-06, 1000000.0)
     >>> read_number("y0", "2 N")
     Traceback (most recent call last):
     ...
@@ -301,16 +280,29 @@ def read_range(name: str, text: str) -> tuple[float, float]:
 # --- columns --------------------------------------------------------------------------------------------
 
 
+def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset has."""
+    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a query of DuckDB
+        import pyarrow as pa  # its columns come from one reading: a second one may have another order
+
+        cases = pa.table(cases)
+    try:
+        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
+        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
+        return {name: cases[name] for name in names if name in there}
+    except (AttributeError, TypeError, KeyError) as error:
+        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
+        raise InputError(
+            argument, kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
+            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
+        ) from error  # fmt: skip
+
+
 def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
-    """The six inputs as float64 arrays; their values are not checked.
+    """The six inputs as float64 arrays; InputError where one is missing, given twice, or no real number.
 
     ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, None or
     ``rigid``; an array may hold the word, too.
-
-    Raises
-    ------
-    InputError
-        An input is missing, given twice, or not a real number.
     """
     converted: dict[str, Array] = {}
     for name in FIELDS:
@@ -373,27 +365,16 @@ def real(name: str, value: Any) -> Array:
 
 
 def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
-    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega.
-
-    Raises
-    ------
-    InputError
-        Naming field, value, bound and, in an array, the index.
-    """
+    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` is what was given as ``f`` in place of omega."""
     for name, values in columns.items():
-        bad = _bad(name, values)
+        legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
+        bad = ~(legal if name == "k" else legal & np.isfinite(values))
         if bad.any():
             i = int(np.flatnonzero(bad.ravel())[0])
             field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
             value = float(told.ravel()[i])
             bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
             raise InputError(field, value, bound, i if values.ndim else None)
-
-
-def _bad(name: str, values: Array) -> NDArray[np.bool_]:
-    legal = (values > 0.0) if name in POSITIVE else (values >= 0.0)
-    out: NDArray[np.bool_] = ~(legal if name == "k" else legal & np.isfinite(values))
-    return out
 
 
 def length_scale(mu0: Array, Fz: Array, k: Array) -> Array:

@@ -6,21 +6,16 @@ changes its sign between two samples, bisection finds them.  Both turns begin in
 y~ = 9.72 v~, so they may stand between two samples, which the cubic through these then shows.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Places
 from mumacro.errors import InputError
 from mumacro.inputs import real
 
-__all__ = ["BOUND", "ENDS", "as_ends", "extremes", "middle", "without_interval"]
-
-Array = NDArray[np.float64]
 ENDS = ("k_low", "k_high")  # columns that hold an interval
 BOUND = "two stiffnesses [N/m] with 0 < low <= high, both finite"
 SPACING = 0.1  # of samples, in ln k
@@ -28,13 +23,7 @@ HALVINGS = 20  # of a spacing, until mu_macro next to an extreme is flat to 1e-1
 
 
 def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Inputs with :data:`ENDS` for ``k_range``, and nothing else that says k.
-
-    Raises
-    ------
-    InputError
-        k beside an interval, half an interval, or what is no pair.
-    """
+    """Inputs with :data:`ENDS` for ``k_range``; InputError for k beside it, half an interval, or what is no pair."""
     given = dict(inputs)
     if "k_range" in given:
         if told := [name for name in ("k", *ENDS) if name in given]:
@@ -52,13 +41,7 @@ def as_ends(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array]:
-    """Both ends and their geometric middle; NaN where they are no interval.
-
-    Raises
-    ------
-    InputError
-        What is no interval, as a single value or where ``illegal`` is "raise".
-    """
+    """Both ends and their geometric middle; for no interval NaN, or InputError as ``illegal`` and one value ask for."""
     low, high = (real(name, inputs[name]) for name in ENDS)
     try:
         low, high = np.broadcast_arrays(low, high)
@@ -73,13 +56,7 @@ def middle(inputs: Mapping[str, Any], illegal: str) -> tuple[Array, Array, Array
 
 
 def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """A case with the middle stiffness, and the ends of an interval of it, if there is one.
-
-    Raises
-    ------
-    InputError
-        What is no interval; an interval where k is the swept input ``along``.
-    """
+    """A case with the middle stiffness, and the ends of an interval of it, if any; there is none where k is swept."""
     if all(case.get(name) is None for name in ("k_range", *ENDS)):
         return case, {}
     given = as_ends(case)
@@ -91,7 +68,7 @@ def without_interval(case: Mapping[str, Any], along: str) -> tuple[Mapping[str, 
 
 
 def extremes(
-    evaluate: Callable[[Array, NDArray[np.intp]], tuple[Array, Array, Array]], low: Array, high: Array
+    evaluate: Callable[[Array, Places], tuple[Array, Array, Array]], low: Array, high: Array
 ) -> tuple[Array, Array, Array]:
     """Smallest and largest mu_macro over [low, high], shapes (n,), and the largest bound of its error met there.
 
@@ -103,14 +80,14 @@ def extremes(
     count = 1 + max(1, math.ceil(largest / SPACING)) if largest > 0.0 else 1
     least, most, bound = np.full(low.size, np.inf), np.full(low.size, -np.inf), np.zeros(low.size)
 
-    def take(k: Array, where: NDArray[np.intp]) -> tuple[Array, Array]:
+    def take(k: Array, where: Places) -> tuple[Array, Array]:
         mu, error, slope = evaluate(k, where)
         least[where] = np.fmin(least[where], mu)
         most[where] = np.fmax(most[where], mu)
         bound[where] = np.fmax(bound[where], error)
         return mu, slope
 
-    def close_in(left: Array, right: Array, sign: Array, where: NDArray[np.intp]) -> None:
+    def close_in(left: Array, right: Array, sign: Array, where: Places) -> None:
         """Takes points ever closer to a turn, left of which the slope has this sign."""
         for _ in range(HALVINGS if where.size else 0):
             half = np.sqrt(left) * np.sqrt(right)

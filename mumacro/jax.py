@@ -1,7 +1,5 @@
 """Friction inside JAX programs: the compiled kernel, called by XLA itself.  Needs the extra ``jax``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -19,8 +17,6 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(missing("jax", error), name=error.name) from None
 
-__all__ = ["Friction"]
-
 _OPENED: dict[int, Data] = {}
 
 
@@ -29,11 +25,7 @@ class Friction(DifferentiableFriction):
 
     See :class:`mumacro.interop.derivatives.DifferentiableFriction` for arguments and accuracy.  Programs run on the
     CPU.  Where a slope is infinite (v0 = 0 at y~ = 1, and for rigid contact), ``jacfwd`` gives NaN along every input.
-
-    Raises
-    ------
-    MumacroError
-        When a function is called while JAX has no double precision.
+    A call raises MumacroError while JAX has no double precision.
 
     Examples
     --------

@@ -1,17 +1,15 @@
 """The friction law: mu_macro over a range of v0, or of any one input, with its marks and the paper's approximations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import closed_forms
-from mumacro.answer import Answer
+from mumacro.answer import BAND, Answer
+from mumacro.arrays import Array
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import FIELDS, POSITIVE
@@ -19,13 +17,6 @@ from mumacro.interval import without_interval
 from mumacro.inverse import Crossing, border_crossings, checked_case
 from mumacro.inverse.rootfinding import Sweep
 from mumacro.surrogate import Surrogate
-
-__all__ = [
-    "APPROXIMATIONS", "BORDERS", "EQUATIONS", "SCALES", "Law", "approximations", "border_speeds", "borders",
-    "friction_law", "sweep_values",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 
 SCALES = ("log", "linear")
 
@@ -56,13 +47,7 @@ BORDERS = {
     "large_amplitude": "l0 omega sqrt(y~ / 4.402914), eq. (26) with the exact constant; given for y~ >= 1",
     "blend": "one formula for every y~, within 0.6 percent",
 }
-#: the paper's equation -> the column that holds it, in APPROXIMATIONS or BORDERS
-EQUATIONS = {
-    16: "static", 23: "eq_23", 24: "eq_24", 26: "eq_26", 27: "eq_27", 28: "master_curve", 31: "small_amplitude",
-    32: "critical", 35: "rigid", 37: "rigid", 38: "static", 39: "eq_24", 40: "critical",
-}  # fmt: skip
 _CORNER_REACH, _CORNER_TOP = 0.5, 0.7
-_BAND = ("mu_macro_low", "mu_macro_high")
 #: column of BORDERS -> formula, smallest and largest y~
 _FORMULAS = {
     "eq_23": (closed_forms.border_23, 0.0, 1.0),
@@ -77,45 +62,26 @@ _FORMULAS = {
 
 @dataclass(frozen=True)
 class Law:
-    """A sweep of one input.
+    """A sweep of one input."""
 
-    Attributes
-    ----------
-    along : str
-        The swept input.
-    values : ndarray
-        Its values [SI], ascending, shape (n,).
-    answer : Answer[Any]
-        The surrogate's results, arrays (n,); of an interval of k those at its geometric middle, and
-        ``mu_macro_low`` and ``mu_macro_high``.
-    mu_static : ndarray
-        Static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,).
-    border : tuple of Crossing
-        Where in the range continuous sliding, or along reverse slip, begins or ends.
-    case : dict of str to float
-        The other five inputs [SI], checked; an interval of k by its middle.
-    kind : Kind
-        Contact and direction; ``kind.names`` has them in words.
-    """
-
-    along: str
-    values: Array
-    answer: Answer[Any]
-    mu_static: Array
-    border: tuple[Crossing, ...]
-    case: dict[str, float]
-    kind: Kind = SPRING
+    along: str  #: the swept input
+    values: Array  #: its values [SI], ascending, shape (n,)
+    answer: Answer[Any]  #: the results, arrays (n,); of an interval of k those at its geometric middle, and the band
+    mu_static: Array  #: static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,)
+    border: tuple[Crossing, ...]  #: where in the range continuous sliding, or along reverse slip, begins or ends
+    case: dict[str, float]  #: the other five inputs [SI], checked; an interval of k by its middle
+    kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
 
     @property
     def band(self) -> tuple[Array, Array] | None:
         """Smallest and largest mu_macro over an interval of k [-], (n,) each; None where k is one number."""
-        low, high = (getattr(self.answer, name, None) for name in _BAND)
+        low, high = (getattr(self.answer, name, None) for name in BAND)
         return None if low is None or high is None else (low, high)
 
     @property
     def columns(self) -> dict[str, Any]:
         """The law as a table: column -> values (n,), the swept input first."""
-        names = ["mu_macro", *(_BAND if self.band else ()), "regime", "error_bound", "source"]
+        names = ["mu_macro", *(BAND if self.band else ()), "regime", "error_bound", "source"]
         found = {name: getattr(self.answer, name) for name in names}
         return {self.along: self.values, **found, "mu_static": self.mu_static}
 
@@ -127,12 +93,9 @@ class Law:
 
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
-    """``points`` values from ``start`` to ``stop``, both included exactly.
+    """``points`` values from ``start`` to ``stop``, both included exactly, even on a ``scale`` "log" or "linear".
 
-    Raises
-    ------
-    InputError
-        Ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
+    InputError for ends out of bounds or not ascending, a logarithmic range from 0, fewer than two points.
     """
     if along not in (*FIELDS, AMPLITUDE):
         raise InputError("along", along, f"one of {', '.join(FIELDS)}, {AMPLITUDE}")
@@ -155,33 +118,25 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
 
 def friction_law(
     surrogate: Surrogate, along: str, values: Array, case: Mapping[str, Any], *, contact: str = "spring",
-    direction: str = "across", k_range: tuple[float, float] | None = None, refine: bool = False,
+    direction: str = "across", refine: bool = False,
 ) -> Law:  # fmt: skip
     """The friction law: mu_macro over a range of one input.
 
     Parameters
     ----------
     surrogate : Surrogate
-        The table to evaluate.
     along : str
         The swept input: mu0, Fz, k, y0, omega or v0; for direction normal Fz_amplitude in place of y0.
     values : ndarray
         Its values [SI], ascending, shape (n,), such as :func:`sweep_values` makes.
     case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``, ``k_range`` for
-        ``k``.
+        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``; ``k_range``, lowest
+        and highest stiffness, for ``k``: the law has a band, see :attr:`Law.band`.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
-    k_range : (float, float), optional
-        Lowest and highest stiffness [N/m] in place of k: the law has a band, see :attr:`Law.band`.
     refine : bool
         Also values where mu_macro bends, for pictures: at the borders, and where a straight line between neighbours
         would be wrong by more than a thousandth of the law's height.
-
-    Returns
-    -------
-    Law
-        The results with the static limit and the borders of continuous sliding and reverse slip.
 
     Raises
     ------
@@ -197,7 +152,7 @@ def friction_law(
     ([0.2238, 0.24, 0.2957], 0.07105)
     """
     kind = kind_of(contact, direction)
-    case, ends = without_interval(case if k_range is None else {**case, "k_range": k_range}, along)
+    case, ends = without_interval(case, along)
     known = checked_case(case, along, kind)
     sweep = Sweep(surrogate, known, along, kind)
     border = border_crossings(surrogate, along, known, float(values[0]), float(values[-1]), **kind.names)
@@ -214,10 +169,7 @@ def friction_law(
 def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the stated range.
 
-    Raises
-    ------
-    InputError
-        The law of a ball, or of an oscillation along or normal: the article has one spring, across.
+    InputError for a ball, and an oscillation along or normal: the article has one spring, across.
     """
     inputs = _of_one_spring(law)
     mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
@@ -233,15 +185,12 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
         share, fit_share = (np.where(v > 0.0, v / at, 0.0) for at in (border, fit_border))
         static, critical, top = closed_forms.static_limit(y), closed_forms.critical(y), surrogate.mu_ratio(border, y)
         rigid = np.where(elastic, closed_forms.outer(np.where(v > 0.0, y / v, math.inf)), law.answer.mu_ratio)
-        corner = closed_forms.corner_root(v, y - 1.0)
+        corner, limit = closed_forms.corner_root(v, y - 1.0), closed_forms.master_curve_limit(share)
         found = {
             "static": (law.mu_static, True),
             "creep": (creep, creep <= mu0),
             "master_curve": (mu0 * (static + (critical - static) * closed_forms.master_curve(fit_share)), low),
-            "master_curve_limit": (
-                mu0 * (static + (top - static) * closed_forms.master_curve_limit(share)),
-                low & (v <= border),
-            ),
+            "master_curve_limit": (mu0 * (static + (top - static) * limit), low & (v <= border)),
             "critical": (mu0 * critical, low),
             "small_amplitude": (mu0 * closed_forms.small_amplitude(v, y), low & slides),
             "continuous": (mu0 * closed_forms.continuous(v, y), slides),
@@ -254,8 +203,6 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
 def borders(y: Array) -> dict[str, Array]:
     """v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN outside the stated range.
 
-    Examples
-    --------
     >>> found = borders(np.array([0.5, 2.0]))
     >>> found["eq_24"].round(4).tolist(), found["eq_26"].round(4).tolist()
     ([0.1124, nan], [nan, 0.6667])

@@ -5,8 +5,6 @@ It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel
 processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,12 +12,9 @@ from typing import Any
 
 import numpy as np
 from cffi import FFI
-from numpy.typing import NDArray
 
-__all__ = ["BLOCK_COLUMNS", "PIECE_COLUMNS", "Data", "Kernel", "kernels", "open_for_xla", "xla_handler"]
+from mumacro.arrays import Array, Codes
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int8]
 #: columns of :class:`Data`'s arrays of blocks and of pieces of the border, see ``kernel/data.h``
 BLOCK_COLUMNS, PIECE_COLUMNS = 8, 4
 
@@ -32,6 +27,7 @@ _NUMBERS, _CODES, _CASE = map(_FFI.typeof, ("double[]", "int8_t[]", "double[19]"
 _POINT, _CODE = map(_FFI.typeof, ("double[4]", "int8_t[1]"))
 _SIX, _STRIDES, _COLUMNS = map(_FFI.typeof, ("double[6]", "int64_t[6]", "double *[6]"))
 _NOTHING: Any = _FFI.NULL
+_new, _unpack = _FFI.new, _FFI.unpack
 
 
 def _numbers(array: Array | None) -> Any:
@@ -41,20 +37,13 @@ def _numbers(array: Array | None) -> Any:
 class Data:
     """A table as the kernel reads it.
 
-    Parameters
-    ----------
-    border : ndarray
-        Polynomials of v~crit (cells, 8), highest power first.
-    pieces : ndarray
-        (3, PIECE_COLUMNS): first cell, offset, step, relative error.
-    blocks : ndarray
-        (sources + 1, BLOCK_COLUMNS): first cell, cells along b, offset and step along a, along b; zero where no cells.
-    outer : ndarray
-        The two terms of large speed, (cells, 2, 8).
+    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3, PIECE_COLUMNS): first cell,
+    offset, step, relative error.  ``blocks`` (sources + 1, BLOCK_COLUMNS): first cell, cells along b, offset and step
+    along a, along b; zero where no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
-        self.pointer = _FFI.new("mumacro_data *")
+        self.pointer = _new("mumacro_data *")
         self._kept: list[Any] = []
         #: points (nodes, 2) and errors (2, 8) of the pieces of a ball, see ``mumacro_rule``; none until they are put
         self.rules: list[tuple[Array, Array]] = []
@@ -128,7 +117,7 @@ class Kernel:
 
     def value(self, data: Data, quantity: int, v: float, y: float) -> tuple[float, float, int]:
         """A quantity at one point in plain numbers, its bound and the source."""
-        point, code = _FFI.new(_POINT, (v, y)), _FFI.new(_CODE)
+        point, code = _new(_POINT, (v, y)), _new(_CODE)
         self._values(data.pointer, 0, 0, quantity, 1, point, point + 1, point + 2, point + 3, code)
         return point[2], point[3], code[0]
 
@@ -146,7 +135,7 @@ class Kernel:
         ``columns`` are the six inputs, (n,) or one number.  Rows: mu_macro, mu_ratio, bound; v~, y~; slopes by input
         and their bounds.  ``kind``: another contact and direction, see :class:`mumacro.contact.Kind`.
         """
-        constants, strides, pointers = _FFI.new(_SIX), _FFI.new(_STRIDES), _FFI.new(_COLUMNS)
+        constants, strides, pointers = _new(_SIX), _new(_STRIDES), _new(_COLUMNS)
         kept = []
         for i, column in enumerate(columns):
             if isinstance(column, float):
@@ -159,23 +148,20 @@ class Kernel:
         codes = _FFI.from_buffer(_CODES, source)
         self._cases(data.pointer, *kind, n, pointers, strides, rows.shape[0], out, rows.shape[1], codes)
 
-    def one(self, data: Data, six: tuple[float, ...], numbers: int) -> list[float]:
+    def one(self, pointer: Any, six: tuple[float, ...], numbers: int) -> list[float]:
         """One case in plain numbers: mu_macro, mu_ratio, bound, v~, y~, l0, source; of 19 also slopes and bounds."""
-        out = _FFI.new(_CASE)
-        self._one(data.pointer, *six, numbers, out)
-        found: list[float] = _FFI.unpack(out, numbers)
-        return found
+        out, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six  # named: a call with *six takes longer
+        self._one(pointer, mu0, Fz, k, y0, omega, v0, numbers, out)
+        return _unpack(out, numbers)  # type: ignore[no-any-return]
 
-    def partials(self, data: Data, quantity: int, v: Array, y: Array) -> Array:
-        """d/dv~ and d/dy~ of a quantity at points (n,), one-sided at v~ = 0: (2, n)."""
-        out = np.empty((2, v.size))
-        self._found.partials(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1])))
-        return out
+    def derivatives(self, data: Data, quantity: int, v: Array, y: Array, order: int) -> Array:
+        """Of a quantity at points (n,), (2, n) or (3, n): d/dv~ and d/dy~; d2/dv~2, d2/dv~ dy~ and d2/dy~2.
 
-    def bends(self, data: Data, quantity: int, v: Array, y: Array) -> Array:
-        """d2/dv~2, d2/dv~ dy~, d2/dy~2 of a quantity at points (n,), NaN at v~ = 0: (3, n)."""
-        out = np.empty((3, v.size))
-        self._found.bends(data.pointer, quantity, v.size, *map(_numbers, (v, y, out[0], out[1], out[2])))
+        The first ones are one-sided at v~ = 0, the second ones NaN there.
+        """
+        out = np.empty((order + 1, v.size))
+        ask = self._found.partials if order == 1 else self._found.bends
+        ask(data.pointer, quantity, v.size, *map(_numbers, (v, y, *out)))
         return out
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:

@@ -1,21 +1,16 @@
 """Measured points of friction: their columns, checked, and the model at them; for :mod:`mumacro.fitting`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array, Bools
 from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
-from mumacro.inputs import NAMES, as_columns, check_inputs, real, unknown_name
+from mumacro.inputs import NAMES, as_columns, check_inputs, picked, real, unknown_name
 from mumacro.surrogate import Surrogate
 
-__all__ = ["HARDLY", "STD", "UNKNOWNS", "Measured"]
-
-Array = NDArray[np.float64]
 UNKNOWNS = ("k", "mu0")
 HARDLY = 20.0  # y~, from which on mu_macro hardly depends on k (docs/validity.md)
 STD = "std"  # the column of standard deviations
@@ -52,18 +47,13 @@ class Measured:
                 raise InputError(name, fixed[name], f"left out, or taken from unknowns={self.unknowns}: it is fitted")
             if name not in (*known, "mu_macro", STD):
                 raise InputError(name, fixed[name], f"one of {', '.join(known)}; {unknown_name(name, known)}")
-        names = [*known, "mu_macro", STD]
-        try:
-            there = data if hasattr(data, "keys") else getattr(data, "column_names", None) or data.columns
-            columns = {name: data[name] for name in names if name in there}
-        except (AttributeError, TypeError, KeyError) as error:
-            raise InputError("data", type(data).__qualname__, "a mapping or table with columns by name") from error
+        columns = picked("data", data, [*known, "mu_macro", STD])
         if twice := sorted(columns.keys() & fixed.keys()):
             raise InputError(twice[0], fixed[twice[0]], "given once: as a column or as a keyword")
         given = {**columns, **fixed}
         for name in ("mu_macro", "v0"):
             if name not in given:
-                raise InputError(name, sorted(map(str, there)), f"a column of the data: {name} of each point")
+                raise InputError(name, sorted(columns), f"a column of the data: {name} of each point")
         return given
 
     def _read(self, given: dict[str, Any]) -> None:
@@ -142,7 +132,7 @@ class Measured:
         return np.asarray(self.surrogate.evaluate(**inputs).mu_macro)
 
 
-def _refuse(name: str, column: Array, legal: NDArray[np.bool_], bound: str) -> None:
+def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:
     """An error for the first value that is not legal."""
     if not legal.all():
         at = int(np.argmin(legal))

@@ -4,8 +4,6 @@ The service serves it, and ``python -m builder.export_page`` writes it into a fo
 ``service/static/page``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -15,8 +13,6 @@ from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs import BOUNDS, LIKE, POSITIVE, RAD_PER_CYCLE, UNITS_OF, Scale, unit_of
 from mumacro.surrogate import Surrogate
-
-__all__ = ["POLICY", "map_of", "names"]
 
 #: the content security policy of the page: no inline script, no inline style, nothing from another host
 POLICY = (
@@ -85,16 +81,11 @@ def map_of(surrogate: Surrogate) -> dict[str, Any]:
     ratio = surrogate.mu_ratio(v[None, :], y[:, None])
     amplitudes = np.geomspace(y[0], y[-1], 4 * y.size)
     rounded = np.rint(ratio / _UNIT).astype(int).ravel().tolist()
-    border = _line(surrogate.v_tilde_crit(amplitudes), amplitudes)
+    border = np.column_stack((surrogate.v_tilde_crit(amplitudes), amplitudes)).tolist()
+    border = [[float(f"{x:.6g}") for x in place] for place in border]
     return {**axes, "unit": _UNIT, "mu_ratio": rounded, "border": border}
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:
     """The factor and the divisor of each unit."""
     return {unit: [scale.times, scale.over] for unit, scale in units.items()}
-
-
-def _line(v: Any, y: Any) -> list[Any]:
-    """Points (v~, y~) of a curve, in six digits; without those at which it is not defined."""
-    places = np.column_stack((v, y))[np.isfinite(v)]
-    return [[float(f"{x:.6g}") for x in place] for place in places.tolist()]

@@ -1,27 +1,21 @@
 """Pictures of a law, of the map of mu~ and of answers, by matplotlib, which is loaded at the first of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mumacro.answer import Answer
 from mumacro.charts import REGIMES
 from mumacro.contact import AMPLITUDE, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
 from mumacro.extras import missing
 from mumacro.inputs import unit_of
-
-if TYPE_CHECKING:
-    from mumacro.answer import Answer
-    from mumacro.inverse import Crossing
-    from mumacro.law import Law
-    from mumacro.surrogate import Surrogate
-
-__all__ = ["ENDINGS", "mark_of", "plot_answer", "plot_law", "plot_map", "save", "y_range"]
+from mumacro.inverse import Crossing
+from mumacro.law import Law
+from mumacro.surrogate import Surrogate
 
 ENDINGS = (".png", ".svg", ".pdf")
 V_RANGE, Y_RANGE = (1e-4, 1e3), (1e-2, 1e3)  # of the map [-]: from deep in creep to fast sliding
@@ -41,25 +35,17 @@ def _loaded(name: str) -> Any:
         raise MumacroError(missing("plot", error)) from None
 
 
-def _own(axes: Any) -> Any:
+def own(axes: Any) -> Any:
+    """The axes of matplotlib that were given, or new ones."""
     return _loaded("pyplot").subplots(layout="constrained")[1] if axes is None else axes
 
 
 def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
-    """Write a picture; ``draw`` gets its axes.
-
-    Raises
-    ------
-    InputError
-        The name does not end in one of :data:`ENDINGS`.
-    MumacroError
-        matplotlib is not installed.
-    """
+    """Write a picture; ``draw`` gets its axes.  InputError where the name does not end in one of :data:`ENDINGS`."""
     path = Path(path)
     if path.suffix not in ENDINGS:
-        raise InputError(
-            "file name", str(path), f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"
-        )
+        told = f"a name that ends in {', '.join(ENDINGS)}, or for the command in .csv"
+        raise InputError("file name", str(path), told)
     figure = _loaded("figure").Figure(figsize=(7.0, 4.5), layout="constrained")
     draw(figure.subplots())
     figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
@@ -68,10 +54,10 @@ def save(path: str | Path, draw: Callable[[Any], Any]) -> None:
 def plot_law(law: Law, axes: Any = None, *, roots: Iterable[float] = (), target: float | None = None) -> Any:
     """mu_macro along one input, with the static limit, the borders, the band of k_range, and roots of a target.
 
-    ``roots`` are values of the input [SI] to mark, and ``target`` the mu_macro [-] that they give.  Draws on ``axes``
-    of matplotlib, or new ones, and returns them; raises MumacroError where matplotlib is not installed.
+    ``roots`` are values of the input [SI] to mark, and ``target`` the mu_macro [-] that they give.  As all pictures
+    this draws on ``axes`` of matplotlib, or new ones, and returns them; MumacroError where it is not installed.
     """
-    axes, x = _own(axes), law.values
+    axes, x = own(axes), law.values
     axes.plot(x, law.answer.mu_macro, label=r"$\mu_\mathrm{macro}$")
     if law.band:
         axes.fill_between(x, *law.band, alpha=0.25, lw=0.0, label="for every $k$ of the interval")
@@ -105,10 +91,9 @@ def y_range(kind: Kind) -> tuple[float, float]:
 def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, float] | None = None, **kind: str) -> Any:
     """mu~ over the dimensionless speed and amplitude, with the border of continuous sliding and a ``point`` (v~, y~).
 
-    ``contact`` and ``direction`` as in :meth:`mumacro.Surrogate.quantity`.  Returns the matplotlib Axes; raises
-    MumacroError where matplotlib is not installed.
+    ``contact`` and ``direction`` as in :meth:`mumacro.Surrogate.quantity`.
     """
-    axes, chosen = _own(axes), kind_of(**kind)
+    axes, chosen = own(axes), kind_of(**kind)
     ends = y_range(chosen)
     v, y = np.geomspace(*V_RANGE, 281), np.geomspace(*ends, 201)
     ratio = surrogate.quantity("mu_ratio", v, y[:, None], **kind)[0]
@@ -124,13 +109,10 @@ def plot_map(surrogate: Surrogate, axes: Any = None, *, point: tuple[float, floa
 
 
 def plot_answer(answer: Answer[Any], axes: Any = None) -> Any:
-    """The cases of an answer over (v~, y~), one colour a regime; of arrays the groups must have been requested.
-
-    Returns the matplotlib Axes; raises MumacroError where matplotlib is not installed.
-    """
+    """The cases of an answer over (v~, y~), one colour a regime; of arrays the groups must have been requested."""
     from mumacro.closed_forms import border_blend  # an answer has no table
 
-    axes = _own(axes)
+    axes = own(axes)
     v, y, codes = (np.ravel(np.asarray(x)) for x in (answer.v_tilde, answer.y_tilde, answer.regime_code))
     for code, name in enumerate(REGIMES):
         shown = (codes == code) & (v > 0.0) & (y > 0.0) & np.isfinite(v) & np.isfinite(y)

@@ -1,7 +1,5 @@
 """``mumacro fit``: k and mu0 from measured points in a file."""
 
-from __future__ import annotations
-
 import csv
 import math
 import sys
@@ -14,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import command
-from mumacro.command import ImpossibleError, UsageError, as_json, in_columns, kind_in, open_table
+from mumacro.command import ImpossibleError, UsageError, as_json, in_columns, open_table
 from mumacro.contact import AMPLITUDE
 from mumacro.errors import InputError
 from mumacro.fitted import Fit
@@ -23,8 +21,6 @@ from mumacro.inputs import LIKE, SI, unit_of
 from mumacro.measured import STD, UNKNOWNS
 from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head
 from mumacro.validity import digits
-
-__all__ = ["FIT", "fit_points", "read_points"]
 
 FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
@@ -51,7 +47,7 @@ def fit_points(words: Sequence[str]) -> str:
     unknown, more = ([x for x in chosen.unknown if ("=" in x) == given] for given in (False, True))
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
-    kind = kind_in(chosen)
+    kind = command.kind_in(chosen)
     text = sys.stdin.read() if chosen.points == "-" else Path(chosen.points).read_text("utf-8-sig", "replace")
     points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
     there = [*unknown, *(name for name in points if name in kind.columns)]

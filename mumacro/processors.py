@@ -1,14 +1,10 @@
 """How many processors there are for this process, and how many threads a call may start by default."""
 
-from __future__ import annotations
-
 import functools
 import multiprocessing
 import os
 import threading
 from contextlib import suppress
-
-__all__ = ["default_threads", "processors"]
 
 
 @functools.cache

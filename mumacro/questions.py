@@ -1,7 +1,5 @@
 """The commands that answer more than one case: ``mumacro law``, ``solve-for``, ``map`` and ``stiffness``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -10,24 +8,12 @@ from typing import Any
 import numpy as np
 
 from mumacro import command, plotting
-from mumacro.command import (
-    ImpossibleError,
-    OneLineParser,
-    UsageError,
-    as_json,
-    format_for,
-    in_columns,
-    kind_in,
-    open_table,
-    read_case,
-)  # fmt: skip
+from mumacro.command import ImpossibleError, OneLineParser, UsageError, as_json, in_columns, open_table, read_case
 from mumacro.contact import AMPLITUDE
 from mumacro.geometries import ARGUMENTS, BODIES, GEOMETRIES, contact_of, read_argument
 from mumacro.inputs import NAMES, field_of, unit_of
 from mumacro.inverse import solve_for
 from mumacro.law import approximations, friction_law, sweep_values
-
-__all__ = ["LAW", "ONE_K", "SOLVE_FOR", "STIFFNESS", "law", "map_", "solve", "stiffness_of"]
 
 LAW = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s 1m/s"
 SOLVE_FOR = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
@@ -48,7 +34,7 @@ def law(words: Sequence[str]) -> str:
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
     parser.add_argument("--approximations", action="store_true", help="also the approximations of the article")
     chosen = parser.parse_intermixed_args(words)
-    (along, *ends), kind = chosen.along, kind_in(chosen)
+    (along, *ends), kind = chosen.along, command.kind_in(chosen)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
     (inner, scale), unit = field_of(along), unit_of(along)
@@ -65,7 +51,7 @@ def law(words: Sequence[str]) -> str:
     if chosen.json:
         return as_json({"along": along, "unit": unit, **columns, "border": border, "table": command.about(surrogate)})
     headed = {f"{name} [{unit}]" if name == along else name: column for name, column in columns.items()}
-    form = format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
+    form = command.format_for(chosen, surrogate, {**case, inner: values[values.size // 2]}, kind)
     of_k = ", for the geometric middle of k" if found.band else ""
     marks = [f"{plotting.mark_of(c)[1]} at {along} = {c.value / scale:{form}} {unit}{of_k}" for c in found.border]
     if chosen.out is not None:
@@ -93,7 +79,7 @@ def solve(words: Sequence[str]) -> str:
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
     chosen = parser.parse_intermixed_args(words)
     unknown, (inner, scale), unit = chosen.unknown, field_of(chosen.unknown), unit_of(chosen.unknown)
-    kind = kind_in(chosen)
+    kind = command.kind_in(chosen)
     if unknown not in kind.columns:
         raise UsageError(f"{unknown} does not belong to --direction {chosen.direction}: {', '.join(kind.columns)} do")
     case = read_case(chosen.words, kind, [unknown], one_k=ONE_K)
@@ -130,7 +116,7 @@ def solve(words: Sequence[str]) -> str:
         return command.write_result(
             chosen.out, columns, lambda axes: plotting.plot_law(curve, axes, roots=at, target=target)
         )  # fmt: skip
-    form = format_for(chosen, surrogate, {**case, inner: found.roots[0][0].value}, kind)
+    form = command.format_for(chosen, surrogate, {**case, inner: found.roots[0][0].value}, kind)
     return in_columns([heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)])
 
 
@@ -142,7 +128,7 @@ def map_(words: Sequence[str]) -> str:
     chosen = parser.parse_intermixed_args(words)
     if chosen.out is None:
         raise UsageError("a map is written to a file: give -o map.png")
-    kind, surrogate = kind_in(chosen), open_table(chosen.table)
+    kind, surrogate = command.kind_in(chosen), open_table(chosen.table)
     one_k = "one k is needed: the map marks one point"
     point = None
     if chosen.words:

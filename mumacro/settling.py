@@ -19,69 +19,40 @@ Both are tabulated, with bounds.  The springs of a ball are independent, and S r
 (60 rays from y~/v~ = 1e-4 to 1e6), so the middle one is the slowest: that of the smallest k, two thirds of the mean.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mumacro.contact import kind_of
 from mumacro.errors import InputError
 from mumacro.surrogate import Surrogate
 
-__all__ = ["Settling", "settling"]
-
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Settling:
-    """How fast a disturbance decays; floats for scalar inputs, arrays of the broadcast shape otherwise.
+    """How fast a disturbance decays; floats for scalar inputs, arrays of the broadcast shape otherwise."""
 
-    Attributes
-    ----------
-    periods : float or ndarray
-        Periods [-] until a small disturbance has fallen to ``remaining``; in stick-slip at most as many.
-    periods_any : float or ndarray
-        Periods [-] after which any disturbance has, whatever its size: twice ``periods``.
-    time : float or ndarray
-        ``periods`` in seconds; finite without oscillation, too.
-    slip_path : float or ndarray
-        Path of the foot per period [l0], of a ball that of its middle spring [1.5 l0].  exp(-slip_path) is the
-        multiplier of a small disturbance per period.
-    error_bound : float or ndarray
-        Bound of the error of ``periods`` that comes from the table [-]; NaN from a table without bounds of the power.
-    """
-
-    periods: Any
-    periods_any: Any
-    time: Any
+    periods: Any  #: periods [-] until a small disturbance has fallen to ``remaining``; in stick-slip at most as many
+    periods_any: Any  #: periods [-] after which any disturbance has, whatever its size: twice ``periods``
+    time: Any  #: ``periods`` in seconds; finite without oscillation, too
+    #: path of the foot per period [l0], of a ball that of its middle spring [1.5 l0]; exp(-slip_path) is the multiplier
+    #: of a small disturbance per period
     slip_path: Any
-    error_bound: Any
+    error_bound: Any  #: bound of the error of ``periods`` that comes from the table [-]
 
 
 def settling(
-    surrogate: Surrogate,
-    *,
-    mu0: ArrayLike,
-    Fz: ArrayLike,
-    k: ArrayLike | None,
-    y0: ArrayLike,
-    omega: ArrayLike,
-    v0: ArrayLike,
-    remaining: float = 0.01,
-    contact: str = "spring",
-    direction: str = "across",
-) -> Settling:
+    surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike | None, y0: ArrayLike, omega: ArrayLike,
+    v0: ArrayLike, remaining: float = 0.01, contact: str = "spring", direction: str = "across",
+) -> Settling:  # fmt: skip
     """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.
 
     Parameters
     ----------
     surrogate : Surrogate
-        The table that gives mu~ and the oscillation power.
     mu0, Fz, k, y0, omega, v0 : array_like
         The case [-, N, N/m, m, rad/s, m/s], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
@@ -89,19 +60,13 @@ def settling(
     contact : str
         "spring"; or "ball", whose slowest spring is answered for.
     direction : str
-        "across" only: the decay is not derived for the other directions.
+        "across" only, else InputError: the decay is not derived for the other directions.
 
     Returns
     -------
     Settling
         Infinite where nothing slips (v0 = 0 with y~ <= 1, or with omega = 0): a disturbance stays.  Zero for
-        rigid contact, whose friction follows at once.  NaN at an illegal case of an array, if the surrogate lets it
-        pass.
-
-    Raises
-    ------
-    InputError
-        An input out of bounds, another direction.
+        rigid contact, whose friction follows at once.  NaN at an illegal case of an array.
 
     Notes
     -----

@@ -27,15 +27,11 @@ K. L. Johnson, "Contact Mechanics", Cambridge University Press (1985), Secs. 4.2
 V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2, 8.2; its G* is four times the one here.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from mumacro.errors import InputError
-
-__all__ = ["AXES", "Contact", "Material", "ball_on_flat", "cylinder_on_flat", "flat_punch", "in_series"]
 
 SMALLEST, LARGEST = 1e-60, 1e60  # of numbers in SI: every product of them below is a double
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
@@ -49,17 +45,8 @@ def _positive(**values: float) -> None:
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic elastic body.
+    """An isotropic elastic body: Young's modulus E [Pa] > 0, ``math.inf`` if rigid; Poisson's ratio -1 < nu <= 0.5.
 
-    Parameters
-    ----------
-    E : float
-        Young's modulus [Pa], > 0; ``math.inf`` for a rigid body.
-    nu : float
-        Poisson's ratio [-], -1 < nu <= 0.5.
-
-    Examples
-    --------
     >>> steel = Material(E=210e9, nu=0.3)
     >>> round(steel.G / 1e9, 2)
     80.77
@@ -82,27 +69,13 @@ class Material:
 
 @dataclass(frozen=True)
 class Contact:
-    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its ``contact``.
+    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its ``contact``."""
 
-    Attributes
-    ----------
-    k : float
-        Tangential stiffness [N/m] while it sticks everywhere: the input of the model.
-    k_normal : float
-        Normal stiffness [N/m].
-    half_width : float
-        Radius of a circular contact, half width of a line contact [m].
-    pressure : float
-        Largest pressure [Pa]: Hertz's, or the mean one under a flat punch.
-    contact : str
-        The kind of contact that ``evaluate`` computes with this k: "spring" or "ball".
-    """
-
-    k: float
-    k_normal: float
-    half_width: float
-    pressure: float
-    contact: str = "spring"
+    k: float  #: tangential stiffness [N/m] while it sticks everywhere: the input of the model
+    k_normal: float  #: normal stiffness [N/m]
+    half_width: float  #: radius of a circular contact, half width of a line contact [m]
+    pressure: float  #: the largest [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge
+    contact: str = "spring"  #: the kind that ``evaluate`` computes with this k: "spring" or "ball"
 
     def keys(self) -> tuple[str, ...]:
         """What is passed on: k, and the kind of contact where it is not the usual one."""
@@ -136,14 +109,9 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     radius : float
         Radius of the ball [m]; of two balls 1/(1/R1 + 1/R2).
     Fz : float
-        Normal force [N].
+        Normal force [N]; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
     first, second : Material
         The two bodies.
-
-    Returns
-    -------
-    Contact
-        A "ball"; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
 
     Notes
     -----
@@ -176,11 +144,6 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
         Normal force [N]; sets the pressure only, k does not depend on it.
     first, second : Material
         The two bodies; exact for a rigid punch on a half-space.
-
-    Returns
-    -------
-    Contact
-        ``pressure`` is the mean one; at the edge it is singular in elasticity.
 
     Examples
     --------
@@ -217,11 +180,6 @@ def cylinder_on_flat(
         The two bodies.
     oscillation : str
         "across" or "along" the cylinder's axis: how the contact oscillates, whichever way it slides.
-
-    Returns
-    -------
-    Contact
-        k in the direction of the oscillation.
 
     Raises
     ------
@@ -276,12 +234,8 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
 
 
 def in_series(*stiffnesses: float) -> float:
-    """Stiffness [N/m] of springs in series, such as contact, roughness and holder: 1/k = sum of 1/k_i.
+    """Stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder; ``math.inf`` is a rigid part.
 
-    A stiffness is > 0; ``math.inf`` is a rigid part.
-
-    Examples
-    --------
     >>> round(in_series(3e6, 6e6))
     2000000
     """

@@ -1,33 +1,27 @@
 """The surrogate for users.  Value, regime, source, gradient, power and stick fraction, each with its bound."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro import batch, charts, closed_forms
 from mumacro.answer import Answer, AnswerWithGradient, IntervalAnswer, single
-from mumacro.border import Border
+from mumacro.arrays import Array, Places
 from mumacro.bundled import bundled_tables
-from mumacro.cells import block_rows, outer_cells, quantity_cells
+from mumacro.cells import Border, block_rows, outer_cells, quantity_cells
 from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
 from mumacro.errors import InputError, TableError
-from mumacro.html import html_table
-from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, real
+from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, picked, real
 from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
 from mumacro.processors import default_threads
 from mumacro.table import BorderPiece, Table, json_attributes, parse_table, read_image
 
-__all__ = ["Surrogate"]
-
-Array = NDArray[np.float64]
 _KERNEL = kernels[-1]
 _ONE = kernels[:2][-1]  # a single point does not fill the widest registers; the bits are the same
 _RATIO = _ONE.ratio
@@ -51,11 +45,11 @@ class Surrogate:
     (0.240012, 'stick_slip')
     """
 
-    def __init__(self, table: Table, path: str | Path, threads: int | None = None, image: bytes | None = None) -> None:
+    def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
         if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
             raise InputError("threads", threads, "None or a whole number from 1 to 1024")
         self._asked_threads = threads
-        self._image = image
+        self._image: bytes | None = None
         self.path = Path(path)
         self.table = table
         self.attributes = json_attributes(table)
@@ -70,7 +64,7 @@ class Surrogate:
         self._pointer = self._data.pointer
 
     @classmethod
-    def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Surrogate:
+    def open(cls, table: str | Path | float | None = None, threads: int | None = None) -> Self:
         """Read, check and prepare a table.
 
         Parameters
@@ -81,11 +75,6 @@ class Surrogate:
         threads : int, optional
             Threads that large arrays are divided among; 1 never starts one.  Left out: all processors when called from
             the main thread of a program; one in other threads and in child processes, where work is already divided.
-
-        Returns
-        -------
-        Surrogate
-            Ready for use.
 
         Raises
         ------
@@ -100,23 +89,22 @@ class Surrogate:
         'mumacro-1e-10'
         """
         path = Path(table) if isinstance(table, (str, Path)) else _bundled(table)
-        image = read_image(path)
-        return cls(parse_table(image, path), path, threads, image)
+        return cls._of_image(read_image(path), path, threads)
+
+    @classmethod
+    def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Self:
+        found = cls(parse_table(image, path), path, threads)
+        found._image = image
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle small: a bundled table by name and checksum, valid on another machine, too; another with its bytes."""
-        if self.path.resolve() in (path.resolve() for path in bundled_tables()):
-            return _reopen, (self.path.name, self.checksum, self._asked_threads, None)
-        image = read_image(self.path) if self._image is None else self._image
-        return _reopen, (str(self.path), self.checksum, self._asked_threads, image)
+        bundled = self.path.resolve() in (path.resolve() for path in bundled_tables())
+        path, image = (self.path.name, None) if bundled else (str(self.path), self._image or read_image(self.path))
+        return _reopen, (path, self.checksum, self._asked_threads, image)
 
     def __repr__(self) -> str:
         return f"<Surrogate {self.id}: tolerance {self.tolerance:g}, error of mu~ at most {self.max_abs_error:.1e}>"
-
-    def _repr_html_(self) -> str:
-        errors = f"{self.max_abs_error:.1e} absolute, {self.max_rel_error:.1e} relative"
-        rows = [("table", self.id), ("tolerance of mu~", f"{self.tolerance:g}"), ("verified error", errors)]
-        return html_table((), rows)
 
     def plot(self, axes: Any = None, **more: Any) -> Any:
         """The map of mu~, see ``mumacro.plotting.plot_map``; needs matplotlib."""
@@ -124,7 +112,7 @@ class Surrogate:
 
         return plot_map(self, axes, **more)
 
-    def on_one_thread(self) -> Surrogate:
+    def on_one_thread(self) -> Self:
         """The same table, whose calls start no thread."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__, _asked_threads=1)
@@ -162,8 +150,8 @@ class Surrogate:
     @property
     def memory(self) -> int:
         """Bytes of the cells that an evaluation of mu~ reads."""
-        arrays = self._data.border, self._data.pieces, self._data.blocks, *self._data.quantities[charts.MU]
-        return sum(array.nbytes for array in arrays)
+        data = self._data
+        return sum(array.nbytes for array in (data.border, data.pieces, data.blocks, *data.quantities[charts.MU]))
 
     def self_check(self) -> None:
         """Compare known answers with the table; raises :class:`TableError` when one is off by more than its bound."""
@@ -208,32 +196,18 @@ class Surrogate:
         v, y, shape = _points(v_tilde, y_tilde)
         found = batch.alone(charts.MU, self._data, v, y, self.threads)
         if not shape and math.isnan(found[0]):
-            _refuse_illegal(-1, v, y, "finite and >= 0")
+            raise _illegal(v, y)
         return _shaped(found, shape)
 
     def ratio_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any, Any]:
-        """mu~ [-], the bound of its absolute error [-], and the source code (index into SOURCES).
-
-        Arguments, shapes and errors as in :meth:`mu_ratio`; ``contact`` and ``direction`` as in :meth:`quantity`.
-
-        Examples
-        --------
-        >>> mu, bound, source = Surrogate.open().ratio_with_bound(0.1, 0.5)
-        >>> round(mu, 6), bound < 1e-12, int(source)
-        (0.942004, True, 5)
-        """
+        """:meth:`quantity` of mu~: the value, the bound of its absolute error, and the source code."""
         return self.quantity("mu_ratio", v_tilde, y_tilde, **kind)
 
     def v_tilde_crit(self, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across") -> Any:
         """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-] >= 0.
 
-        Scalar in, float out; infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.
-        For a ball all springs slide from there on; along and normal it is the amplitude itself, for normal below 1.
-
-        Raises
-        ------
-        InputError
-            A negative scalar or NaN; in an array it gives NaN.
+        Infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.  For a ball all springs slide
+        from there on; along and normal it is the amplitude itself, for normal below 1.
 
         Examples
         --------
@@ -250,34 +224,22 @@ class Surrogate:
         return _shaped(found, shape)
 
     def power(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
-        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega; scalar in, float out.
+        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega: :meth:`quantity` without bound.
 
-        Slip turns v~ mu~ plus this power into heat.  Arguments and errors as in :meth:`mu_ratio`; an infinite amplitude
-        gives infinite power.  The first call prepares the cells.  ``contact`` and ``direction`` as in :meth:`quantity`.
-
-        Examples
-        --------
-        >>> round(Surrogate.open().power(0.1, 0.5), 6)
-        0.012142
+        Slip turns v~ mu~ plus this power into heat.  An infinite amplitude gives infinite power.
         """
         return self.power_with_bound(v_tilde, y_tilde, **kind)[0]
 
     def stick_fraction(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> Any:
-        """Share of the period during which the contact sticks [-], 0 to 1; arguments and errors as :meth:`power`.
-
-        Examples
-        --------
-        >>> round(Surrogate.open().stick_fraction(0.1, 0.5), 6)
-        0.224881
-        """
+        """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without bound."""
         return self.stick_fraction_with_bound(v_tilde, y_tilde, **kind)[0]
 
     def power_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
-        """:meth:`power` and the bound of its absolute error; scalars in, floats out."""
+        """:meth:`power` and the bound of its absolute error."""
         return self.quantity("power", v_tilde, y_tilde, **kind)[:2]
 
     def stick_fraction_with_bound(self, v_tilde: ArrayLike, y_tilde: ArrayLike, **kind: str) -> tuple[Any, Any]:
-        """:meth:`stick_fraction` and the bound of its absolute error; scalars in, floats out.
+        """:meth:`stick_fraction` and the bound of its absolute error.
 
         At the border the bound is larger than elsewhere, on both sides: there the fraction is a square root of the
         distance to v~crit, and v~crit is known to some digits only.
@@ -287,21 +249,10 @@ class Surrogate:
     def slopes(
         self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", *, bounds: bool = False
     ) -> tuple[Any, ...]:
-        """A quantity, and its slopes v~ d/d v~ and y~ d/d y~ [-].
+        """The quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~ d/d y~ [-].
 
-        Parameters
-        ----------
-        v_tilde, y_tilde : float or array_like
-            As in :meth:`mu_ratio`.
-        of : str
-            "mu_ratio", "power" or "stick_fraction".
-        bounds : bool
-            Also return the bounds of the two slopes' absolute errors.
-
-        Returns
-        -------
-        tuple of float or ndarray
-            Value, slope along ln v~, slope along ln y~, and with ``bounds`` the bounds of both.
+        With ``bounds`` also those of the two slopes' absolute errors.  Arguments, shapes and errors as in
+        :meth:`mu_ratio`.
 
         Examples
         --------
@@ -309,20 +260,18 @@ class Surrogate:
         >>> f"{along_y:.3e}"     # eq. (31): -y~^2 / (2 (1 + v~^2))
         '-1.000e-05'
         """
-        if of not in self.table.quantities:
-            raise InputError("of", of, f"one of {', '.join(self.table.quantities)}")
-        v, y, shape = _points(v_tilde, y_tilde)
-        rows = batch.slopes(_CODES[of], self._with(of), v, y, self.threads)
+        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
+        rows = batch.slopes(_CODES[of], data, v, y, self.threads)
         if not shape and math.isnan(rows[0, 0]):
-            _refuse_illegal(-1, v, y, "finite and >= 0")
+            raise _illegal(v, y)
         return tuple(_shaped(row, shape) for row in rows[: 5 if bounds else 3])
 
-    def _with(self, quantity: str) -> Data:
+    def _with(self, quantity: str, argument: str = "name") -> Data:
         """What the kernel reads, with the cells of a quantity; they are cut on first use."""
-        code = _CODES[quantity]
+        code = _CODES[quantity] if quantity in charts.QUANTITY_NAMES else None
         if code not in self._data.quantities:
-            if quantity not in self.table.quantities:
-                raise TableError(self.path, f"holds no {quantity}: build it anew, python -m builder build")
+            if code is None or quantity not in self.table.quantities:
+                raise InputError(argument, quantity, f"one of {', '.join(self.table.quantities)}, which the table has")
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
@@ -339,12 +288,10 @@ class Surrogate:
         >>> [round(x, 6) for x in Surrogate.open().derivatives(0.1, 0.5)]
         [0.108351, -0.250146]
         """
-        if of not in self.table.quantities:
-            raise InputError("of", of, f"one of {', '.join(self.table.quantities)}")
         if order not in (1, 2):
             raise InputError("order", order, "1 or 2")
-        v, y, shape = _points(v_tilde, y_tilde)
-        return tuple(_shaped(row, shape) for row in batch.derivatives(_CODES[of], self._with(of), v, y, order))
+        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
+        return tuple(_shaped(row, shape) for row in _KERNEL.derivatives(data, _CODES[of], v, y, order))
 
     def prepared(self) -> Data:
         """What the kernel reads, with the cells of every quantity."""
@@ -357,7 +304,7 @@ class Surrogate:
     ) -> tuple[Any, Any, Any]:
         """A tabulated quantity, the bound of its absolute error, and the source code (index into SOURCES).
 
-        ``name`` is one of ``table.quantities``; the other arguments, shapes and errors are those of :meth:`mu_ratio`.
+        ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as in :meth:`mu_ratio`.
         Of a ball the stick fraction is a share of the load, too.  For direction "normal" ``y_tilde`` is Fz_amplitude/Fz
         [-], below 1; it has no power, because the model does not know how far the load moves.
 
@@ -367,24 +314,21 @@ class Surrogate:
         >>> round(power, 6), bound < 1e-12, int(source)
         (0.012142, True, 5)
         """
-        if name not in charts.QUANTITY_NAMES:
-            raise InputError("name", name, f"one of {', '.join(self.table.quantities)}")
-        kind = kind_of(contact, direction)
+        data, kind = self._with(name), kind_of(contact, direction)
         if kind == SPRING and type(v_tilde) in _NUMBERS and type(y_tilde) in _NUMBERS:
             try:
-                one = _ONE.value(self._with(name), _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                one = _ONE.value(data, _CODES[name], v_tilde, y_tilde)  # type: ignore[arg-type]
+                if one[2] >= 0:
+                    return one
             except OverflowError:  # a whole number beyond double range
-                one = None
-            if one is not None and one[2] >= 0:
-                return one
+                pass
         if kind.normal and name == "power":
             raise InputError("direction", direction, "across or along for the power: the load's path is not modelled")
-        self._data_of(kind)
         v, y, shape = _points(v_tilde, y_tilde)
-        value, bound, source = batch.values(_CODES[name], self._with(name), v, y, self.threads, kind)
-        if not shape:
+        value, bound, source = batch.values(_CODES[name], self._data_of(kind), v, y, self.threads, kind)
+        if not shape and source[0] == -1:
             finite = "finite and >= 0" if name == "mu_ratio" or kind.direction else ">= 0"
-            _refuse_illegal(int(source[0]), v, y, ">= 0 and < 1" if kind.normal else finite)
+            raise _illegal(v, y, ">= 0 and < 1" if kind.normal else finite)
         return _shaped(value, shape), _shaped(bound, shape), _shaped(source, shape)
 
     # --- dimensional ----------------------------------------------------------------------------------
@@ -471,9 +415,8 @@ class Surrogate:
         Returns
         -------
         Answer
-            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k (:class:`mumacro.answer.IntervalAnswer`).
-            Or the container of the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
-            (see :mod:`mumacro.interop.labels`).  Arrow and Polars give an answer of arrays.
+            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Or the container of the inputs: pandas
+            objects give a DataFrame, xarray objects a Dataset, Dask stays lazy (:mod:`mumacro.interop.labels`).
 
         Raises
         ------
@@ -513,39 +456,10 @@ class Surrogate:
                     return self._arrays(six, arrays[0].shape, gradient, gradient or groups)
         return self._evaluate(cases, inputs, gradient, groups, illegal)
 
-    def evaluate_case(
-        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
-    ) -> tuple[float, float, float, int]:
-        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats, k = inf for rigid contact.
-
-        An illegal case gives NaN and -1.
-        """
-        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._data, (mu0, Fz, k, y0, omega, v0), 7)
-        return mu_macro, mu_ratio, bound, int(source)
-
-    def evaluate_columns(
-        self, mu0: Array, Fz: Array, k: Array, y0: Array, omega: Array, v0: Array, n: int | None = None, *,
-        contact: str = "spring", direction: str = "across",
-    ) -> tuple[Array, Array, Array, NDArray[np.int8]]:  # fmt: skip
-        """(mu_macro, mu~, bound of mu_macro, source code) of columns of float64, each of shape (n,) or (1,).
-
-        On the calling thread alone; k = inf is rigid contact; illegal cases give NaN and -1.  ``n`` is the number of
-        cases where all columns have length 1.  For direction "normal" ``y0`` is the amplitude of the force [N].
-        """
-        kind = kind_of(contact, direction)
-        columns = [_contiguous(c) for c in (mu0, Fz, k, y0, omega, v0)]
-        if n is None:
-            n = max(c.size for c in columns) if all(c.size for c in columns) else 0
-        if any(c.ndim != 1 or c.size not in (1, n) for c in columns):
-            raise InputError("inputs", [c.shape for c in columns], "columns of one length, or of length 1")
-        given = [c if c.size == n else float(c[0]) for c in columns]
-        rows, source = batch.cases(self._data_of(kind), given, n, 1, 3, kind)
-        return rows[0], rows[1], rows[2], source
-
     def _one(self, six: tuple[float, ...], gradient: bool) -> Answer[float] | None:
         """The answer to one case; None where it is illegal."""
         try:
-            found = _ONE.one(self._data, six, 19 if gradient else 7)
+            found = _ONE.one(self._pointer, six, 19 if gradient else 7)
         except OverflowError:  # a whole number beyond double range
             return None
         if found[6] < 0.0:
@@ -557,6 +471,13 @@ class Surrogate:
             answer.gradient_bound = dict(zip(FIELDS, found[13:], strict=True))
         return answer
 
+    def evaluate_case(
+        self, mu0: float, Fz: float, k: float, y0: float, omega: float, v0: float
+    ) -> tuple[float, float, float, int]:
+        """(mu_macro, mu~, bound of mu_macro, source code) of one case in plain floats; NaN and -1 if illegal."""
+        mu_macro, mu_ratio, bound, _, _, _, source = _ONE.one(self._pointer, (mu0, Fz, k, y0, omega, v0), 7)
+        return mu_macro, mu_ratio, bound, int(source)
+
     def _evaluate(
         self, cases: Any, inputs: dict[str, Any], gradient: bool, groups: bool, illegal: str, kind: Kind = SPRING
     ) -> Any:
@@ -566,10 +487,10 @@ class Surrogate:
         if unknown:
             raise InputError(min(unknown), inputs[min(unknown)], f"one of {', '.join(kind.fields)} or f")
         if cases is not None:
-            picked = _picked(cases, kind.columns)
-            if twice := picked.keys() & inputs.keys():
+            found = picked("cases", cases, (*kind.columns, *ENDS))
+            if twice := found.keys() & inputs.keys():
                 raise InputError(min(twice), inputs[min(twice)], "given once: in the cases or as a keyword")
-            inputs = {**picked, **inputs}
+            inputs = {**found, **inputs}
         inputs = kind.as_six({name: _from_arrow(x) for name, x in inputs.items()})
         interval = not inputs.keys().isdisjoint(("k_range", *ENDS))
         if interval:
@@ -618,8 +539,8 @@ class Surrogate:
             float(c) if type(c) is not np.ndarray else c.item() if c.size == 1 else _flat(c, shape) for c in columns
         ]
         found, source = batch.cases(
-            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3, kind,
-        )  # fmt: skip
+            self._data_of(kind), flat, math.prod(shape), self.threads, 17 if gradient else 5 if groups else 3, kind
+        )
         rows = found.reshape(len(found), *shape)
         answer: Answer[Array] = (AnswerWithGradient if gradient else Answer)(
             rows[0], rows[1], rows[2], source.reshape(shape)
@@ -639,11 +560,10 @@ class Surrogate:
         """``answer`` for the middle of an interval of k, and the extremes over it."""
         shape = answer.mu_macro.shape
         flat = {name: _flat(column, shape) for name, column in columns.items()}
-        data = self._data_of(kind)
 
-        def evaluate(k: Array, places: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        def evaluate(k: Array, places: Places) -> tuple[Array, Array, Array]:
             six = [_contiguous(k if name == "k" else column[places]) for name, column in flat.items()]
-            rows = batch.cases(data, six, k.size, self.threads, 17, kind)[0]
+            rows = batch.cases(self._data_of(kind), six, k.size, self.threads, 17, kind)[0]
             return rows[0], rows[2], rows[5 + FIELDS.index("k")] * k
 
         low, high, bound = extremes(evaluate, *(np.array(np.broadcast_to(end, shape)).ravel() for end in ends))
@@ -707,28 +627,16 @@ def _bundled(tolerance: float | None) -> Path:
     return tables[max(fit)]
 
 
+@functools.cache  # a worker gets the same surrogate with every task
 def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
     """Unpickle: from the bytes, or from the bundled table of that name."""
-    key = path, checksum, threads
-    if key not in _reopened:  # a worker gets the same surrogate with every task
-        _reopened[key] = _reopen_anew(path, checksum, threads, image)
-    return _reopened[key]
-
-
-_reopened: dict[tuple[str, str, int | None], Surrogate] = {}
-
-
-def _reopen_anew(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
     if image is not None:
-        return Surrogate(parse_table(image, path), path, threads, image)
-    found = next((table for table in bundled_tables() if table.name == path), Path(path))
-    surrogate = Surrogate.open(found, threads)
-    if surrogate.checksum != checksum:
-        raise TableError(
-            found, f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}: "
-            "install the same release on both sides"
-        )  # fmt: skip
-    return surrogate
+        return Surrogate._of_image(image, Path(path), threads)
+    found = Surrogate.open(next((table for table in bundled_tables() if table.name == path), path), threads)
+    if found.checksum != checksum:
+        told = f"holds {found.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"
+        raise TableError(found.path, f"{told}: install the same release on both sides")
+    return found
 
 
 def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
@@ -741,25 +649,6 @@ def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
         )  # fmt: skip
     except (KeyError, TypeError, OverflowError):
         return None
-
-
-def _picked(cases: Any, columns: Sequence[str]) -> dict[str, Any]:
-    """The inputs among the columns of a mapping, a data frame, an Arrow table or stream, or a Dataset."""
-    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a query of DuckDB
-        import pyarrow as pa  # its columns come from one reading: a second one may have another order
-
-        cases = pa.table(cases)
-    try:
-        # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars have lists of names
-        there = cases if hasattr(cases, "keys") else getattr(cases, "column_names", None) or cases.columns
-        picked = {name: cases[name] for name in (*columns, *ENDS) if name in there}
-    except (AttributeError, TypeError, KeyError) as error:
-        kind = f"{type(cases).__module__}.{type(cases).__qualname__}"
-        raise InputError(
-            "cases", kind, "a mapping, DataFrame, Arrow table or Dataset with the inputs by name; "
-            "give anything else as {name: array}, what is lazy after its collect() or read_all()"
-        ) from error  # fmt: skip
-    return picked
 
 
 _PLAIN = _NUMBERS | {np.ndarray, list, tuple, type(None), dict}
@@ -780,11 +669,9 @@ def _from_arrow(x: Any) -> Any:
     return np.asarray(x) if arrow and not _labels(x) else x
 
 
-def _refuse_illegal(source: int, v: Array, y: Array, bound: str) -> None:
-    if source == -1:
-        if not v[0] >= 0.0:
-            raise InputError("v_tilde", float(v[0]), ">= 0")
-        raise InputError("y_tilde", float(y[0]), bound)
+def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
+    """The error of a single point; ``bound`` is that of y~."""
+    return InputError("y_tilde", float(y[0]), bound) if v[0] >= 0.0 else InputError("v_tilde", float(v[0]), ">= 0")
 
 
 def _shaped(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
@@ -807,9 +694,7 @@ def _points(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
 def _common_shape(arrays: Sequence[Array]) -> tuple[int, ...]:
     """The shape to which arrays broadcast; ValueError where they do not."""
     shapes = {array.shape for array in arrays} - {()}
-    if len(shapes) > 1:
-        return np.broadcast_shapes(*shapes)
-    return shapes.pop() if shapes else ()
+    return np.broadcast_shapes(*shapes) if len(shapes) > 1 else shapes.pop() if shapes else ()
 
 
 def _contiguous(a: Array) -> Array:

@@ -1,18 +1,9 @@
 """The table file, format 3: netCDF-4 with CF-1.11 conventions; written atomically, checked on reading.
 
-Layout (all quantities dimensionless, units "1"):
-
-* root: the plain log-spaced grid for plots, ``mu_ratio(v_tilde, y_tilde)`` with ``stick_fraction``,
-  ``error_estimate`` and ``v_tilde_crit(y_tilde)``, and the provenance as attributes;
-* group ``border``: one sub-group a piece of v~crit (:data:`mumacro.charts.BORDER_PIECES`);
-* group ``border/blocks``: one sub-group a block (:data:`mumacro.charts.CHARTS`): node coordinates, node values of
-  mu~, power and stick fraction, the chart by name and range, the number of cells, the verified errors.
-
+docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``, the blocks inside.
 The netCDF library writes, and is not thread-safe: a lock is held while it works.  For reading see
 ``mumacro.hdf5``.
 """
-
-from __future__ import annotations
 
 import hashlib
 import json
@@ -23,16 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import charts, hdf5
+from mumacro.arrays import Array
 from mumacro.cells import nodes
 from mumacro.errors import TableError
 from mumacro.writing import write_whole
-
-__all__ = [
-    "FORMAT_VERSION", "Block", "BorderPiece", "Table", "json_attributes", "parse_table", "read_table", "write_table",
-]  # fmt: skip
 
 FORMAT_VERSION = 3
 # More is refused before memory is taken; of the largest table that the builder makes:
@@ -41,7 +28,6 @@ MOST_NUMBERS = 200_000  # of a variable: 14,641
 MOST_NODES = 1024  # along an axis: 91; preparing cells takes matrices of its square
 MOST_CELLS = 1024  # along an axis: 156
 MOST_PATCHES = 8192  # cells of a block: 646, of 512 bytes each and quantity
-Array = NDArray[np.float64]
 
 _one_at_a_time = threading.Lock()
 
@@ -53,7 +39,6 @@ _PLAIN = {
     "error_estimate": ("estimated absolute error of mu_ratio", ("v_tilde", "y_tilde")),
     "v_tilde_crit": ("border of continuous sliding: smallest dimensionless speed without stick", ("y_tilde",)),
 }  # fmt: skip
-FIRST_QUANTITIES = "mu_ratio power stick_fraction"  # of a file that does not name its quantities
 CELL_AXES = ("quantity", "cell", "derivative")
 _NAMED = {quantity.name: quantity for quantity in charts.QUANTITIES}
 FEW = 256  # numbers: fewer are stored as they are, since a chunk's index takes 2 kB
@@ -71,28 +56,18 @@ class BorderPiece:
 
 @dataclass
 class Block:
-    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is tabulated.
-
-    Attributes
-    ----------
-    nodes : dict of str to ndarray
-        Node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity is zero.
-    errors : dict of str to ndarray
-        By quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a and b, over the whole
-        block.  In older tables the last two bound what all three together do to a slope along ln v~ and ln y~.
-    cell_errors : dict of str to ndarray
-        The same for every cell (cells, 3), in the order of the cells, for slopes; older tables have none.
-    max_abs_error, max_rel_error : float
-        The largest errors of mu~ found.
-    """
+    """One block: Chebyshev nodes ``a`` (m,), ``b`` (n,), cells for evaluation, and what is tabulated."""
 
     a: Array
     b: Array
     cells: tuple[int, int]
+    #: node values (m, n) by quantity, scaled as in ``kernel/records.c``; no entry where a quantity is zero
     nodes: dict[str, Array] = field(default_factory=dict)
+    #: by quantity (3,): bounds of the errors of what is tabulated and of its derivatives along a and b, in all cells
     errors: dict[str, Array] = field(default_factory=lambda: {name: np.zeros(3) for name in charts.QUANTITY_NAMES})
+    #: the same for every cell (cells, 3), in the order of the cells, for slopes
     cell_errors: dict[str, Array] = field(default_factory=dict)
-    max_abs_error: float = 0.0
+    max_abs_error: float = 0.0  #: the largest errors of mu~ found
     max_rel_error: float = 0.0
 
 
@@ -121,7 +96,7 @@ class Table:
 
 
 def _names(attributes: dict[str, Any]) -> list[str]:
-    return str(attributes.get("quantities", FIRST_QUANTITIES)).split()
+    return str(attributes.get("quantities")).split()
 
 
 def _digest(table: Table) -> str:
@@ -130,11 +105,8 @@ def _digest(table: Table) -> str:
 
     def put(*parts: object) -> None:
         for part in parts:
-            h.update(
-                np.ascontiguousarray(part, dtype="<f8").tobytes()
-                if isinstance(part, np.ndarray)
-                else repr(part).encode()
-            )
+            is_array = isinstance(part, np.ndarray)
+            h.update(np.ascontiguousarray(part, dtype="<f8").tobytes() if is_array else repr(part).encode())
 
     put("mumacro", FORMAT_VERSION, float(table.attributes["tolerance"]))
     put(*(getattr(table, name) for name in _PLAIN))
@@ -218,10 +190,7 @@ def _fill(root: Any, table: Table) -> None:
 def write_table(table: Table, path: str | Path) -> str:
     """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return its checksum.
 
-    Raises
-    ------
-    TableError
-        When the folder does not exist or cannot be written, or the disk is full; nothing is left behind.
+    TableError where the folder does not exist or cannot be written, or the disk is full; nothing is left behind.
     """
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
@@ -287,10 +256,11 @@ def _error(group: hdf5.Group, name: str) -> float:
     return float(_errors(group, name, group.numbers(name, 1))[0])
 
 
-def _check_same(group: hdf5.Group, name: str, wanted: object) -> None:
+def _check_same(group: hdf5.Group, name: str, wanted: Any) -> None:
     found = group.attribute(name)
-    if not np.array_equal(found, np.asarray(wanted)):
-        raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {wanted!r}")
+    if not np.array_equal(found, wanted):
+        told = wanted.tolist() if isinstance(wanted, np.ndarray) else wanted
+        raise group.refuse(f"{group.path}: {name} is {found!r}, this program's atlas has {told!r}")
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
@@ -325,7 +295,7 @@ def _border_piece(group: hdf5.Group, axis: charts.Axis) -> BorderPiece:
 
 def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
     for name, wanted in _geometry(chart).items():
-        _check_same(group, name, wanted.tolist() if isinstance(wanted, np.ndarray) else wanted)
+        _check_same(group, name, wanted)
     a, b = _nodes(group, chart.a), _nodes(group, chart.b)
     quantities = [_NAMED[name] for name in names if chart.holds(_NAMED[name])]
     found = {one.name: group.array(one.variable, MOST_NUMBERS, (a.size, b.size)) for one in quantities}
@@ -338,9 +308,6 @@ def _block(group: hdf5.Group, chart: charts.Chart, names: list[str]) -> Block:
 
 
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: list[str]) -> None:
-    """The errors in every cell, which older tables have for whole blocks only."""
-    if not group.holds("cell_errors"):
-        return
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
     found = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
     for name, errors in zip(names, _errors(group, "cell_errors", found), strict=True):
@@ -354,9 +321,6 @@ def _read(root: hdf5.Group) -> Table:
     names = _names(attributes)
     below_border = root.group("border")
     below_blocks = below_border.group("blocks")
-    strange = sorted(set(below_blocks.groups()) - set(charts.NAMES))
-    if strange:
-        raise root.refuse(f"block {strange[0]!r} is unknown to this program's atlas")
     border = [_border_piece(below_border.group(name), axis) for name, axis, _ in charts.BORDER_PIECES]
     blocks = [_block(below_blocks.group(chart.name), chart, names) for chart in charts.CHARTS]
     _add_cell_errors(below_blocks, blocks, names)
@@ -367,20 +331,6 @@ def _read(root: hdf5.Group) -> Table:
         if not axes and plain[name].ndim != 1:
             raise root.refuse(f"variable {name!r} in / is no axis")
     return Table(border=border, blocks=blocks, attributes=attributes, **plain)
-
-
-def parse_table(image: bytes, path: str | Path) -> Table:
-    """Read and check the bytes of a table file; ``path`` names it in errors.  See :func:`read_table`."""
-    try:
-        table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
-        digest = _digest(table)
-    except TableError:
-        raise
-    except Exception as error:  # h5py raises nearly any exception
-        raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
-    if digest != table.attributes["content_sha256"]:
-        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
-    return table
 
 
 def read_table(path: str | Path) -> Table:
@@ -395,14 +345,22 @@ def read_table(path: str | Path) -> Table:
     return parse_table(read_image(path), path)
 
 
-def read_image(path: str | Path) -> bytes:
-    """The bytes of a table file.
+def parse_table(image: bytes, path: str | Path) -> Table:
+    """As :func:`read_table`, from the bytes of the file; ``path`` names it in errors."""
+    try:
+        table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
+        digest = _digest(table)
+    except TableError:
+        raise
+    except Exception as error:  # h5py raises nearly any exception
+        raise TableError(path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})") from error
+    if digest != table.attributes["content_sha256"]:
+        raise TableError(path, "checksum does not match the content: the file is damaged or was edited")
+    return table
 
-    Raises
-    ------
-    TableError
-        Missing, unreadable, or larger than any table.
-    """
+
+def read_image(path: str | Path) -> bytes:
+    """The bytes of a table file; TableError where it is missing, unreadable, or larger than any table."""
     path = Path(path)
     try:
         if not path.is_file():

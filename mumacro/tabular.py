@@ -1,7 +1,5 @@
 """Tables with a head: separator and decimal sign of CSV, which column is which input, its unit, cells as numbers."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -20,8 +18,6 @@ from mumacro.inputs import (
     unit_of,
 )
 
-__all__ = ["SEPARATORS", "TOO_LARGE", "absent", "find_heads", "meant_by", "read_cell", "read_head"]
-
 #: what may stand between the cells of CSV, by the word for it
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
@@ -29,11 +25,7 @@ _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
 def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | None:
-    """The options to give, where a file is not as they say; None where it is.
-
-    >>> _advice("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
-    "the columns are separated by ';' and the decimal sign is ',': give --sep ';' --decimal ','"
-    """
+    """The options to give, where a file is not as they say; None where it is."""
     found, sign = _recognised(header, rows, sep, decimal)
     if (found, sign) == (sep, decimal):
         return None
@@ -62,8 +54,9 @@ def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tup
 def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[str]:
     """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it ask for other options.
 
-    >>> read_head("v0 [mm/s],note", ["1.5,a"], ",", ".")
-    ['v0 [mm/s]', 'note']
+    >>> read_head("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
+    Traceback (most recent call last):
+    ValueError: the columns are separated by ';' and the decimal sign is ',': give --sep ';' --decimal ','
     """
     try:
         cells = next(csv.reader([line], delimiter=sep, strict=True), [])

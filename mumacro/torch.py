@@ -1,7 +1,5 @@
 """Friction inside PyTorch programs: a custom operator on the compiled kernel.  Needs the extra ``torch``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -10,7 +8,7 @@ from mumacro import batch
 from mumacro.charts import QUANTITY_NAMES
 from mumacro.extras import missing
 from mumacro.interop.derivatives import NO_THIRD, DifferentiableFriction, slopes_by_groups
-from mumacro.library import Data
+from mumacro.library import Data, kernels
 from mumacro.surrogate import Surrogate
 
 try:
@@ -20,8 +18,6 @@ try:
     from torch.func import debug_unwrap
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(missing("torch", error), name=error.name) from None
-
-__all__ = ["Friction"]
 
 _TABLES: dict[int, tuple[Data, int]] = {}  # data and threads
 
@@ -105,7 +101,7 @@ def _on_host(x: Any, table: int, code: int, order: int) -> Any:
     elif order == 0:
         found = batch.alone(code, data, rows[0], rows[1], threads)
     else:
-        found = batch.derivatives(code, data, rows[0], rows[1], order)
+        found = kernels[-1].derivatives(data, code, rows[0], rows[1], order)
     return torch.from_numpy(found.reshape(found.shape[:-1] + shape)).to(x.device)
 
 

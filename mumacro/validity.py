@@ -5,8 +5,6 @@ question, and mostly the larger one.  Two assumptions cannot be judged from the 
 quasi-static contact, which needs masses, and a stiff drive.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, TypedDict
@@ -20,8 +18,6 @@ from mumacro.interval import without_interval
 from mumacro.measured import HARDLY
 from mumacro.settling import settling
 from mumacro.surrogate import Surrogate
-
-__all__ = ["KNOWN", "ROWS", "Row", "digits", "k_effect", "model_rows"]
 
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (
@@ -49,25 +45,8 @@ def model_rows(
 ) -> list[Row]:
     """The rows of docs/validity.md that a case falls in.
 
-    Parameters
-    ----------
-    surrogate : Surrogate
-        The table.
-    case : mapping
-        Inputs of :meth:`mumacro.Surrogate.evaluate`, numbers in SI; of an interval of k its geometric middle is told,
-        without the row of k.
-    contact, direction : str
-        As there.
-
-    Returns
-    -------
-    list of Row
-        Empty where nothing is to be said, as for a contact without oscillation.
-
-    Raises
-    ------
-    InputError
-        The case is illegal.
+    ``case`` has inputs of :meth:`mumacro.Surrogate.evaluate`, numbers in SI; of an interval of k its geometric middle
+    is told, without the row of k.  Nothing is to be said of a contact without oscillation.
 
     Examples
     --------
@@ -122,8 +101,6 @@ def k_effect(
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
     """Digits to show of a number that is known to ``uncertainty``, relatively: one beyond the first that it moves.
 
-    Examples
-    --------
     >>> digits(0.06), digits(3e-5), digits(0.0)
     (4, 6, 6)
     """
@@ -163,7 +140,7 @@ def _stiffness(surrogate: Surrogate, case: Mapping[str, Any], y: float, contact:
         text = f"k known to {known} leaves mu_macro uncertain by {off}: give k_range, or fit k"
     elif y > HARDLY:
         text = (
-            f"y~ = {y:.3g}, above {HARDLY:g}: {known} of k change mu_macro by {off}, and measured points hardly tell k"
+            f"y~ = {y:.3g}, above {HARDLY:g}: k off by {known} moves mu_macro by {off}; measured points hardly tell k"
         )
     else:
         return None
@@ -192,10 +169,8 @@ def _cycle(surrogate: Surrogate, six: dict[str, Any]) -> list[Row]:
         rows.append({"row": "steady cycle", "text": text, "effect": None})
     if _ADAPTS[0] < way < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
-        text = (
-            f"slip path {way:.2g} m a period, near the micrometres in which friction adapts to speed; a factor of 100 "
-        )
-        text += f"in slip speed changes mu0 by {100.0 * effect:.2g} %"
+        text = f"slip path {way:.2g} m a period, near the micrometres in which friction adapts to speed; "
+        text += f"a factor of 100 in slip speed changes mu0 by {100.0 * effect:.2g} %"
         rows.append({"row": "Coulomb friction", "text": text, "effect": effect})
     if watts > _WATTS:
         text = f"the contact turns {watts:.2g} W into heat, over a slip path of {way * frequency:.2g} m/s"

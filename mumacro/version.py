@@ -1,5 +1,3 @@
 """The version of the project.  The wheel, the tables and the service read it here."""
 
-__all__ = ["__version__"]
-
 __version__ = "0.1.0"

@@ -1,7 +1,5 @@
 """Files that are either complete or absent, and folders that one process has locked."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterator
@@ -14,8 +12,6 @@ try:
     import fcntl
 except ImportError:  # Windows: two processes are not distinguished
     fcntl = None  # type: ignore[assignment]
-
-__all__ = ["BusyError", "alone_in", "put", "sync_folder", "write_whole"]
 
 
 class BusyError(MumacroError):
@@ -44,10 +40,7 @@ def put(growing: Path, path: Path) -> None:
 def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
     """Write a file under another name beside its place, to the disk, and rename it.
 
-    Raises
-    ------
-    OSError
-        No such folder, no permission, no space; nothing is left behind, and an older file stays.
+    OSError leaves nothing behind, and an older file stays.
     """
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".growing")
     try:
@@ -62,16 +55,9 @@ def write_whole(path: Path, content: bytes, mode: int = 0o644) -> None:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Make a folder and have it to oneself; one that is empty at the end goes away.
+    """Make a folder and have it to oneself, or BusyError; one that is empty at the end goes away.
 
     The system releases it when the process ends, in any way.
-
-    Raises
-    ------
-    BusyError
-        Another process has it.
-    OSError
-        The folder cannot be made.
     """
     while True:
         folder.mkdir(exist_ok=True)

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from mumacro import charts
-from mumacro.border import Border
 from mumacro.bundled import bundled_tables
-from mumacro.cells import block_rows, outer_cells
+from mumacro.cells import Border, block_rows, outer_cells
 from mumacro.charts import CHARTS
 from mumacro.library import Data, Kernel, kernels
 from mumacro.table import Block, read_table

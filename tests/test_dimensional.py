@@ -249,12 +249,11 @@ def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate) -> None:
     assert "(2,)" in str(caught.value)
 
 
-# --- columns and single cases without checks ----------------------------------------------------------
+# --- single cases without checks ----------------------------------------------------------
 
 
 @pytest.mark.parametrize("n", [1, 255, 256, 1000])
-def test_columns_on_one_thread_equal_the_array(table: Surrogate, n: int) -> None:
-    """Illegal cases too, and an infinite stiffness, which is a rigid contact."""
+def test_single_cases_equal_the_array(table: Surrogate, n: int) -> None:
     rng = np.random.default_rng(n)
     ranges = ((0.1, 0.8), (0.1, 1e3), (1e4, 1e8), (1e-8, 1e-3), (1.0, 1e6), (1e-6, 10.0))
     columns = [log_uniform(rng, *ends, n) for ends in ranges]
@@ -263,19 +262,24 @@ def test_columns_on_one_thread_equal_the_array(table: Surrogate, n: int) -> None
     columns[0][5::50], columns[1][6::50], columns[5][7::50], columns[2][8::50] = -0.3, 0.0, math.nan, math.inf
     for fixed in (None, 0, 2, 5):
         given: list[Any] = [c[:1].copy() if i == fixed else c for i, c in enumerate(columns)]
-        found: Any = table.evaluate_columns(*given)
-        macro, mu, bound, source = found
-        expected = table.evaluate(dict(zip(FIELDS, given, strict=True)))
-        for column, name in zip(found, ("mu_macro", "mu_ratio", "error_bound", "source_code"), strict=True):
-            np.testing.assert_array_equal(column, getattr(expected, name))
+        found = table.evaluate(dict(zip(FIELDS, given, strict=True)))
+        macro, mu, bound, source = found.mu_macro, found.mu_ratio, found.error_bound, found.source_code
         for i in range(0, n, 17):
             case = [float(c[i if c.size == n else 0]) for c in given]
-            np.testing.assert_array_equal(table.evaluate_case(*case), (macro[i], mu[i], bound[i], source[i]))
+            assert table.evaluate_case(*case) == (macro[i], mu[i], bound[i], source[i])
 
 
-def test_columns_of_different_lengths_are_refused(table: Surrogate) -> None:
-    one, two, three = np.full(1, 1.0), np.full(2, 1.0), np.full(3, 1.0)
-    for columns in ((one, two, three, one, one, one), (one, one, one, one, one, np.ones((2, 1)))):
-        with pytest.raises(InputError, match="columns of one length"):
-            table.evaluate_columns(*columns)
-    assert table.evaluate_columns(one, one, one, one, one, np.empty(0))[0].shape == (0,)
+def test_columns_mark_illegal_cases_and_take_infinite_stiffness_for_rigid(table: Surrogate) -> None:
+    mu0 = np.array([0.3, -0.3, 0.3, 0.3, math.nan, 0.3])
+    force = np.array([10.0, -10.0, 10.0, 0.0, 10.0, 10.0])
+    k = np.array([1e6, 1e6, math.inf, 1e6, 1e6, -1e6])
+    rest = (np.array([2e-6]), np.array([1.3e5]), np.array([0.01]))
+    found = table.evaluate(dict(zip(FIELDS, (mu0, force, k, *rest), strict=True)))
+    macro, mu, bound, source = found.mu_macro, found.mu_ratio, found.error_bound, found.source_code
+    assert np.flatnonzero(source < 0).tolist() == [1, 3, 4, 5]
+    for values in (macro, mu, bound):
+        assert np.isnan(values).tolist() == (source < 0).tolist()
+    assert macro[2] == table.evaluate(**{**CASE, "k": None}).mu_macro
+    for i in range(6):
+        one = table.evaluate_case(float(mu0[i]), float(force[i]), float(k[i]), 2e-6, 1.3e5, 0.01)
+        np.testing.assert_array_equal(one, (macro[i], mu[i], bound[i], source[i]))

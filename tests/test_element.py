@@ -1,6 +1,7 @@
 """The contact in the time domain: the table's mean, its properties, bounds."""
 
 import math
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -118,7 +119,7 @@ def test_arrays_are_the_single_contacts() -> None:
 def test_states_are_read_set_copied_and_reset() -> None:
     contact = Element(**CASE, contact="ball")
     contact.step(2e-6, 1e-6)
-    copy, state = contact.copy(), contact.state
+    copy, state = deepcopy(contact), contact.state
     moved = contact.step(2e-6, 0.0)
     assert copy.force != moved
     assert copy.step(2e-6, 0.0) == moved

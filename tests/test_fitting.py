@@ -211,7 +211,7 @@ POINTS: Case = {"v0": [0.01, 0.1, 1.0], "mu_macro": [0.2, 0.25, 0.3]}
         (POINTS, {"Fz": 10.0, "y0": 2e-6}, "omega must be given or f"),
         (POINTS, {**RIG, "y0": -1.0}, "y0 must be finite and >= 0"),
         ({"v0": [0.1, 0.2]}, RIG, "mu_macro must be a column of the data"),
-        ([0.1, 0.2], RIG, "data must be a mapping or table"),
+        ([0.1, 0.2], RIG, "data must be a mapping, DataFrame"),
         ({"v0": [0.1, 0.1, 0.1], "mu_macro": [0.2, 0.21, 0.2]}, RIG, "at least 2 different inputs"),
         ({"v0": [0.1, 0.2, 0.3], "mu_macro": [0.2, 0.21]}, RIG, "data must be columns of one length"),
         ({"v0": [0.1, 0.2], "mu_macro": [0.2, math.nan]}, RIG, "mu_macro at index 1 must be finite and >= 0"),

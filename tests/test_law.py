@@ -68,10 +68,8 @@ def test_a_law_is_the_surrogate_along_a_line(surrogate: Surrogate, pair: Any, pl
     assert law.answer.mu_macro == close(moving.mu_macro, rel=1e-15)
     assert law.mu_static == close(still.mu_macro, rel=1e-9, abs=1e-15)
     assert np.count_nonzero(law.answer.regime[1:] != law.answer.regime[:-1]) == len(law.border)
-    columns: Any = (values if name == along else np.array([case[name]]) for name in fields)
-    found = surrogate.evaluate_columns(*columns, **said)
-    for column, name in zip(found, ("mu_macro", "mu_ratio", "error_bound", "source_code"), strict=True):
-        np.testing.assert_array_equal(column, getattr(law.answer, name))
+    for name in ("mu_macro", "mu_ratio", "error_bound", "source_code"):
+        np.testing.assert_array_equal(getattr(moving, name), getattr(law.answer, name))
 
 
 @every_pair
@@ -95,8 +93,6 @@ def test_the_band_holds_every_stiffness_of_its_interval(surrogate: Surrogate, pa
     assert "mu_macro_low" not in middle.columns
     assert middle.border == law.border
     assert middle.answer.mu_macro == close(law.answer.mu_macro, rel=1e-14)
-    again = friction_law(surrogate, "v0", SPEEDS, single, **said, **INTERVAL)  # as a keyword, too
-    np.testing.assert_array_equal(again.band, law.band)
 
 
 @every_pair

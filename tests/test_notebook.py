@@ -1,4 +1,4 @@
-"""What a notebook shows: tables in HTML, pictures by one call, data frames; and the notebook in examples runs."""
+"""What a notebook shows: pictures by one call, data frames; and the notebook in examples runs."""
 
 import json
 import sys
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mumacro import MumacroError, Surrogate, fit
+from mumacro import MumacroError, Surrogate
 from mumacro.fitted import Fit
 from tests.cases import Case
 from tests.comparing import close
@@ -33,22 +33,6 @@ def test_every_cell_of_the_notebook_runs_and_finds_the_truth(repository: Path, m
     low, high = names["fit"].interval["k"]
     assert low < names["ball"].k < high
     assert names["known"].mu_macro_low < names["one"].mu_macro < names["known"].mu_macro_high
-
-
-def test_surrogate_answer_and_fit_show_themselves_in_html(surrogate: Surrogate) -> None:
-    pytest.importorskip("scipy")
-    assert surrogate.id in surrogate._repr_html_()
-    answer = surrogate.evaluate(**CASE, v0=SPEEDS)
-    shown = answer._repr_html_()
-    assert shown.count("<tr>") == 11
-    assert "and 20 more" in shown
-    assert f"<td>{answer.mu_macro[9]:.6g}</td>" in shown
-    one = surrogate.evaluate(**CASE, v0=0.01)._repr_html_()
-    assert one.count("<tr>") == 2
-    assert "more" not in one
-    mu = answer.mu_macro + 1e-3 * np.cos(17.0 * np.arange(30))
-    found = fit({"v0": SPEEDS, "mu_macro": mu}, Fz=10, y0=2e-6, f=2e4)
-    assert f"<td>k</td><td>{found.values['k']:.6g}</td>" in found._repr_html_()
 
 
 @pytest.mark.parametrize(

@@ -71,10 +71,6 @@ def test_one_thread_means_that_none_is_started(table: Surrogate, monkeypatch: py
     assert everything(table.on_one_thread()) == expected
     with pytest.raises(AssertionError, match="a thread was started"):
         table.mu_ratio(*points(N))
-    # columns are evaluated on the calling thread, for any number of threads of the table
-    v, y = points(N)
-    one = np.ones(1)
-    table.evaluate_columns(0.5 * one, 2.0 * one, one, y, one, v)
 
 
 def test_no_thread_outlives_its_call(table: Surrogate) -> None:

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import mumacro
 from mumacro import charts
+from mumacro.arrays import Array
 from mumacro.cells import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.contact import rules
 from mumacro.errors import MumacroError
-from mumacro.library import Array
 from mumacro.table import Table
 from mumacro.version import __version__
 from mumacro.writing import write_whole

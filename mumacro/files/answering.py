@@ -3,8 +3,6 @@
 Columns that are named like a missing input are refused.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -13,9 +11,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
-from mumacro.answer import IntervalAnswer
+from mumacro.answer import BAND
+from mumacro.arrays import Array, Bools, Codes
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.contact import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.errors import InputError, MumacroError
@@ -24,13 +22,8 @@ from mumacro.interval import ENDS
 from mumacro.surrogate import Surrogate
 from mumacro.tabular import TOO_LARGE, absent, find_heads, meant_by, read_cell
 
-__all__ = ["ANSWERS", "REJECTS", "FilesError", "added_fields", "answer", "answer_columns", "find_columns", "numbers"]
-
-Array = NDArray[np.float64]
-
 #: columns that are added
 ANSWERS = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
-BAND = IntervalAnswer.__slots__  # beside mu_macro, of an interval of k
 #: of a row without a result: its index, the input (null: the row itself), the value, the reason
 REJECTS = pa.schema([("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())])
 
@@ -46,14 +39,9 @@ def added_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
 
 
 def answer(
-    batch: pa.RecordBatch,
-    surrogate: Surrogate | None = None,
-    *,
-    rigid: bool = False,
-    include: Sequence[str] = (),
-    contact: str = "spring",
-    direction: str = "across",
-) -> tuple[pa.RecordBatch, pa.RecordBatch]:
+    batch: pa.RecordBatch, surrogate: Surrogate | None = None, *, rigid: bool = False, include: Sequence[str] = (),
+    contact: str = "spring", direction: str = "across",
+) -> tuple[pa.RecordBatch, pa.RecordBatch]:  # fmt: skip
     """Evaluate every case of a batch.
 
     Parameters
@@ -64,7 +52,7 @@ def answer(
         rigid contact.  A null, a NaN or an empty cell is missing, in k as elsewhere.  ``k_low`` and ``k_high`` may
         stand for k; ``Fz_amplitude`` [N] stands for y0 in direction normal.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
-        The table; left out, the tightest one that comes with the library.
+        Left out, the tightest table that comes with the library.
     rigid : bool
         All contacts are rigid and there is no column k.
     include : sequence of str
@@ -84,8 +72,6 @@ def answer(
     ------
     FilesError
         A column is missing, has a wrong name or no numbers.
-    InputError
-        An unknown contact or direction.
 
     Examples
     --------
@@ -171,7 +157,7 @@ def answer_columns(
     return columns, rejects, given
 
 
-def _words(codes: NDArray[np.int8], words: Sequence[str], mask: NDArray[np.bool_] | None) -> pa.Array:
+def _words(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
     return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string()))
 
 

@@ -1,7 +1,5 @@
 """``mumacro eval``: files of cases from the command line."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 import tempfile
@@ -15,8 +13,6 @@ from mumacro.command import OneLineParser, add_format, add_kind, open_table
 from mumacro.files.reading import find_files
 from mumacro.files.run import evaluate_files
 from mumacro.tabular import SEPARATORS
-
-__all__ = ["main"]
 
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:

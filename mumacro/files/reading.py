@@ -3,8 +3,6 @@
 Cells of CSV and values of NDJSON are text.  Inputs become numbers; all else stays text.
 """
 
-from __future__ import annotations
-
 import csv
 import glob
 import gzip
@@ -22,8 +20,6 @@ import pyarrow.dataset
 
 from mumacro.files.answering import FilesError
 from mumacro.tabular import read_head
-
-__all__ = ["ENDINGS", "Block", "ParquetSource", "TextSource", "find_files", "format_of"]
 
 FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
 ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"

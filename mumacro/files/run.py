@@ -6,8 +6,6 @@ the note itself.  Pieces that fit their notes are kept; what follows them is don
 ``OUT.run.json`` stays: it tells what the output was made of, so that the same command finds it complete.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -31,8 +29,6 @@ from mumacro.surrogate import Surrogate
 from mumacro.version import __version__
 from mumacro.writing import alone_in, put, write_whole
 
-__all__ = ["Summary", "evaluate_files"]
-
 
 @dataclass(frozen=True)
 class Summary:
@@ -47,20 +43,12 @@ class Summary:
 
 
 def evaluate_files(
-    given: Sequence[str | Path],
-    out: str | Path,
-    surrogate: Surrogate,
-    *,
-    rigid: bool = False,
-    include: Sequence[str] = (),
-    sep: str = ",",
-    decimal: str = ".",
-    contact: str = "spring",
-    direction: str = "across",
-    force: bool = False,
+    given: Sequence[str | Path], out: str | Path, surrogate: Surrogate, *, rigid: bool = False,
+    include: Sequence[str] = (), sep: str = ",", decimal: str = ".", contact: str = "spring",
+    direction: str = "across", force: bool = False,
     progress: Callable[[float, int, int], None] = lambda _share, _rows, _rejected: None,
     say: Callable[[str], None] = lambda _text: None,
-) -> Summary:
+) -> Summary:  # fmt: skip
     """Evaluate every case of some files.
 
     Parameters
@@ -68,32 +56,21 @@ def evaluate_files(
     given : sequence of path
         Files, folders or patterns; all of one format.
     out : path
-        A file, whose ending sets the format.  Rows keep their order; a rejected row is not in it, but in
-        ``OUT.rejects.csv``.
+        Its ending sets the format.  Rows keep their order; a rejected row is not in it, but in ``OUT.rejects.csv``.
     surrogate : Surrogate
-        The table.
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
     sep, decimal : str
         Between the cells of CSV, and within its numbers, read and written.
     force : bool
         Replace an output that exists, and delete the parts of another run.
-    progress : callable
-        Called with the share that is done, rows read and rows rejected.
-    say : callable
-        Called with one line about what a resumed run found.
-
-    Returns
-    -------
-    Summary
-        What was done.
+    progress, say : callable
+        Called with the share that is done, rows read and rejected; with one line about what a resumed run found.
 
     Raises
     ------
     FilesError
         An input or output that cannot be used, or an input that changed meanwhile; names it, with the remedy.
-    InputError
-        An unknown contact or direction.
     BusyError
         Another run writes the same output.
 

@@ -1,7 +1,5 @@
 """Evaluated batches as pieces of a file: CSV, NDJSON, or Arrow streams, of which a Parquet file is made at the end."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io
@@ -13,8 +11,6 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
-
-__all__ = ["Output", "csv_lines"]
 
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:

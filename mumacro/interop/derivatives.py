@@ -1,15 +1,11 @@
 """What the classes for JAX and PyTorch share: the quantities by name, open tables, mu_macro as a function of groups."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from threading import Lock
 from typing import Any
 
 from mumacro.surrogate import Surrogate
-
-__all__ = ["NO_THIRD", "DifferentiableFriction", "slopes_by_groups"]
 
 NO_THIRD = "third derivatives are not tabulated: take differences of the second ones"
 _OPENING = Lock()
@@ -38,12 +34,9 @@ class DifferentiableFriction:
         with _OPENING:
             self._open(self._table, opened)
 
-    def _open(self, table: int, surrogate: Surrogate) -> None:
-        """Keep a table for programs, if it is not kept yet."""
-        raise NotImplementedError
-
-    def _call(self, quantity: str, *arguments: Any) -> Any:
-        raise NotImplementedError
+    #: keeps a table for programs, if it is not kept yet: (number, surrogate)
+    _open: Callable[[int, Surrogate], None]
+    _call: Callable[..., Any]
 
     def mu_macro(self, mu0: Any, Fz: Any, k: Any, y0: Any, omega: Any, v0: Any) -> Any:
         """mu_macro [-] from SI inputs, see :meth:`mumacro.Surrogate.evaluate`; k None or inf is rigid contact."""

@@ -3,28 +3,20 @@
 The inputs of one call come from one of these libraries, with plain numbers and NumPy arrays beside them.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mumacro.answer import Answer, IntervalAnswer
+from mumacro.answer import BAND, GROUPS, Answer, IntervalAnswer
 from mumacro.charts import REGIMES
 from mumacro.contact import AMPLITUDE, Kind
 from mumacro.errors import InputError
 from mumacro.inputs import PER_UNIT
+from mumacro.surrogate import Surrogate
 
-if TYPE_CHECKING:
-    from mumacro.surrogate import Surrogate
-
-__all__ = ["evaluate_labelled"]
-
-_GROUPS = ("v_tilde", "y_tilde", "length_scale")
-_ENDS = ("mu_macro_low", "mu_macro_high")
 #: name -> units and long_name, as xarray and CF write them
 _ABOUT = {
     "mu_macro": ("1", "macroscopic friction coefficient"),
@@ -55,17 +47,10 @@ def evaluate_labelled(
 ) -> Any:
     """:meth:`mumacro.Surrogate.evaluate` for labelled inputs, ``options`` are its other keywords.
 
-    Returns
-    -------
-    Answer, DataFrame of pandas or Dask, or xarray.Dataset
-        An answer whose attributes are Series, DataArrays or Dask arrays, by their names, for xarray with ``units`` and
-        ``long_name``; for a DataFrame or Dataset of cases one of these, with the columns mu_macro, mu_ratio, regime,
-        error_bound and source (regime and source of pandas as categories).
-
-    Raises
-    ------
-    InputError
-        Series whose indexes differ, objects of two libraries in one call, and what ``evaluate`` refuses.
+    An answer whose attributes are Series, DataArrays or Dask arrays, by their names, for xarray with ``units`` and
+    ``long_name``; for a DataFrame or Dataset of cases one of these, with the columns mu_macro, mu_ratio, regime,
+    error_bound and source (regime and source of pandas as categories).  InputError for Series whose indexes differ,
+    objects of two libraries in one call, and what ``evaluate`` refuses.
     """
     given = {name: math.inf if name == "k" and value is None else value for name, value in inputs.items()}
     kinds = {name: type(value).__module__.partition(".")[0] for name, value in {"": cases, **given}.items()}
@@ -82,8 +67,8 @@ def evaluate_labelled(
             raise InputError(name, type(value).__name__, "a Dask array: .to_dask_array(lengths=True)")
     gradient, groups = options["gradient"], options["groups"] or options["gradient"]
     slopes = [f"d_mu_macro_d_{name}{end}" for end in ("", "_bound") for name in kind.fields] if gradient else []
-    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(_ENDS if interval else ())]
-    names += [*(_GROUPS if groups else ()), *slopes]
+    names = ["mu_macro", "mu_ratio", "error_bound", "source_code", *(BAND if interval else ())]
+    names += [*(GROUPS if groups else ()), *slopes]
 
     def chunk(*values: Any) -> list[Any]:
         found = table.evaluate(dict(zip(given, values, strict=True)), **options)
@@ -104,7 +89,7 @@ def evaluate_labelled(
 
     mu_macro, mu_ratio, bound, code = (found[name] for name in names[:4])
     answer: Any = (IntervalAnswer if interval else Answer)(mu_macro, mu_ratio, bound, code, look_up=look_up)
-    for name in _ENDS if interval else ():
+    for name in BAND if interval else ():
         setattr(answer, name, found[name])
     if groups:
         answer._groups, answer._certain = (found["v_tilde"], found["y_tilde"], found["length_scale"]), certain
@@ -113,7 +98,7 @@ def evaluate_labelled(
         answer.gradient_bound = {name: found[f"d_mu_macro_d_{name}_bound"] for name in kind.fields}
     if kinds[""] not in ("pandas", "xarray"):
         return answer
-    shown = ("mu_macro", *(_ENDS if interval else ()), "mu_ratio", "regime", "error_bound", "source")
+    shown = ("mu_macro", *(BAND if interval else ()), "mu_ratio", "regime", "error_bound", "source")
     columns = {name: getattr(answer, name) for name in shown}
     whole = importlib.import_module(kinds[""])
     return whole.DataFrame(columns) if library == "pandas" else whole.Dataset(columns)

@@ -1,7 +1,5 @@
 """The results of the inverse problem, and the case that it is solved for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -11,51 +9,28 @@ from mumacro.errors import InputError
 from mumacro.inputs import as_columns, check_inputs
 from mumacro.interval import ENDS
 
-__all__ = ["Crossing", "Reach", "Root", "Solution", "checked_case"]
-
 
 class Root(NamedTuple):
-    """One value of the unknown.
+    """One value of the unknown."""
 
-    Attributes
-    ----------
-    value : float
-        The unknown [SI].
-    low, high : float
-        Between them, and on the root's side of the next turning point, mu_macro is within the surrogate's error bound
-        of the target: the true root cannot be distinguished from any of these values [SI].
-    mu_macro : float
-        The surrogate's value there [-].
-    regime : str
-        One of :data:`mumacro.REGIMES`.
-    """
-
-    value: float
+    value: float  #: the unknown [SI]
+    #: between them, and on the root's side of the next turning point, mu_macro is within the surrogate's error bound of
+    #: the target: the true root cannot be distinguished from any of these values [SI]
     low: float
     high: float
-    mu_macro: float
-    regime: str
+    mu_macro: float  #: the surrogate's value there [-]
+    regime: str  #: one of :data:`mumacro.REGIMES`
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Which mu_macro is reachable in a range of the unknown.
+    """Which mu_macro is reachable in a range of the unknown."""
 
-    Attributes
-    ----------
-    low, high : float
-        The range of the unknown [SI].
-    mu_min, mu_max : float
-        Smallest and largest mu_macro in it [-].
-    min_included, max_included : bool
-        False where that value is approached and never reached.
-    """
-
-    low: float
+    low: float  #: the range of the unknown [SI]
     high: float
-    mu_min: float
+    mu_min: float  #: smallest and largest mu_macro in it [-]
     mu_max: float
-    min_included: bool
+    min_included: bool  #: False where that value is approached and never reached
     max_included: bool
 
     def holds(self, target: float) -> bool:
@@ -66,27 +41,13 @@ class Reach:
 
 @dataclass(frozen=True)
 class Solution:
-    """All roots of every target.
+    """All roots of every target."""
 
-    Attributes
-    ----------
-    unknown : str
-        The input that was solved for.
-    targets : tuple of float
-        The wanted mu_macro [-].
-    roots : tuple of tuple of Root
-        The roots of each target, ascending; empty where it is not reachable.
-    reach : Reach
-        What is reachable in the range that was searched.
-    constant : bool
-        True when the unknown has no influence on mu_macro, such as v0 without oscillation.
-    """
-
-    unknown: str
-    targets: tuple[float, ...]
-    roots: tuple[tuple[Root, ...], ...]
-    reach: Reach
-    constant: bool
+    unknown: str  #: the input that was solved for
+    targets: tuple[float, ...]  #: the wanted mu_macro [-]
+    roots: tuple[tuple[Root, ...], ...]  #: of each target, ascending; empty where it is not reachable
+    reach: Reach  #: what is reachable in the range that was searched
+    constant: bool  #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
 
 
 @dataclass(frozen=True)
@@ -99,15 +60,9 @@ class Crossing:
 
 
 def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
-    """The five known inputs [SI]; an infinite ``k`` is rigid contact.
+    """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an infinite ``k`` is rigid.
 
-    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.  The amplitude is
-    ``Fz_amplitude`` [N] for direction normal, ``y0`` [m] otherwise.
-
-    Raises
-    ------
-    InputError
-        A value is missing, not one number, out of bounds, given twice, or given for the unknown; an interval of k.
+    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.
     """
     if without not in kind.fields:
         raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")

@@ -6,8 +6,6 @@ bracket, that has no finite slope (plateaus, the cusp of the static limit at y~ 
 step is replaced by halving the bracket: by its geometric mean, so that any scale is reached.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -16,13 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mumacro.answer import Answer
+from mumacro.arrays import Array, Bools, Places
 from mumacro.contact import SPRING, Kind
 from mumacro.surrogate import Surrogate
-
-__all__ = ["TINY", "Curve", "Sweep", "curves_between", "last_double", "samples"]
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 TINY = 5e-324
 _ROUNDING = 2.0**-52
@@ -44,8 +38,7 @@ class Sweep:
 
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""
-        out: Array = self.answer(x).mu_macro
-        return out
+        return np.asarray(self.answer(x).mu_macro)
 
     def with_slope(self, x: Array) -> tuple[Answer[Any], Array]:
         """The results and d mu_macro / d ln x [-] at ``x`` (n,); the slope may be infinite or NaN at an edge."""
@@ -80,8 +73,7 @@ class Curve:
     def holds(self, level: Array) -> Bools:
         """Which of the levels (n,) lie between the ends of the piece, these included."""
         low, high = sorted((float(self.mu[0]), float(self.mu[-1])))
-        out: Bools = (level >= low) & (level <= high)
-        return out
+        return np.asarray((level >= low) & (level <= high))
 
     def end(self) -> float:
         """Where the piece first has its last value: at its end, or where the plateau begins that ends it."""
@@ -103,7 +95,7 @@ class Curve:
             out[inside] = self._newton(level[inside], j[inside], going[inside])
         return out
 
-    def _newton(self, level: Array, j: NDArray[np.intp], leave: Bools) -> Array:
+    def _newton(self, level: Array, j: Places, leave: Bools) -> Array:
         """The same for levels between the samples j - 1 and j, (n,)."""
         a, b = self.x[j - 1].copy(), self.x[j].copy()
         fa, fb = self.sign * (self.mu[j - 1] - level), self.sign * (self.mu[j] - level)
@@ -163,8 +155,7 @@ def _middle(a: Array, b: Array) -> Array:
     """A double between ``a`` and ``b``, in the middle of their logarithms; ``a`` where they are neighbours."""
     middle = np.sqrt(np.maximum(a, TINY)) * np.sqrt(b)
     # the square roots of subnormal numbers keep fewer digits than the numbers have
-    out: Array = np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
-    return out
+    return np.where((middle > a) & (middle < b), middle, a + 0.5 * (b - a))
 
 
 def _ordered(x: ArrayLike) -> NDArray[np.int64]:
@@ -176,15 +167,8 @@ def last_double(below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
     """Neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
 
     For what has no slope, such as a regime.  Cuts the *bits*: doubles of one sign are ordered like the integers
-    with the same bits, so this ends at two neighbours, whatever the scale.
-
-    Parameters
-    ----------
-    below : callable
-        Array (n, m) in, array of bool (n, m) out, row i for bracket i; true at ``low``, false at ``high``, monotone
-        in between.
-    low, high : array_like
-        Ends of the brackets, >= 0, shape (n,).
+    with the same bits, so this ends at two neighbours, whatever the scale.  ``below`` maps (n, m) values, row i for
+    bracket i, to bool; from true at ``low`` (n,) to false at ``high`` it changes once.
     """
     a, b = _ordered(low).copy(), _ordered(high).copy()
     rows = np.arange(a.size)

@@ -24,28 +24,22 @@ springs slide all the time.  There mu_macro falls with k and rises with Fz (alon
 How a level is found on a monotone piece: :mod:`mumacro.inverse.rootfinding`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mumacro.answer import Answer
+from mumacro.arrays import Array, Bools, Places
 from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import POSITIVE
 from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
 from mumacro.surrogate import Surrogate
-
-__all__ = ["border_crossings", "solve_for"]
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # searched over all their values
 HUGE = 1.7976931348623157e308
@@ -63,21 +57,14 @@ _Y_CLOSEST = 1.290791
 
 
 def solve_for(
-    surrogate: Surrogate,
-    unknown: str,
-    targets: ArrayLike,
-    case: Mapping[str, float | None],
-    within: tuple[float, float] | None = None,
-    *,
-    contact: str = "spring",
-    direction: str = "across",
-) -> Solution:
+    surrogate: Surrogate, unknown: str, targets: ArrayLike, case: Mapping[str, float | None],
+    within: tuple[float, float] | None = None, *, contact: str = "spring", direction: str = "across",
+) -> Solution:  # fmt: skip
     """Every value of one input at which mu_macro has the wanted value.
 
     Parameters
     ----------
     surrogate : Surrogate
-        What is solved; a root is as good as its error bound, see :class:`Root`.
     unknown : str
         One of mu0, Fz, k, y0, omega, v0; for direction normal Fz_amplitude in place of y0.
     targets : array_like
@@ -89,11 +76,6 @@ def solve_for(
         where the contact is so soft that it does not matter to where it is as good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
-
-    Returns
-    -------
-    Solution
-        All roots of every target, ascending, each with its interval from the error bound; and the reachable range.
 
     Raises
     ------
@@ -237,8 +219,7 @@ def _turning_points(sweep: Sweep, x: Array, mu: Array, noise: Array) -> list[flo
     inside = (places > 0) & (places < x.size - 1)
     places, sign = places[inside], sign[inside]
     _, turns = last_double(lambda at: ~(sign * sweep.with_slope(at)[1] < 0.0), x[places - 1], x[places + 1])
-    found: list[float] = turns.tolist()
-    return found
+    return [*map(float, turns)]
 
 
 def _roots(sweep: Sweep, curves: list[Curve], targets: Array) -> list[list[Root]]:
@@ -289,14 +270,7 @@ def _enclosures(
 
 
 def _where_off(
-    sweep: Sweep,
-    curve: Curve,
-    i: NDArray[np.intp],
-    above: Bools,
-    bound: Array,
-    wanted: Array,
-    value: Array,
-    slope: Array,
+    sweep: Sweep, curve: Curve, i: Places, above: Bools, bound: Array, wanted: Array, value: Array, slope: Array
 ) -> Array:
     """Where, above or below the roots ``i``, mu_macro is off its target by ``bound``, each (m,)."""
     sign = np.where(above, 1.0, -1.0)
