@@ -52,10 +52,11 @@ def _check(settings: Settings) -> int:
     url = f"http://{f'[{host}]' if ':' in host else host}:{settings.port}/readyz"
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with opener.open(url, timeout=3.0) as response:
-            return 0 if response.status == 200 else 1
-    except (OSError, ValueError):
+        opener.open(url, timeout=10.0).close()  # any other status raises
+    except (OSError, ValueError) as error:
+        print(f"{url}: {error}", file=sys.stderr)
         return 1
+    return 0
 
 
 def _serve(settings: Settings) -> int:

@@ -81,7 +81,8 @@ def command(repository: Path, *arguments: Any) -> Any:
 
 
 def test_the_health_check_and_a_port_that_is_taken(live_server: Any, repository: Path, surrogate: Surrogate) -> None:
-    assert command(repository, "healthcheck", "--port", str(live_server.port)).returncode == 0
+    found = command(repository, "healthcheck", "--port", str(live_server.port))
+    assert found.returncode == 0, found.stderr
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         assert command(repository, "healthcheck", "--port", str(unused.getsockname()[1])).returncode == 1
