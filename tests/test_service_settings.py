@@ -68,6 +68,7 @@ def test_the_key_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_health_check_asks_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.environ", os.environ.copy())  # main writes its options there
     monkeypatch.setattr("urllib.request.OpenerDirector.open", opened := Mock(side_effect=LookupError))
     for host, asked in (("0.0.0.0", "127.0.0.1"), ("::", "[::1]"), ("10.1.2.3", "10.1.2.3")):  # noqa: S104
         with pytest.raises(LookupError):
