@@ -34,7 +34,6 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = str(BIN / ("python.exe" if os.name == "nt" else "python"))
 MARKER = VENV / "mumacro-installed.json"
 OLDEST, NEWER_NAMES = (3, 11), ("python3.13", "python3.12", "python3.11")
-
 # dev.txt holds all of build and service at the same versions; zig.txt is added where a compiler is missing
 SETS = {"service": ("build", "service"), "dev": ("dev",)}
 

@@ -2,7 +2,8 @@
 
     python deploy/packages.py FOLDER [--all]
 
-One wheel, of this machine; with ``--all`` one of every platform in pyproject.toml, by zig.
+One wheel, of this machine; with ``--all`` one of every platform in pyproject.toml, by zig.  ``build/service.cdx.json``
+is the bill of materials of the service.
 """
 
 import os
@@ -36,9 +37,17 @@ def build(folder: Path, platforms: Iterable[str]) -> None:
         run("", "auditwheel", "show", "--ldpaths", folder, wheel)
 
 
+def describe(out: Path) -> None:
+    """Write what the service is installed with, versions and hashes, as CycloneDX."""
+    lock = ("requirements/service.txt", "--pyproject", "pyproject.toml")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    run("", "cyclonedx-py", "requirements", *lock, "--output-reproducible", "-o", out)
+
+
 if __name__ == "__main__":
     table = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
     try:
         build(ROOT / sys.argv[1], table["wheels"] if "--all" in sys.argv else [""])
+        describe(ROOT / "build" / "service.cdx.json")
     except subprocess.CalledProcessError as error:
         raise SystemExit(f"FAILED: {error}") from None

@@ -31,7 +31,10 @@ _NICENESS = 5  # that is added to the threads of batches, so that short requests
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024  # how long, and how many bytes of a refused body are read
 _PAUSE_S = 0.25  # a client that sends nothing for so long waits for the answer
 _OTHER_CHARSET = re.compile(r'charset=(?! *"?(utf-?8|us-ascii|) *"? *(;|$))')
-_ONCE = (b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"x-request-id")
+_ONCE = (
+    b"host", b"x-api-key", b"authorization", b"content-type", b"content-encoding", b"transfer-encoding",
+    b"x-request-id",
+)  # fmt: skip
 
 
 def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
@@ -50,8 +53,11 @@ def holder_of(headers: Mapping[bytes, bytes], keys: Mapping[str, str]) -> str:
 
 def check_head(scope: Scope, headers: Mapping[bytes, bytes]) -> None:
     """Refuse a head that says two things, or asks for another protocol, as which its body would be read."""
-    if b"host" not in headers and scope["http_version"] == "1.1":
-        raise RequestError(Kind.MALFORMED_HTTP, "a request has one Host")
+    version = scope["http_version"]
+    if version not in ("1.0", "1.1") or (version == "1.1" and b"host" not in headers):
+        raise RequestError(Kind.MALFORMED_HTTP, "a request is of HTTP/1.1 and has one Host")
+    if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
+        raise RequestError(Kind.MALFORMED_HTTP, "the only transfer coding is chunked")
     if len(headers) != len(scope["headers"]):
         names = [name for name, _ in scope["headers"]]
         for name in _ONCE:
@@ -80,7 +86,7 @@ async def read_body(
     headers: Mapping[bytes, bytes], receive: Receive, limit: int, large: Callable[[], None] = lambda: None
 ) -> bytearray:
     """The body of a request; ``large`` is called before more than SMALL_BODY is read."""
-    length = headers.get(b"content-length", b"0")
+    length = headers.get(b"content-length", b"0").strip()
     size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
     body, more = bytearray(), True
     while True:

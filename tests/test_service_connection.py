@@ -95,7 +95,9 @@ HEADS = [
     (TWO_LENGTHS, 400), (GET[:-2] + b"a: b\r\n" * 99 + b"\r\n", 200), (GET[:-2] + b"a: b\r\n" * 100 + b"\r\n", 431),
     (GET[:-2] + b"A: " + b"b" * 65_000 + b"\r\n\r\n", 200), (GET[:-2] + b"A: " + b"b" * 66_000 + b"\r\n\r\n", 431),
     (b"GET /" + b"b" * 66_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", 431), (head(SINGLE, 300_000_000), 413),
-    (head(BATCH, 300_000_000), 413),
+    (head(BATCH, 300_000_000), 413), (b"GET /livez\r\n\r\n", 400),
+    (GET[:-2] + b"Transfer-Encoding: gzip, chunked\r\n\r\n" + END, 400),
+    (posted(SINGLE, b"{}").replace(b": 2\r\n", b": 2\t\r\n"), 422),
 ]  # fmt: skip
 
 

@@ -1,8 +1,8 @@
-"""Strange requests and many clients at once: short forms of fuzz/strange.py and fuzz/attacks.py."""
+"""Strange requests, damaged framing, many clients at once: short forms of trials in fuzz/."""
 
 import pytest
 
-from fuzz import attacks, strange
+from fuzz import attacks, framing, strange
 from tests.serving import Server
 
 SHARE = 0.2
@@ -23,4 +23,9 @@ def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server
     assert found.bad == []
     assert set(found.counts) == set(strange.KINDS)
     assert {200, 400, 404, 422} <= set(found.statuses)
+    assert live_server.errors() == []
+
+
+def test_a_connection_is_divided_into_the_same_requests_as_by_h11(live_server: Server) -> None:
+    assert {framing.compared(live_server, seed) for seed in range(2000)} == {"the same", "fewer here"}
     assert live_server.errors() == []
