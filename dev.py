@@ -43,10 +43,11 @@ class FailedError(Exception):
 
 
 def environment() -> dict[str, str]:
-    """The environment variables with ``.venv`` first; without those that would add other packages."""
-    env = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
+    """The environment variables with ``.venv`` first, without those that would add other packages; caches are in it."""
+    # without compiled modules kept there, each of hundreds of processes would compile up to 3,000 again
+    env = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")}
     env |= {"VIRTUAL_ENV": str(VENV), "PATH": f"{BIN}{os.pathsep}{env.get('PATH', os.defpath)}"}
-    return {"ZIG_GLOBAL_CACHE_DIR": str(VENV / "zig"), **env}
+    return {"ZIG_GLOBAL_CACHE_DIR": str(VENV / "zig"), "PYTHONPYCACHEPREFIX": str(VENV / "bytecode"), **env}
 
 
 def run(*command: str | Path, quiet: bool = False) -> int:
@@ -159,7 +160,6 @@ def docs() -> int:
 
 
 def page() -> int:
-    """The page that computes in the browser from the table of 1e-7."""
     table, module = "tables/mumacro-1e-7.nc", "build/mumacro.wasm"
     (ROOT / "build").mkdir(exist_ok=True)
     made = execute("python", "-m", "builder", "export", table, "--format", "wasm", "--out", module)
