@@ -342,7 +342,13 @@ PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s"
             "map": ("map", CASE), "fit": ("fit", "MEASURED", *RIG, "--contact", "ball")}  # fmt: skip
 
 
-@pytest.mark.parametrize("words", PICTURES.values(), ids=PICTURES)
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param(x, id=name, marks=() if name in ("law", "fit") else pytest.mark.slow)
+        for name, x in PICTURES.items()
+    ],
+)
 def test_results_go_into_pictures_and_csv(capsys: Capture, tmp_path: Path, measured: Any, words: Any) -> None:
     pytest.importorskip("matplotlib")
     pytest.importorskip("scipy")
@@ -368,8 +374,7 @@ def test_a_picture_names_the_extra_it_needs(capsys: Capture, tmp_path: Path, mon
 
 
 def test_a_case_beyond_the_map_is_said_to_be_so(capsys: Capture, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    out = str(tmp_path / "map.png")
+    out = str(tmp_path / "map.csv")
     assert "outside" not in said(capsys, 0, "map", CASE, "-o", out)
     for case in (CASE.replace("1e6", "rigid"), CASE.replace("0.01", "0"), CASE.replace("1e6", "1e30")):
         assert "the case lies outside the map: v~ = " in said(capsys, 0, "map", case, "-o", out)

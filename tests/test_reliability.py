@@ -137,6 +137,7 @@ def test_a_killed_build_resumes_to_the_same_data(tmp_path: Path) -> None:
     assert "1 kills, 1 starts from finished parts" in faults.killed_builds(tmp_path, kills=1)
 
 
+@pytest.mark.slow
 def test_a_full_disk_in_a_sweep_is_reported_and_finished_work_stays(tmp_path: Path) -> None:
     v, y = np.full(60, 0.1), np.geomspace(0.1, 10.0, 60)
     try:

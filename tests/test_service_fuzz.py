@@ -19,7 +19,7 @@ def test_an_attack_takes_little_memory_and_keeps_nobody_waiting(name: str) -> No
 
 def test_a_strange_request_is_answered_or_refused_and_never_an_error(live_server: Server) -> None:
     found = strange.Found()
-    found.ask(live_server, 1, 2000)
+    found.ask(live_server, 1, 1000)
     assert found.bad == []
     assert set(found.counts) == set(strange.KINDS)
     assert {200, 400, 404, 422} <= set(found.statuses)
