@@ -78,6 +78,7 @@ def _serve(settings: Settings) -> int:
                 host=settings.host, port=settings.port, workers=settings.workers, root_path=settings.root_path,
                 log_config=log_config(settings.log_level), log_level=settings.log_level, access_log=False,
                 server_header=False, proxy_headers=False, timeout_graceful_shutdown=settings.shutdown_grace_s,
+                timeout_worker_healthcheck=30,  # on a busy machine a worker may need more than 5 s to start
             )  # fmt: skip
     except SystemExit as stop:
         return 1 if stop.code else 0
