@@ -78,13 +78,7 @@ def document(chance: random.Random) -> tuple[str, Any]:
     measured["y0"] = chance.choice([2e-6, [2e-6] * len(speeds)])
     half = {"unknowns": ["k"], "mu0": 0.3}
     geometry = chance.choice([*GEOMETRIES])
-    bodies: dict[str, Any] = {
-        "geometry": chance.choice([*GEOMETRIES]),
-        "radius": 5e-3,
-        "Fz": 10.0,
-        "E": 210e9,
-        "nu": 0.3,
-    }
+    bodies: dict[str, Any] = {"geometry": geometry, "radius": 5e-3, "Fz": 10.0, "E": 210e9, "nu": 0.3}
     bodies |= {"length": 0.01, "oscillation": chance.choice(AXES)} if geometry == "cylinder" else {}
     return chance.choice((
         ("/v1/mu-macro", one),

@@ -342,13 +342,8 @@ PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s"
             "map": ("map", CASE), "fit": ("fit", "MEASURED", *RIG, "--contact", "ball")}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        pytest.param(x, id=name, marks=() if name in ("law", "fit") else pytest.mark.slow)
-        for name, x in PICTURES.items()
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("words", PICTURES.values(), ids=PICTURES)
 def test_results_go_into_pictures_and_csv(capsys: Capture, tmp_path: Path, measured: Any, words: Any) -> None:
     pytest.importorskip("matplotlib")
     pytest.importorskip("scipy")

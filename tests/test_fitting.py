@@ -245,12 +245,8 @@ def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
     """One number of an ordinary measurement is replaced by one of any size."""
     chance = np.random.default_rng(seed)
     sizes = [0.0, 5e-324, 1.7e308, 1e20, *10.0 ** chance.uniform(-307, 308, 3)]
-    columns = {
-        "v0": V0[::5],
-        "y0": np.full(4, 2e-6),
-        "mu_macro": np.array([0.02, 0.1, 0.2, 0.3]),
-        "std": np.full(4, 0.01),
-    }
+    columns = {"v0": V0[::5], "mu_macro": np.array([0.02, 0.1, 0.2, 0.3])}
+    columns |= {"y0": np.full(4, 2e-6), "std": np.full(4, 0.01)}
     for name, size, scattered in itertools.product(columns, sizes, (True, False)):
         data = {key: x.copy() for key, x in columns.items() if key != "std" or not scattered}
         data.setdefault(name, columns[name].copy())[chance.integers(4)] = size

@@ -75,11 +75,6 @@ def service(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[st
         yield server.url
 
 
-def programs_for(page: Path, request: pytest.FixtureRequest) -> Path:
-    found: Path = request.getfixturevalue("bare" if page.stem in BARE else "full")
-    return found
-
-
 def run(programs: Path, folder: Path, *words: str | Path) -> str:
     env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "MUMACRO_"))}
     env |= {"PATH": f"{programs}{os.pathsep}/usr/bin{os.pathsep}/bin", "COLUMNS": "120", "MPLBACKEND": "agg"}
@@ -90,7 +85,7 @@ def run(programs: Path, folder: Path, *words: str | Path) -> str:
 
 @pytest.mark.parametrize("page", having("pycon"), ids=lambda page: page.stem)
 def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    programs = programs_for(page, request)
+    programs = request.getfixturevalue("bare" if page.stem in BARE else "full")
     (tmp_path / "session.txt").write_text("\n".join(blocks(page, "pycon")), "utf-8")
     run(programs, tmp_path, programs / "python", "-c", SESSION, "session.txt")
 
@@ -101,7 +96,7 @@ def parts(text: str) -> tuple[list[str], list[float]]:
 
 @pytest.mark.parametrize("page", having("console"), ids=lambda page: page.stem)
 def test_commands(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    programs = programs_for(page, request)
+    programs = request.getfixturevalue("bare" if page.stem in BARE else "full")
     for block in blocks(page, "console"):
         for entry in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
             command, _, shown = entry.partition("\n")

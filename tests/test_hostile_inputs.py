@@ -14,12 +14,8 @@ from tests.cases import CASE, tables, without
 
 #: methods of (v~, y~)
 PLANE: dict[str, Callable[..., Any]] = {
-    "mu_ratio": lambda s, v, y: s.mu_ratio(v, y),
-    "ratio_with_bound": lambda s, v, y: s.ratio_with_bound(v, y),
-    "power": lambda s, v, y: s.power(v, y),
-    "stick_fraction": lambda s, v, y: s.stick_fraction(v, y),
-    "power_with_bound": lambda s, v, y: s.power_with_bound(v, y),
-    "stick_fraction_with_bound": lambda s, v, y: s.stick_fraction_with_bound(v, y),
+    **{name: getattr(Surrogate, name) for name in (*QUANTITY_NAMES, "ratio_with_bound")},
+    **{name: getattr(Surrogate, name) for name in ("power_with_bound", "stick_fraction_with_bound")},
     **{f"slopes of {of}": lambda s, v, y, of=of: s.slopes(v, y, of, bounds=True) for of in QUANTITY_NAMES},
 }
 NO_NUMBERS: dict[str, Any] = {

@@ -187,8 +187,6 @@ def test_a_package_finds_its_own_tables(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 PARTS = ("service", "builder", "mumacro")
-
-
 LACKS = [(name, "packages", r".*(\w+) is not installed: pip install 'mumacro.*") for name in PARTS]
 LACKS += [(name, "kernel", r".*compiled kernel.* missing .* C compiler .* ziglang.*") for name in PARTS[1:]]
 
