@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import MumacroError, Surrogate
+from mumacro.arrays import Array
 from mumacro.cells import Border
 from mumacro.charts import CHARTS, QUANTITIES, QUANTITY_NAMES, Quantity
 from mumacro.table import Block, Table, write_table
@@ -23,7 +23,6 @@ from .quantities import ABS_TO_REL, SOLVED
 from .sweep import Sweep
 from .verify import holds, uncovered, verify
 
-Array = NDArray[np.float64]
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
 SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
 #: the same in every cell.  Less, since nothing is left to chance there: the error of a cell is known on 17 x 17 of its

@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import charts
+from mumacro.arrays import Array
 from mumacro.cells import LOCAL, WIDTH, Border, cell_scale, chebyshev_coefficients, interpolation_matrix, nodes
 from mumacro.charts import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
 from mumacro.library import kernels
@@ -15,7 +15,6 @@ from mumacro.table import Block, BorderPiece
 from .quantities import SOLVED
 from .sweep import Sweep
 
-Array = NDArray[np.float64]
 MAX_NODES = 96
 MAX_CELLS = 160
 SHARE = 0.1  # of the tolerance that the nodes' truncation in one direction may take

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.io import savemat
 
+from mumacro.arrays import Array
 from mumacro.table import Table, json_attributes, read_table
 from mumacro.writing import write_whole
 
@@ -25,7 +25,6 @@ from .c.fmu.model import fmu2, fmu3
 from .c.source import ExportError, write_c
 from .c.wasm import wasm
 
-Array = NDArray[np.float64]
 PLANE = ("mu_ratio", "stick_fraction", "error_estimate")
 #: matrices of a Modelica file; those with log10 axes are the ones to interpolate
 MODELICA_TABLES = (*PLANE, "mu_ratio_log10", "stick_fraction_log10", "v_tilde_crit")

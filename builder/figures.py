@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import MumacroError, Surrogate, closed_forms
+from mumacro.arrays import Array
 from mumacro.law import approximations, border_speeds, friction_law
 
 from .steady import border
 
-Array = NDArray[np.float64]
 SIZE, DPI = (7.2, 4.6), 110
 V, Y, MU = r"$\tilde v_0 = v_0/(l_0\omega)$", r"$\tilde y_0 = y_0/l_0$", r"$\tilde\mu_\mathrm{macro}$"
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from mumacro import Surrogate, charts
+from mumacro.arrays import Array
 from mumacro.cells import WIDTH, cells_2d, chebyshev_coefficients, interpolation_matrix
 from mumacro.charts import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
 from mumacro.library import kernels
@@ -25,8 +25,6 @@ from mumacro.table import Block
 from .blocks import solve_nodes
 from .quantities import solver_noise
 from .sweep import Sweep
-
-Array = NDArray[np.float64]
 
 
 class BlockErrors(NamedTuple):

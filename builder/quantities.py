@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mumacro.arrays import Array
+
 Sliding = NDArray[np.bool_] | bool
 ABS_TO_REL = 10.0  # the largest relative error of mu~ may be this many times the tolerance of a table
 #: what a fresh solve of mu~ may be wrong by, relative: rounding, and the input's last digit next to the corner

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.errors import MumacroError
 from mumacro.writing import write_whole
 
@@ -21,7 +21,6 @@ from . import steady
 from .compiled import solver_kernel, source_digest
 from .model import OK
 
-Array = NDArray[np.float64]
 CHUNK = 128  # points; about 10 ms of work
 #: the steady state; the continuous orbit whether or not lam stays positive, analytic across the border; the border,
 #: where the column deficit holds v~crit

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate, charts
+from mumacro.arrays import Array
 from mumacro.charts import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE, SOURCES
 
 from .measure import SEAMS, fast_from, near_seams
@@ -15,7 +16,6 @@ from .measure import log_uniform as _log
 from .quantities import ABS_TO_REL, solver_noise
 from .sweep import Sweep
 
-Array = NDArray[np.float64]
 BESIDE_BORDER = 1e-3  # of v~crit: nearer, slopes of what is not smooth at the border are not compared
 # differences of fresh solves stand for the slopes of the model
 _STENCIL = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
@@ -128,11 +128,6 @@ class Neighbours:
             each = solver_noise(name, self.v[:, None], self.y[:, None], solved, sliding).max(axis=1)
             noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
         return slope, noise
-
-
-def differences(surrogate: Surrogate, sweep: Sweep, name: str, v: Array, y: Array) -> tuple[Array, Array]:
-    """:meth:`Neighbours.slopes` of one quantity at points (n,)."""
-    return Neighbours(surrogate, sweep, v, y).slopes(name)
 
 
 class _Compared(NamedTuple):

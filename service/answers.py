@@ -13,9 +13,9 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro import Surrogate
+from mumacro.arrays import Array, Codes
 from mumacro.charts import REGIME_OF_SOURCE, REGIMES, SOURCES
 from mumacro.contact import AMPLITUDE, SPRING, Kind
 from mumacro.inputs import FIELDS
@@ -23,8 +23,6 @@ from mumacro.interval import middle
 
 from .case import PLAIN, Asked
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int8]
 #: name of the regime of every source code
 REGIME_NAMES = tuple(REGIMES[code] for code in REGIME_OF_SOURCE)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mumacro.arrays import Array
 from mumacro.contact import AMPLITUDE, SPRING
 from mumacro.contact import Kind as ContactKind
 from mumacro.inputs import (
@@ -33,7 +33,6 @@ from mumacro.interval import BOUND, ENDS
 
 from .problems import FieldFault, Kind, RequestError, refuse
 
-Array = NDArray[np.float64]
 #: the bad field, or None for the case as a whole, and why
 Reason = tuple[str | None, str]
 MAX_ERRORS = 1000  # bad cases of a batch that are listed

@@ -9,11 +9,12 @@ from functools import reduce
 
 import numpy as np
 
+from mumacro.arrays import Array
 from mumacro.charts import ROUNDING
 from mumacro.inputs import FIELDS, PER_UNIT
 from mumacro.settling import settling as decay
 
-from .answers import QUANTITIES, Array, Cases, Part, register, where
+from .answers import QUANTITIES, Cases, Part, register, where
 
 
 @register(

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mumacro.arrays import Codes
 from mumacro.contact import Kind as ContactKind
 
-from ..answers import Codes, Wanted, answer_columns
+from ..answers import Wanted, answer_columns
 from ..case import MAX_ERRORS, Columns, columns_of
 from ..problems import FieldFault
 from ..tables import LoadedTable
