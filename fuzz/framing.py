@@ -21,8 +21,7 @@ from tests.serving import CASE, Server, chunk, connect, serving, to_end
 TABLE, TOTAL = ROOT / "tables" / "mumacro-1e-4.nc", 200_000
 BODY = json.dumps(CASE).encode()
 LENGTH, CHUNKED = b"Content-Length: %d\r\n" % len(BODY), b"Transfer-Encoding: chunked\r\n"
-POST = b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\n"
-SECOND = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
+POST, SECOND = b"POST /v1/mu-macro HTTP/1.1\r\nHost: x\r\n", b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
 TEXTS = [
     POST + LENGTH + b"\r\n" + BODY, POST + LENGTH + CHUNKED + b"\r\n" + chunk(BODY) + chunk(b""),
     POST + CHUNKED + b"\r\n" + chunk(BODY[:20]) + chunk(BODY[20:]) + chunk(b""),

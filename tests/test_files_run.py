@@ -251,6 +251,7 @@ def test_other_files_are_kept_and_a_second_run_is_refused(tmp_path: Path, cases:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no limit of file sizes")
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 def test_a_full_disk_is_told_and_the_run_goes_on_later(tmp_path: Path, cases: Any, repository: Path, kind: Any) -> None:
     source, out = copied(cases, kind, tmp_path), tmp_path / f"out.{kind}"

@@ -42,7 +42,8 @@ def accesses(lines: Any) -> Any:
     return [line for line in fields_of(lines) if line["logger"] == "mumacro.access"]
 
 
-@pytest.mark.parametrize("number", [pytest.param(signal.SIGTERM), pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case: Case, number: Any) -> None:
     with serving(surrogate.path, MUMACRO_ROOT_PATH="/friction") as server:
         status, headers, _ = server.ask("POST", SINGLE, json.dumps(case), {"X-Request-ID": "the-last"})
@@ -80,6 +81,7 @@ def command(repository: Path, *arguments: Any) -> Any:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_health_check_and_a_port_that_is_taken(live_server: Any, repository: Path, surrogate: Surrogate) -> None:
     found = command(repository, "healthcheck", "--port", str(live_server.port))
     assert found.returncode == 0, found.stderr
