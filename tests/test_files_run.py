@@ -216,8 +216,12 @@ def test_a_fault_that_a_change_brings_in_is_told_as_a_change(tmp_path: Path, cas
         "parquet": (cases / "cases.parquet").read_bytes()[:5000],
     }[kind]
     copied(cases, kind, tmp_path)
-    with pytest.raises(FilesError, match=r"changed while it was read") as told:  # the first call comes before the file
-        evaluate_files([source], out, TABLE, progress=lambda *_: source.write_bytes(half))
+
+    def change(*_: Any) -> None:  # its first call comes before the file is opened
+        source.write_bytes(half)
+
+    with pytest.raises(FilesError, match="changed while it was read") as told:
+        evaluate_files([source], out, TABLE, progress=change)
     assert "quote" not in str(told.value)
     assert left(tmp_path) == [source.name]
     if kind.startswith("csv"):  # the fault alone is told as what it is
