@@ -12,7 +12,7 @@ from mumacro.charts import BORDER_PIECES, CONTINUOUS, QUANTITIES, Axis, Chart
 from mumacro.library import kernels
 from mumacro.table import Block, BorderPiece
 
-from .quantities import SOLVED
+from .quantities import SOLVED, solver_noise
 from .sweep import Sweep
 
 MAX_NODES = 96
@@ -24,9 +24,13 @@ NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more
 
 def solve_nodes(
     index: int, shape: tuple[int, int], border: Border, sweep: Sweep
-) -> tuple[Array, Array, dict[str, Array]]:
-    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves."""
-    chart, found = charts.CHARTS[index], {}
+) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
+    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from fresh solves.
+
+    The last is the solver's rounding in it where a base is subtracted: 1 - mu~ and q without a base keep their digits,
+    but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to 0.
+    """
+    chart, found, cancelled = charts.CHARTS[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
     v, y, eta = chart.point(a[:, None], b[None, :], border)
     solved = sweep.solve("continuous" if chart.regime == CONTINUOUS else "full", v, y, eta)
@@ -37,7 +41,9 @@ def solve_nodes(
             if complement:  # next to 1 it has the digits
                 rest = np.where(base == 1.0, -solved[complement], rest)
             found[quantity.name] = rest / factor
-    return a, b, found
+            noise = solver_noise(quantity.name, v, y, solved, chart.regime == CONTINUOUS)
+            cancelled[quantity.name] = np.where((base == 0.0) | (base == 1.0), 0.0, noise / np.abs(factor))
+    return a, b, found, cancelled
 
 
 def _next(n: int) -> int:
@@ -133,7 +139,7 @@ def build_block(
     best, stuck = [math.inf, math.inf], [0, 0]
     while True:
         progress(f"{chart.name} {na} x {nb}")
-        a, b, found = solve_nodes(index, (na, nb), border, sweep)
+        a, b, found, _ = solve_nodes(index, (na, nb), border, sweep)
         values = found["mu_ratio"]
         left = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):

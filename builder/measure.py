@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 
 from mumacro import Surrogate, charts
 from mumacro.arrays import Array
-from mumacro.cells import WIDTH, cells_2d, chebyshev_coefficients, interpolation_matrix
+from mumacro.cells import WIDTH, cells_2d, chebyshev_coefficients, coefficient_matrix, interpolation_matrix
 from mumacro.charts import CHARTS, CONTINUOUS, QUANTITIES, SQRT2, Axis, Chart
 from mumacro.library import kernels
 from mumacro.table import Block
@@ -85,8 +85,8 @@ def block_errors(surrogate: Surrogate, sweep: Sweep, n: int, seed: int) -> list[
     found = []
     for index, block in enumerate(surrogate.table.blocks):
         errors = _value_errors(surrogate, stating, sweep, index, np.random.default_rng([seed, index]), n)
-        _, _, exact = solve_nodes(index, finer((block.a.size, block.b.size)), surrogate.border, sweep)
-        found.append(BlockErrors(*errors, cell_errors(index, block, exact)))
+        _, _, *exact = solve_nodes(index, finer((block.a.size, block.b.size)), surrogate.border, sweep)
+        found.append(BlockErrors(*errors, cell_errors(index, block, *exact)))
     return found
 
 
@@ -160,22 +160,31 @@ class _Along:
         self.to_derivative = scale[:, None, None] * _TO_DERIVATIVE
 
 
-def _difference(chart: Chart, block: Block, values: Array, exact: Array) -> tuple[Array, _Along, _Along]:
+def _difference(chart: Chart, block: Block, values: Array, exact: Array, noise: Array) -> tuple[Array, _Along, _Along]:
     """Cells through node ``values`` minus the interpolant through ``exact``, (cells a, POINTS, cells b, POINTS)."""
     a, b = (_Along(axis, n, m) for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True))
     own = cells_2d(chart.a, chart.b, values, block.cells).reshape(*block.cells, WIDTH, WIDTH)
     found = np.einsum("ipx,ijzx,jqz->ipjq", a.powers, own, b.powers, optimize=True)
-    return found - (a.follow @ _without_noise(exact) @ b.follow.T).reshape(found.shape), a, b
+    return found - (a.follow @ _without_noise(exact, noise) @ b.follow.T).reshape(found.shape), a, b
 
 
-def _without_noise(exact: Array) -> Array:
-    """Chebyshev coefficients of the interpolant through ``exact``, those at the level of the last ones left out.
+#: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to reach 2.6 of them
+DEVIATIONS = 4.0
 
-    These are the solver's rounding.  At an edge a second derivative multiplies them by the fourth power of their
-    number, which would hide what the table errs by.
+
+def _without_noise(exact: Array, noise: Array) -> Array:
+    """Chebyshev coefficients of the interpolant through ``exact``, without those that are the solver's rounding.
+
+    At an edge a second derivative multiplies them by the fourth power of their number, which would hide what the table
+    errs by.  They are those at the level of the last ones, and those that the ``noise`` of the nodes explains.
+
+    The last ones do not tell the second: a node next to an edge has hardly a share in them.
     """
     c = chebyshev_coefficients(exact)
-    c[np.abs(c) <= max(np.abs(c[-2:]).max(), np.abs(c[:, -2:]).max())] = 0.0
+    last = max(np.abs(c[-2:]).max(), np.abs(c[:, -2:]).max())
+    along_a, along_b = (coefficient_matrix(n) ** 2 for n in noise.shape)
+    deviation = np.sqrt(along_a @ noise**2 @ along_b.T)
+    c[np.abs(c) <= np.maximum(last, DEVIATIONS * deviation)] = 0.0
     return c
 
 
@@ -192,15 +201,16 @@ def _without_edge(off: Array, b: _Along, cells: int) -> None:
     off[:, :, -1, -1] = off[:, :, -1, -2]
 
 
-def cell_errors(index: int, block: Block, exact: dict[str, Array]) -> dict[str, Array]:
+def cell_errors(index: int, block: Block, exact: dict[str, Array], noise: dict[str, Array]) -> dict[str, Array]:
     """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and along b.
 
-    ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`.
+    ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`; ``noise`` their rounding.
     """
     chart, found = CHARTS[index], {}
     for quantity in QUANTITIES:
         if quantity.name in block.nodes:
-            off, a, b = _difference(chart, block, block.nodes[quantity.name], exact[quantity.name])
+            name = quantity.name
+            off, a, b = _difference(chart, block, block.nodes[name], exact[name], noise[name])
             along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)
             along_b = np.einsum("jrq,ipjq->ipjr", b.to_derivative, off)
             if quantity.smooth_at_border and chart.regime != CONTINUOUS and chart.b.name == "s":

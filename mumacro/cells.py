@@ -35,15 +35,20 @@ def nodes(n: int, low: float, high: float) -> Array:
     return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * x, dtype=np.float64)
 
 
+def coefficient_matrix(n: int) -> Array:
+    """Matrix (n, n) from values at ``n`` :func:`nodes` to the Chebyshev coefficients of the interpolant."""
+    # the angle in whole parts of a turn: rounding it is seen in second derivatives at the edges
+    parts = np.outer(np.arange(n), 2 * np.arange(n, 0, -1) - 1) % (4 * n)
+    matrix = 2.0 / n * np.cos(np.pi * parts / (2 * n))
+    matrix[0] *= 0.5
+    return np.asarray(matrix, dtype=np.float64)
+
+
 def chebyshev_coefficients(values: Array) -> Array:
     """Chebyshev coefficients of the interpolant through ``values`` at :func:`nodes`, along every axis."""
     out = np.asarray(values, dtype=np.float64)
     for axis in range(out.ndim):
-        n = out.shape[axis]
-        # the angle in whole parts of a turn: rounding it is seen in second derivatives at the edges
-        parts = np.outer(np.arange(n), 2 * np.arange(n, 0, -1) - 1) % (4 * n)
-        matrix = 2.0 / n * np.cos(np.pi * parts / (2 * n))
-        matrix[0] *= 0.5
+        matrix = coefficient_matrix(out.shape[axis])
         out = np.moveaxis(np.tensordot(matrix, out, axes=(1, axis)), 0, axis)
     return out
 

@@ -164,6 +164,7 @@ class _Run:
                             progress(share, done.rows, done.rejected)
                 except (FilesError, pa.ArrowException):  # an input must be changed before this run can end
                     self._clear()
+                    self._refuse_changed()  # first: what was half written looks like a damaged row
                     raise
                 self._finish(done)
             self._clear()
@@ -231,9 +232,12 @@ class _Run:
             for block in self.source.blocks(file, done.at, self.wanted):
                 done, text = self._piece(done, block)
                 yield done, text, (file + block.share) / len(self.files)
+        self._refuse_changed()
+
+    def _refuse_changed(self) -> None:
         for path, checksum in zip(self.files, self.checksums, strict=True):
             if _checksum(path) != checksum:
-                raise FilesError(f"{path}: changed while it was read; give the command again")
+                raise FilesError(f"{path}: changed while it was read; give the command again") from None
 
     def _piece(self, done: _Done, block: reading.Block) -> tuple[_Done, bytes]:
         """A block as it stands in the output, and what is done with it."""
