@@ -42,7 +42,7 @@ def fit(
     surrogate : Surrogate, optional
         The table; the tightest bundled one if left out.
     **fixed : float or array_like
-        Inputs that are not columns: ``Fz=10.0, y0=2e-6, f=20e3``, and k (None: rigid) or mu0 where it is known.
+        Inputs that are not columns: ``Fz=10.0, y0=2e-6, f=20e3``, and k or mu0 where it is known.
 
     Returns
     -------

@@ -2,9 +2,10 @@
 
 The library, the files, the command line, the service and the exports take their fields from here.  A frequency
 ``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one of them.  The stiffness ``k``
-is always said: a number, or rigid contact by infinity, by the word ``rigid``, or by None as a single value.
+is always said: a positive number, or rigid contact by the word ``rigid`` or by infinity.
 
-**A gap is never rigid**: an empty cell, null or NaN in a column ``k`` makes its case illegal, see :data:`GAP`.
+**A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column ``k`` makes its case
+illegal, see :data:`GAP`.
 """
 
 import difflib
@@ -40,6 +41,8 @@ BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for 
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
+#: what a stiffness must be, told by :class:`InputError`
+STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
 MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
 
 
@@ -211,7 +214,7 @@ def number_hint(name: str, value: object) -> str:
 'must be a number, not a text: leave out the quotes', 'must be a number')
     """
     if not isinstance(value, str):
-        return "must be a number"
+        return GAP if name == "k" and value is None else "must be a number"
     text = value.strip()[:80]
     if PLAIN.fullmatch(text):
         number = float(text)
@@ -301,7 +304,7 @@ def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
 def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
     """The six inputs as float64 arrays; InputError where one is missing, given twice, or no real number.
 
-    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, None or
+    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array or
     ``rigid``; an array may hold the word, too.
     """
     converted: dict[str, Array] = {}
@@ -314,22 +317,28 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
                 raise InputError("omega", given.get("omega"), f"given or f [Hz] in its place, {told}")
             source = "omega" if both else "f"
         if source not in given:
-            hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
+            hint = f": {STIFFNESS}" if name == "k" else f" [{UNITS[name]}]"
             raise InputError(name, None, f"given{hint}")
         value = given[source]
-        if name == "k" and value is None:
-            value = math.inf
         try:
             array = real(source, value)
         except InputError:
             if name != "k":
                 raise
-            array = real(source, _rigid_as_infinity(value))
+            array = _stiffness(value)
         if source == "f":
             with np.errstate(over="ignore"):  # infinite, which is refused as a value of f
                 array = array * RAD_PER_CYCLE
         converted[name] = array
     return converted
+
+
+def _stiffness(value: Any) -> Array:
+    """A stiffness, or an array of them, which may say ``rigid``; InputError with the remedy for a gap."""
+    try:
+        return real("k", _rigid_as_infinity(value))
+    except InputError as error:
+        raise InputError("k", value, STIFFNESS) from error
 
 
 def _rigid_as_infinity(value: Any) -> Any:
@@ -374,6 +383,7 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
             field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
             value = float(told.ravel()[i])
             bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
+            bound = STIFFNESS if field == "k" and math.isnan(value) else bound
             raise InputError(field, value, bound, i if values.ndim else None)
 
 

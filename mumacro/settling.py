@@ -45,7 +45,7 @@ class Settling:
 
 
 def settling(
-    surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike | None, y0: ArrayLike, omega: ArrayLike,
+    surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike, y0: ArrayLike, omega: ArrayLike,
     v0: ArrayLike, remaining: float = 0.01, contact: str = "spring", direction: str = "across",
 ) -> Settling:  # fmt: skip
     """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.

@@ -176,7 +176,7 @@ def test_a_range_of_k_is_told_with_that_of_mu_macro_and_checked(capsys: Capture)
 
 NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
 KINDS: dict[str, tuple[str, Case, Case]] = {
-    "spring": (CASE, {}, {}), "rigid": (CASE.replace("1e6", "rigid"), {}, {"k": None}),
+    "spring": (CASE, {}, {}), "rigid": (CASE.replace("1e6", "rigid"), {}, {"k": "rigid"}),
     "ball": (CASE, {"contact": "ball"}, {}), "along": (CASE, {"direction": "along"}, {}),
     "ball along": (CASE, {"contact": "ball", "direction": "along"}, {}),
     "normal": (NORMAL, {"direction": "normal"}, {"Fz_amplitude": 1.0}),

@@ -126,7 +126,7 @@ def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate
     low, high = stiff.interval["k"]
     assert 1e7 < low < 1e9 < high == math.inf
     assert stiff.interval["mu0"][0] < 0.3 < stiff.interval["mu0"][1]
-    rigid = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0, k=None)}, **RIG)
+    rigid = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0, k=math.inf)}, **RIG)
     assert rigid.values == {"k": math.inf, "mu0": close(0.3, rel=1e-9)}
     assert rigid.std["k"] == rigid.interval["k"][1] == math.inf
     soft, large = measured(1e3), measured(5e7, 1e-4)

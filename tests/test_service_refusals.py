@@ -27,6 +27,9 @@ REFUSED = [
     # names
     ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
     ("GET mu-macro", {"k": ...}, "?k", "rigid"),
+    *((f"POST {path}", {"k": None}, "#/k", "is missing; write rigid or a number") for path in ("mu-macro", "law")),
+    ("POST solve-for", {"k": None}, "#/k", "is missing; write rigid or a number"),
+    ("POST fit", {"k": None, "unknowns": ["mu0"]}, "#/k", "is missing; write rigid or a number"),
     ("POST mu-macro", {"v0": ...}, "#/v0", "is required"),
     ("POST mu-macro", {"omega": ...}, "#/omega", "is required: omega [rad/s], or f [Hz]"),
     ("POST mu-macro", {"f": 1.0}, "#/f", "exactly one of omega"),

@@ -80,7 +80,7 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
     ("changed", "periods"),
     [
         ({"v0": 0.0}, math.inf), ({"v0": 0.0, "y0": 0.0}, math.inf), ({"v0": 0.0, "omega": 0.0}, math.inf),
-        ({"k": None, "v0": 0.0, "y0": 0.0}, math.inf), ({"k": None}, 0.0), ({"k": math.inf}, 0.0),
+        ({"k": "rigid", "v0": 0.0, "y0": 0.0}, math.inf), ({"k": "rigid"}, 0.0), ({"k": math.inf}, 0.0),
     ],
 )  # fmt: skip
 def test_without_slip_nothing_settles_and_rigid_at_once(surrogate: Surrogate, changed: Any, periods: Any) -> None:

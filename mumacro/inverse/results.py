@@ -62,7 +62,7 @@ class Crossing:
 def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
     """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an infinite ``k`` is rigid.
 
-    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.
+    ``f`` [Hz] may stand for ``omega`` [rad/s], the word ``rigid`` for an infinite ``k``.
     """
     if without not in kind.fields:
         raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")

@@ -70,7 +70,7 @@ def solve_for(
     targets : array_like
         Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
     case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
+        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand for ``omega``.
     within : (float, float), optional
         Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for k, Fz and mu0 from
         where the contact is so soft that it does not matter to where it is as good as rigid.
