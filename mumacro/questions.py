@@ -172,4 +172,4 @@ def stiffness_of(words: Sequence[str]) -> str:
     rows = [(name, f"{found[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
-    return in_columns(rows)
+    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in contact.warnings)])

@@ -411,12 +411,19 @@ def test_what_stiffness_prints_goes_into_a_command(capsys: Capture, words: Any, 
     found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
     expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
     assert (found["k"], found["contact"]) == (expected.k, expected.contact)
-    lines = said(capsys, 0, "stiffness", *words).splitlines()
+    lines = said(capsys, 0, "stiffness", *words).partition("\nwarning")[0].splitlines()
     assert lines[-2].split() == ["contact", expected.contact]
     pasted = lines[-1].split()[1:]
     answer = json.loads(said(capsys, 0, CASE.replace("k=1e6", ""), *pasted, "--json"))
     assert answer.get("contact", "spring") == expected.contact
     assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
+
+
+def test_a_wide_contact_is_told_below_its_stiffness(capsys: Capture) -> None:
+    words = "stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--nu", "0.3", "--E"
+    assert said(capsys, 0, *words, "1MPa").splitlines()[-1].startswith("warning: the contact's half width 0.00409 m")
+    assert "did you mean 210 GPa?" in said(capsys, 2, *words, "210")
+    assert "warning" not in said(capsys, 0, *words, "210GPa")
 
 
 def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture) -> None:

@@ -136,11 +136,20 @@ BODIES = [
 ]  # fmt: skip
 
 
+def test_a_wide_contact_is_told_with_its_stiffness(client: Any) -> None:
+    soft = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "nu": 0.3}
+    (told,) = answered(client, "stiffness", {**soft, "E": 1e6})["warnings"]
+    assert "0.82 of the radius" in told
+    refused = client.post("/v1/stiffness", json={**soft, "E": 210})
+    assert refused.status_code == 422
+    assert "did you mean 210 GPa?" in refused.text
+
+
 @pytest.mark.parametrize(("geometry", "given"), BODIES)
 def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> None:
     found = contact_of(geometry, **STEEL, **{name: np.inf if x == "rigid" else x for name, x in given.items()})
     answer = answered(client, "stiffness", {"geometry": geometry, **STEEL, **given})
-    assert answer == {"geometry": geometry, **vars(found), "api_version": "1"}
+    assert answer == {"geometry": geometry, **vars(found), "warnings": [], "api_version": "1"}
 
 
 def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:

@@ -66,7 +66,7 @@ StiffnessAnswer = model(
     k_normal=told(float, "Normal stiffness [N/m]"),
     half_width=told(float, "Radius of a circular contact, half width of a line contact [m]"),
     pressure=told(float, "Largest pressure [Pa]: Hertz's, or the mean one under a flat punch"),
-    contact=ContactName, api_version=str,
+    contact=ContactName, warnings=told(many(str), "Where the theory behind k is off"), api_version=str,
 )  # fmt: skip
 
 
