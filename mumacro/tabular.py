@@ -24,9 +24,9 @@ TOO_LARGE = "is beyond double range"
 _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
-def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | None:
+def _advice(header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]) -> str | None:
     """The options to give, where a file is not as they say; None where it is."""
-    found, sign = _recognised(header, rows, sep, decimal)
+    found, sign = _recognised(header, rows, sep, decimal, more)
     if (found, sign) == (sep, decimal):
         return None
     word = next(word for word, known in SEPARATORS.items() if known == found)
@@ -34,12 +34,12 @@ def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | N
     return f"{told}: give --sep '{word}' --decimal '{sign}'"
 
 
-def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tuple[str, str]:
-    """The separator that gives the most names of inputs, and the decimal sign of most numbers; if unsure, as given."""
+def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]) -> tuple[str, str]:
+    """The separator that gives the most names of inputs or of ``more``, and the decimal sign of most numbers; if unsure, as given."""
 
     def inputs(given: str) -> list[int]:
-        names = header.replace('"', "").split(given)
-        return [i for i, name in enumerate(names) if suggestion(split_unit(name)[0], loosely=False)]
+        names = [split_unit(name)[0] for name in header.replace('"', "").split(given)]
+        return [i for i, name in enumerate(names) if name in more or suggestion(name, loosely=False)]
 
     best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
     places = inputs(best)
@@ -51,8 +51,10 @@ def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tup
     return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
 
 
-def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[str]:
+def read_head(line: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str] = ()) -> list[str]:
     """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it ask for other options.
+
+    ``more`` are names of columns that are no inputs.
 
     >>> read_head("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
     Traceback (most recent call last):
@@ -64,7 +66,7 @@ def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[st
         raise ValueError(f"is no header of CSV ({error})") from None
     if not any(map(str.strip, cells)):
         raise ValueError("must name the columns, and is empty")
-    if remedy := _advice(line, rows, sep, decimal):
+    if remedy := _advice(line, rows, sep, decimal, more):
         raise ValueError(remedy)
     return cells
 

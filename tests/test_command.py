@@ -336,6 +336,23 @@ def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measu
     assert german["values"] == json.loads(said(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
 
 
+def test_a_german_file_of_two_columns_gets_advice_that_works(capsys: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    path = tmp_path / "german.csv"
+    path.write_text("v0 [mm/s];mu_macro\n1;0,069\n5;0,174\n20;0,247\n100;0,289\n")
+    words = ("fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz")
+    assert "give --sep ';' --decimal ','" in said(capsys, 1, *words)
+    assert said(capsys, 0, *words, "--sep", ";", "--decimal", ",").startswith("k ")
+
+
+def test_a_fit_takes_mu0_of_each_point(capsys: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    path = tmp_path / "points.csv"
+    path.write_text("v0 [mm/s],mu_macro,mu0\n1,0.069,0.31\n5,0.174,0.305\n20,0.247,0.3\n100,0.289,0.295\n")
+    found = json.loads(said(capsys, 0, "fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz", "--json"))
+    assert [*found["values"]] == ["k"]
+
+
 PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s", "1m/s"),
             "solve-for": ("solve-for", "y0", CASE.replace("y0=2e-6", ""), "--target", "0.15"),
             "rest": ("solve-for", "v0", CASE.replace("v0=0.01", ""), "--target", "0.25", "--between", "0", "1"),
