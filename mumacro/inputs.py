@@ -107,6 +107,7 @@ _OTHER_NAMES |= {name.lower(): name for name in NAMES}
 _IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
+_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})\s*(\D.*)?")  # an interval, as people write it
 PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 
 
@@ -223,6 +224,8 @@ def number_hint(name: str, value: object) -> str:
         return "must be a number, or rigid" if name == "k" else "must be finite"
     if re.fullmatch(r"[+-]?\d+,\d+", text):
         return f"must be a number with a decimal point: {text.replace(',', '.')}"
+    if name == "k" and ".." in text:
+        return "must be a number, or rigid; an interval is k_range in JSON, columns k_low and k_high in a file"
     found = _WITH_UNIT.fullmatch(text)
     if found is None:
         return "must be a number, or rigid" if name == "k" else "must be a number"
@@ -260,9 +263,31 @@ def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], 
         return scale.si(float(with_unit[1]))
     if PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
+    if meant := _meant(name, text, units):
+        raise ValueError(f"{name}={text}: {meant}")
     known = ", ".join([unit for unit in units if unit][:4])
     hint = ", or rigid" if rigid else ""
     raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, ...{hint}")
+
+
+def _meant(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
+    """What was probably meant by a text that is no quantity: an interval, a unit in other case, f for omega.
+
+    >>> _meant("k", "0.8-1.2N/um", UNITS_OF["k"]), _meant("omega", "20kHz", UNITS_OF["omega"])
+    ('write an interval as k=0.8..1.2N/um', 'did you mean f=20kHz? omega is in rad/s')
+    """
+    if name == "k" and (ends := _DASHED.fullmatch(text)):
+        return f"write an interval as k={ends[1]}..{ends[2]}{ends[3] or ''}"
+    if not (found := _WITH_UNIT.fullmatch(text)):
+        return None
+    number, unit = found[1], found[2].replace(" ", "")
+    near = [known for known in units if known.lower() == unit.lower()]
+    other = {"omega": "f", "f": "omega"}.get(name)
+    if near:
+        return f"did you mean {' or '.join(f'{number}{known}' for known in near)}?"
+    if other and (there := next((known for known in UNITS_OF[other] if known.lower() == unit.lower()), None)):
+        return f"did you mean {other}={number}{there}? {name} is in {SI[name][0]}"
+    return None
 
 
 def read_range(name: str, text: str) -> tuple[float, float]:
@@ -272,7 +297,8 @@ def read_range(name: str, text: str) -> tuple[float, float]:
     (800000.0, 1200000.0)
     """
     low, _, high = text.partition("..")
-    if PLAIN.fullmatch(low.strip()) and (found := _WITH_UNIT.fullmatch(high.strip())):
+    plain = [PLAIN.fullmatch(end.strip()) for end in (low, high)]  # 1.2e6 is not 1.2 of a unit e6
+    if plain[0] and not plain[1] and (found := _WITH_UNIT.fullmatch(high.strip())):
         low = f"{low} {found[2]}"
     ends = read_number(name, low), read_number(name, high)
     if not 0.0 < ends[0] < ends[1] < math.inf:

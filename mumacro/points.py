@@ -19,7 +19,7 @@ from mumacro.fitted import Fit
 from mumacro.fitting import fit
 from mumacro.inputs import LIKE, SI, unit_of
 from mumacro.measured import STD, UNKNOWNS, unknowns_beside
-from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head
+from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head, read_text
 from mumacro.validity import digits
 
 FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
@@ -49,7 +49,10 @@ def fit_points(words: Sequence[str]) -> str:
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
     kind = command.kind_in(chosen)
-    text = sys.stdin.read() if chosen.points == "-" else Path(chosen.points).read_text("utf-8-sig", "replace")
+    try:
+        text = sys.stdin.read() if chosen.points == "-" else read_text(Path(chosen.points).read_bytes(), chosen.points)
+    except ValueError as error:
+        raise ImpossibleError(str(error)) from None
     points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
     unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]

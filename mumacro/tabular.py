@@ -21,6 +21,7 @@ from mumacro.inputs import (
 #: what may stand between the cells of CSV, by the word for it
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
+NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
 _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
@@ -49,6 +50,20 @@ def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str, more: 
         return sum(re.fullmatch(_SIGNED.format(sign), cell) is not None for cell in cells)
 
     return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
+
+
+def read_text(data: bytes, where: str) -> str:
+    """A file of CSV as text, without the mark of byte order; ValueError with the remedy where it is no UTF-8.
+
+    >>> read_text(b"v0 [mm/s];\\xb5", "points.csv")
+    Traceback (most recent call last):
+    ValueError: points.csv: line 1 is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"{where}: line {line} {NO_UTF8}") from None
 
 
 def read_head(line: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str] = ()) -> list[str]:
@@ -136,7 +151,8 @@ def read_cell(name: str, cell: str, decimal: str = ".") -> float:
         return math.inf
     plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
     if not PLAIN.fullmatch(plain):
-        raise ValueError(number_hint(name, text) if decimal == "." else f"must be a number such as 0{decimal}5")
+        told = decimal == "." or (name == "k" and ".." in text)
+        raise ValueError(number_hint(name, text) if told else f"must be a number such as 0{decimal}5")
     value = float(plain)
     if math.isinf(value) and any(map(str.isdigit, plain)):  # too many digits must not pass for an infinite stiffness
         raise ValueError(TOO_LARGE)

@@ -63,6 +63,17 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
     assert "no influence" in result["reason"]
 
 
+def test_both_ends_of_an_interval_of_k_are_solved_for(client: Any) -> None:
+    rest = {name: value for name, value in SOLVE.items() if name != "k"}
+    whole = answered(client, "solve-for", {**rest, "k_range": [8e5, 1.25e6]})
+    for k, one in zip((8e5, 1.25e6), whole.pop("ends"), strict=True):
+        alone = answered(client, "solve-for", {**rest, "k": k})
+        assert one == {"k": k, **{name: alone[name] for name in ("results", "range", "reachable")}}
+    assert whole["results"][0]["roots"][0]["value"] == close(
+        answered(client, "solve-for", {**rest, "k": 1e6})["results"][0]["roots"][0]["value"], rel=1e-9
+    )
+
+
 def test_folded_roots_are_all_returned_within_the_range(client: Any) -> None:
     request = {**SOLVE, "unknown": "k", "target": 0.3 * 0.0023, "v0": 1e-4, "y0": CASE["y0"], "k": None}
     values = [root["value"] for root in answered(client, "solve-for", request)["results"][0]["roots"]]

@@ -118,7 +118,6 @@ REFUSED = [
         ("mu0", ..., "is required"), ("target", [], "a list of 1 to 10000"), ("target", [0.1] * 10_001, "10000"),
         ("Fz", 0, "finite and > 0"), ("Fz", "10", "must be a number"), ("range", [1], "two numbers"),
         ("range", [2, 1], "ascending"), ("extra", 1, "unknown"), ("omega", -1, "finite and >= 0"))),
-    ("POST solve-for", RANGE, "#/k_range", "solve for both ends"),
     ("POST solve-for", {"target": -0.1}, "#/target/0", "finite and >= 0"),
     *(("POST solve-for", {"target": [0.1, value]}, "#/target/1", "must be a number") for value in ("0.1", True)),
     ("POST solve-for", {"range": [0, -1]}, "#/range/1", "finite and >= 0"),

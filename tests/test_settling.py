@@ -88,6 +88,15 @@ def test_without_slip_nothing_settles_and_rigid_at_once(surrogate: Surrogate, ch
     assert (found.periods, found.time, found.slip_path) == (periods, periods, 0.0 if periods else math.inf)
 
 
+def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
+    rest = {name: value for name, value in CASE.items() if name != "omega"}
+    expected = settling(surrogate, **rest, omega=2.0 * math.pi * 2e4)
+    assert settling(surrogate, **rest, f=2e4) == expected
+    for told in ({}, {"f": 2e4, "omega": 1e5}):
+        with pytest.raises(InputError, match="omega must be given or f"):
+            settling(surrogate, **rest, **told)
+
+
 def test_without_oscillation_the_drag_decides(surrogate: Surrogate) -> None:
     l0 = 3e-6
     for changed in ({"y0": 0.0}, {"omega": 0.0}):

@@ -48,6 +48,8 @@ class Solution:
     roots: tuple[tuple[Root, ...], ...]  #: of each target, ascending; empty where it is not reachable
     reach: Reach  #: what is reachable in the range that was searched
     constant: bool  #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
+    #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and its highest value
+    ends: tuple["Solution", "Solution"] | None = None
 
 
 @dataclass(frozen=True)

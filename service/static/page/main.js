@@ -97,7 +97,7 @@ function showAnswer({ asked, ...found }) {
     "ṽ = v₀/(l₀ω)": group(groups.v_tilde), [normal ? "ỹ = ΔFz/Fz" : "ỹ = y₀/l₀"]: group(groups.y_tilde),
   });
   list("origin", {
-    "error bound of µ": bound === null ? "not known" : `± ${show(bound, 2)}`, "answered by block": found.source,
+    "numerical error of µ": bound === null ? "not known" : `≤ ${show(bound, 2)}`, "answered by block": found.source,
     "of table": `${found.table.id}, tolerance ${show(found.table.tolerance)}`,
   });
   showBars(found, asked);
