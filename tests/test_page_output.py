@@ -53,6 +53,15 @@ def test_it_loads_and_shows_the_known_value(open_page: Any, surrogate: Surrogate
     assert {urlsplit(address).netloc for address in loaded} == {urlsplit(live_server.url).netloc}
 
 
+def test_units_that_no_contact_has_are_told_beside_the_number(open_page: Any) -> None:
+    page = open_page("#y0=2")
+    assert re.fullmatch(r"Check the units: y~ = .*: is y0 = 2 in metres\?", page.text("#units"))
+    assert page.find("#units").is_displayed()
+    assert page.text("#rows") == ""  # nothing of the closed line is needed
+    page.type("#field-y0", "2 um")
+    assert page.text("#units") == ""
+
+
 def test_solving_for_an_input(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
     page.click("#solve-form button")  # which amplitude halves the friction?

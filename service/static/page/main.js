@@ -85,7 +85,10 @@ function showAnswer({ asked, ...found }) {
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
   $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; not compared with measured points.`;
-  $("rows").replaceChildren(...(found.model ?? []).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
+  const rows = found.model ?? [];
+  const units = rows.find(({ row }) => row === "units"); // beside the number: it is probably wrong
+  $("units").textContent = units ? `Check the units: ${units.text}` : "";
+  $("rows").replaceChildren(...rows.filter((one) => one !== units).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
   list("values", {
     "µ/µ₀": all ? friction(found.mu_ratio, bound / valueOf(asked, "mu0"), 15) : show(found.mu_ratio, 4),
     "static µ (v₀ → 0)": show(limits.mu_static, 4),
