@@ -42,7 +42,9 @@ def fit_points(words: Sequence[str]) -> str:
     first = "points", {"help": "a file of CSV; - is standard input"}
     told = "k and mu0 of a contact from measured friction."
     parser = command.question("fit", told, _COLUMNS, "the other inputs", "*", first)
-    parser.add_argument("--unknown", nargs="+", metavar="NAME", help="k, mu0; default: both, k alone beside a column mu0")
+    parser.add_argument(
+        "--unknown", nargs="+", metavar="NAME", help="k, mu0; default: both, k alone beside a column mu0"
+    )
     command.add_format(parser)
     chosen = parser.parse_intermixed_args(words)
     unknown, more = ([x for x in chosen.unknown or () if ("=" in x) == given] for given in (False, True))

@@ -88,8 +88,8 @@ def solve(words: Sequence[str]) -> str:
     ends = [scale * end for end in command.read_values((unknown, text) for text in chosen.between or ())]
     surrogate = open_table(chosen.table)
     found = solve_for(surrogate, inner, target, case, (ends[0], ends[1]) if ends else None, **kind.names)
-    reach, ends = found.reach, found.ends
-    if not found.roots[0] and not (ends and any(end.roots[0] for end in ends)):
+    reach, two = found.reach, found.ends
+    if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
         if found.constant:
             raise ImpossibleError(f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}")
@@ -97,19 +97,19 @@ def solve(words: Sequence[str]) -> str:
             f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to {reach.mu_max:.12g}"
         )
     places = {command.middle_of(case).get("k"): found}
-    if ends:
-        places = dict(sorted({**places, **dict(zip(case["k_range"], ends, strict=True))}.items()))
+    if two:
+        places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
     roots = [
-        (*((k,) if ends else ()), r.value / scale, r.low / scale, r.high / scale, r.mu_macro, r.regime)
+        (*((k,) if two else ()), r.value / scale, r.low / scale, r.high / scale, r.mu_macro, r.regime)
         for k, one in places.items() for r in one.roots[0]
     ]  # fmt: skip
-    names = (*(("k",) if ends else ()), unknown, "low", "high", "mu_macro", "regime")
+    names = (*(("k",) if two else ()), unknown, "low", "high", "mu_macro", "regime")
     if chosen.json:
         listed = [dict(zip(names, root, strict=True)) for root in roots]
         return as_json(
             {"unknown": unknown, "unit": unit, "target": target, "roots": listed, "table": command.about(surrogate)}
         )
-    heads = [*(["k [N/m]"] if ends else []), f"{unknown} [{unit}]", "between", "and", "mu_macro [-]", "regime"]
+    heads = [*(["k [N/m]"] if two else []), f"{unknown} [{unit}]", "between", "and", "mu_macro [-]", "regime"]
     if chosen.out is not None:
         at = [root.value for one in places.values() for root in one.roots[0]]
         # a decade around the roots; what is at 0 is shown up to 1

@@ -47,7 +47,8 @@ class Settling:
 
 def settling(
     surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike, y0: ArrayLike, v0: ArrayLike,
-    omega: ArrayLike | None = None, f: ArrayLike | None = None, remaining: float = 0.01, contact: str = "spring", direction: str = "across",
+    omega: ArrayLike | None = None, f: ArrayLike | None = None, remaining: float = 0.01, contact: str = "spring",
+    direction: str = "across",
 ) -> Settling:  # fmt: skip
     """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.
 

@@ -335,15 +335,15 @@ class Surrogate:
 
     @overload
     def evaluate(
-        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ..., f: float = ...,
-        gradient: Literal[True], groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
+        f: float = ..., gradient: Literal[True], groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
         direction: DirectionName = ...,
     ) -> AnswerWithGradient[float]: ...  # fmt: skip
 
     @overload
     def evaluate(
-        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ..., f: float = ...,
-        gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
+        f: float = ..., gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
         direction: DirectionName = ...,
     ) -> Answer[float]: ...  # fmt: skip
 

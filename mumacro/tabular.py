@@ -36,7 +36,7 @@ def _advice(header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequ
 
 
 def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]) -> tuple[str, str]:
-    """The separator that gives the most names of inputs or of ``more``, and the decimal sign of most numbers; if unsure, as given."""
+    """The separator that gives most names of inputs or ``more``, and the decimal sign of most numbers; or as given."""
 
     def inputs(given: str) -> list[int]:
         names = [split_unit(name)[0] for name in header.replace('"', "").split(given)]

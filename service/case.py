@@ -121,7 +121,8 @@ def checked(
 ) -> tuple[dict[str, Any], list[FieldFault]]:  # fmt: skip
     """The inputs of one case by field, with ``omega`` for ``f``, and all of its faults.
 
-    ``left_out`` are the inputs that the request asks for, which must not be given.  ``known`` are all names that the request may have, for the advice on others.
+    ``left_out`` are the inputs that the request asks for, which must not be given.  ``known`` are all names that the
+    request may have, for the advice on others.
     """
     values: dict[str, float] = {}
     faults: list[FieldFault] = []

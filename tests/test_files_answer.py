@@ -59,7 +59,8 @@ def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any)
         pa.array([1_000_000], pa.int64()), pa.array([1e6], pa.float32()), pa.array(["1e6"]), pa.array([" +1e6 "]),
         pa.array([decimal.Decimal("1000000.0")]), pa.array(["1e6"]).dictionary_encode(),
         pa.array(["1e6"], pa.large_string()))),
-     *((cell, "rigid") for cell in (pa.array(["rigid"]), pa.array([" Rigid"]), pa.array([math.inf]), pa.array(["inf"]))),
+     *((cell, "rigid") for cell in (
+         pa.array(["rigid"]), pa.array([" Rigid"]), pa.array([math.inf]), pa.array(["inf"]))),
      *((cell, GAP) for cell in (  # a gap is never rigid
          pa.array([""]), pa.array([" "]), pa.array(["NaN"]), pa.array([None], pa.float64()), pa.nulls(1),
          pa.array([None], pa.string()), pa.array([math.nan]), pa.array([math.nan], pa.float32())))],

@@ -395,6 +395,8 @@ def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> No
     for ends in ({"k_range": (8e5, 1.25e6)}, {"k_low": 8e5, "k_high": 1.25e6}):
         found = solve_for(surrogate, "y0", [0.15, 0.4], {**rest, **ends})
         assert found.ends == tuple(solve_for(surrogate, "y0", [0.15, 0.4], {**rest, "k": k}) for k in (8e5, 1.25e6))
-        assert found.roots[0][0].value == close(solve_for(surrogate, "y0", 0.15, {**rest, "k": 1e6}).roots[0][0].value, rel=1e-9)
+        assert found.roots[0][0].value == close(
+            solve_for(surrogate, "y0", 0.15, {**rest, "k": 1e6}).roots[0][0].value, rel=1e-9
+        )
     with pytest.raises(InputError, match="k_range must be left out where k is the swept input"):
         solve_for(surrogate, "k", 0.15, {**without(CASE, "k"), "k_range": (8e5, 1.25e6)})

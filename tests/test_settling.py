@@ -92,7 +92,8 @@ def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
     rest = {name: value for name, value in CASE.items() if name != "omega"}
     expected = settling(surrogate, **rest, omega=2.0 * math.pi * 2e4)
     assert settling(surrogate, **rest, f=2e4) == expected
-    for told in ({}, {"f": 2e4, "omega": 1e5}):
+    wrong: list[Any] = [{}, {"f": 2e4, "omega": 1e5}]
+    for told in wrong:
         with pytest.raises(InputError, match="omega must be given or f"):
             settling(surrogate, **rest, **told)
 

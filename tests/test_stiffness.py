@@ -119,7 +119,8 @@ def test_a_bad_value_is_named(field: str, function: Any, arguments: Any) -> None
 
 
 def test_hertz_wants_a_small_contact() -> None:
-    for function, more in ((ball_on_flat, ()), (cylinder_on_flat, ("across",))):
+    shapes: list[tuple[Any, Any]] = [(ball_on_flat, ()), (cylinder_on_flat, ("across",))]
+    for function, more in shapes:
         length = (1.0,) if more else ()
         for share in (0.099, 0.101, 0.99, 1.01):
             # of a half width that is proportional to a power of Fz
@@ -143,7 +144,7 @@ def test_forgotten_gigapascals_are_told(second: Any, shape: tuple[str, Any]) -> 
     with pytest.raises(InputError, match=r"^E must be in pascals: did you mean 210 GPa\?"):
         contact_of(shape[0], **given)
     assert contact_of(shape[0], **{**given, "E": 210e9}).warnings == ()
-    with pytest.raises(InputError, match="^radius must be"):  # GPa do not explain it
+    with pytest.raises(InputError, match=r"^radius must be"):  # GPa do not explain it
         contact_of(shape[0], **{**given, "E": 210, "Fz": 1e12})
 
 

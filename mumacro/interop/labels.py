@@ -4,7 +4,6 @@ The inputs of one call come from one of these libraries, with plain numbers and 
 """
 
 import importlib
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -93,13 +93,13 @@ def solve_for(
     [['2.8570e-06 m'], []]
     """
     kind = kind_of(contact, direction)
-    case, ends = without_interval(case, unknown)
-    if ends:
-        low, middle, high = (
+    case, interval = without_interval(case, unknown)
+    if interval:
+        softest, middle, stiffest = (
             solve_for(surrogate, unknown, targets, {**case, "k": k}, within, contact=contact, direction=direction)
-            for k in (ends["k_low"], case["k"], ends["k_high"])
+            for k in (interval["k_low"], case["k"], interval["k_high"])
         )
-        return replace(middle, ends=(low, high))
+        return replace(middle, ends=(softest, stiffest))
     sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind)
     wanted = np.asarray(targets, dtype=np.float64).ravel()
     bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
@@ -127,7 +127,7 @@ def solve_for(
 
 
 def border_crossings(
-    surrogate: Surrogate, along: str, case: Mapping[str, float | None], low: float, high: float, *,
+    surrogate: Surrogate, along: str, case: Mapping[str, Any], low: float, high: float, *,
     contact: str = "spring", direction: str = "across",
 ) -> tuple[Crossing, ...]:  # fmt: skip
     """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends, ascending.

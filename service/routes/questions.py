@@ -232,7 +232,7 @@ _solved: dict[str, Any] = {
 SolveForEnd = model("SolveForEnd", "The same for one end of an interval of k.", k=told(float, "[N/m]"), **_solved)
 SolveForAnswer = model(
     "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=Name, unit=str, quantity=_Quantity,
-    **_solved, ends=optional(many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for their middle"),
+    **_solved, ends=optional(many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for the middle"),
 )  # fmt: skip
 ENDPOINTS = [
     Endpoint("/v1/law", "POST", post_law, "mu_macro over a range of one input", LawRequest, LawAnswer),
