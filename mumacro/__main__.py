@@ -85,7 +85,7 @@ def _one_case(words: Sequence[str]) -> str:
         for row in rows if (row["row"], "k_range" in case) != ROW_OF_K
     ]  # fmt: skip
     text = in_columns(_rows_of(answer, surrogate, case, kind, command.format_for(chosen, surrogate, case, kind)))
-    error = f"numerical error of mu_macro: {answer.error_bound:.2g} at most"
+    error = f"numerical error  {answer.error_bound:.2g}"
     return "\n".join([text, *([in_columns(lines)] if lines else []), error])
 
 
@@ -93,7 +93,7 @@ def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: K
     """An answer as rows of name, value, unit, meaning."""
     groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
     rows = [
-        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", "<Fx> / Fz, over a period"),
+        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", ""),
         ("mu_ratio", f"{answer.mu_ratio:#{form}}", "[-]", "mu_macro / mu0"),
         ("regime", answer.regime, "", REGIME_WORDS[answer.regime]),
         ("v_tilde", f"{answer.v_tilde:{form}}", "[-]", "v0 k / (mu0 Fz omega)"),

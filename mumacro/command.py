@@ -251,7 +251,7 @@ def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
 def in_words(text: str, case: Mapping[str, Any]) -> str:
     """The advice of a model line with what the command takes in place of Python's keyword."""
     k = case["k"]
-    return text.replace("give k_range", f"give an interval such as k={0.9 * k:.3g}..{1.1 * k:.3g}")
+    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}")
 
 
 def format_for(chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING) -> str:

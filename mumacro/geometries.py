@@ -54,7 +54,8 @@ GEOMETRIES = {
 def contact_of(geometry: str, /, **given: Any) -> Contact:
     """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
 
-    Its warnings are in it.  InputError for an unknown geometry, and an argument that is missing, unknown, no number or out of bounds.
+    Its warnings are in it.  InputError for an unknown geometry, and an argument that is missing, unknown, no number or
+    out of bounds.
 
     >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
     'ball'

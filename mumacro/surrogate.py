@@ -343,8 +343,8 @@ class Surrogate:
     @overload
     def evaluate(
         self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
-        f: float = ..., gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
-        direction: DirectionName = ...,
+        f: float = ..., gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ...,
+        contact: ContactName = ..., direction: DirectionName = ...,
     ) -> Answer[float]: ...  # fmt: skip
 
     @overload

@@ -73,7 +73,8 @@ def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(surroga
     assert found.values["mu0"] == close(np.mean(mu), rel=1e-8)
     assert found.std["mu0"] == close(np.std(mu, ddof=1) / 2.0, rel=1e-8)
     both = fit({"v0": V0[::4], "mu_macro": noisy(surrogate, 3e-3, v0=V0[::4])}, **RIG)
-    slopes = surrogate.evaluate(**both.values, v0=V0[::4], **RIG, gradient=True).gradient
+    case: Case = {**both.values, **RIG, "v0": V0[::4]}
+    slopes: Any = surrogate.evaluate(case, gradient=True).gradient
     rows = np.stack([slopes["k"], slopes["mu0"]])
     assert both.covariance == close(both.chi2 / (5 - 2) * np.linalg.inv(rows @ rows.T), rel=1e-6)
 
