@@ -22,7 +22,7 @@ def post(path: str, body: dict[str, Any]) -> Any:
 
 
 answer = get("/v1/mu-macro", **CASE, include="limits")
-print(f"mu_macro = {answer['mu_macro']:.6f} +- {answer['error_bound']:.0e}, {answer['regime']}")
+print(f"mu_macro = {answer['mu_macro']:.6f} (numerical error {answer['error_bound']:.0e}), {answer['regime']}")
 print(f"slides without sticking from v0 = {answer['limits']['v0_crit']:.4g} m/s on")
 
 speeds = [0.001, 0.01, 0.1, 1.0]

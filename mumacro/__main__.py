@@ -80,16 +80,20 @@ def _one_case(words: Sequence[str]) -> str:
         found |= {"model": rows} if chosen.model else {}
         found |= dict(kind.names.items() - SPRING.names.items())
         return as_json({**found, "table": command.about(surrogate)})
-    lines = [("model", f"{row['row']}: {row['text']}") for row in rows if (row["row"], "k_range" in case) != ROW_OF_K]
+    lines = [
+        ("model", f"{row['row']}: {command.in_words(row['text'], middle)}")
+        for row in rows if (row["row"], "k_range" in case) != ROW_OF_K
+    ]  # fmt: skip
     text = in_columns(_rows_of(answer, surrogate, case, kind, command.format_for(chosen, surrogate, case, kind)))
-    return "\n".join([text, *([in_columns(lines)] if lines else [])])
+    error = f"numerical error  {answer.error_bound:.2g}"
+    return "\n".join([text, *([in_columns(lines)] if lines else []), error])
 
 
 def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind, form: str) -> list[Sequence[str]]:
     """An answer as rows of name, value, unit, meaning."""
     groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
     rows = [
-        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", f"+- {answer.error_bound:.2g}"),
+        ("mu_macro", f"{answer.mu_macro:#{form}}", "[-]", ""),
         ("mu_ratio", f"{answer.mu_ratio:#{form}}", "[-]", "mu_macro / mu0"),
         ("regime", answer.regime, "", REGIME_WORDS[answer.regime]),
         ("v_tilde", f"{answer.v_tilde:{form}}", "[-]", "v0 k / (mu0 Fz omega)"),
@@ -98,7 +102,7 @@ def _rows_of(answer: Any, surrogate: Surrogate, case: Mapping[str, Any], kind: K
     ]
     if "k_range" in case:
         low, high = (f"{end:.6g}" for end in case["k_range"])
-        middle = f"{rows[0][3]}, at k = {command.middle_of(case)['k']:.6g} N/m, the geometric middle"
+        middle = f"at k = {command.middle_of(case)['k']:.6g} N/m, the geometric middle"
         rows[:1] = [
             (*rows[0][:3], middle),
             ("from", f"{answer.mu_macro_low:#{form}}", "[-]", f"the least for k from {low} to {high} N/m"),

@@ -2,6 +2,7 @@
 
 import argparse
 import csv
+import difflib
 import json
 import math
 import os
@@ -59,6 +60,10 @@ class OneLineParser(argparse.ArgumentParser):
         super().__init__(formatter_class=RawDescriptionHelpFormatter, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
+        if wrong := re.fullmatch(r"(.*: invalid choice: '([^']*)') \(choose from (.*)\)", message):
+            known = [word.strip(" '") for word in wrong[3].split(",")]
+            near = difflib.get_close_matches(wrong[2].lower(), known, n=1)
+            message = f"{wrong[1]}, did you mean {near[0]}?" if near else message
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
@@ -241,6 +246,12 @@ def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
         low, high = found.pop("k_range")
         found["k"] = math.sqrt(low) * math.sqrt(high)
     return found
+
+
+def in_words(text: str, case: Mapping[str, Any]) -> str:
+    """The advice of a model line with what the command takes in place of Python's keyword."""
+    k = case["k"]
+    return text.replace("give k_range", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}")
 
 
 def format_for(chosen: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING) -> str:

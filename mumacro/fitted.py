@@ -36,7 +36,8 @@ class Fit:
         (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points it is scaled
         by the scatter about the fit.
     interval : dict of tuple
-        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.
+        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.  Of several solutions
+        they cover all, while ``std`` and ``covariance`` are those of the best one.
     residuals : ndarray
         Measured mu_macro minus the fit's [-], (n,).
     chi2, reduced_chi2 : float

@@ -18,14 +18,14 @@ from mumacro.arrays import Array
 from mumacro.errors import InputError
 from mumacro.extras import missing
 from mumacro.fitted import Fit, quantile
-from mumacro.measured import HARDLY, STD, UNKNOWNS, Measured
+from mumacro.measured import HARDLY, STD, Measured
 from mumacro.surrogate import Surrogate
 
 _PER_DECADE, _MOST_NODES = 10, 600  # of the sweep
 
 
 def fit(
-    data: Any, unknowns: str | Sequence[str] = UNKNOWNS, *, contact: str = "spring", direction: str = "across",
+    data: Any, unknowns: str | Sequence[str] | None = None, *, contact: str = "spring", direction: str = "across",
     surrogate: Surrogate | None = None, **fixed: Any,
 ) -> Fit:  # fmt: skip
     """k and mu0 of a contact, or one of them, from measured friction.
@@ -34,15 +34,16 @@ def fit(
     ----------
     data : mapping, DataFrame, Arrow table or Dataset
         Columns ``v0`` [m/s] and ``mu_macro`` [-]; where they vary also ``Fz`` [N], ``y0`` [m], ``omega`` [rad/s] or
-        ``f`` [Hz]; if known ``std``, the standard deviation of mu_macro [-].  Other columns are ignored.
-    unknowns : str or sequence of str
-        "k", "mu0" or both.
+        ``f`` [Hz]; if known ``std``, the standard deviation of mu_macro [-], and ``mu0`` of each point, such as from
+        the force without oscillation.  Other columns are ignored.
+    unknowns : str or sequence of str, optional
+        "k", "mu0" or both.  Left out: both, and k alone where ``mu0`` is a column.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
     surrogate : Surrogate, optional
         The table; the tightest bundled one if left out.
     **fixed : float or array_like
-        Inputs that are not columns: ``Fz=10.0, y0=2e-6, f=20e3``, and k (None: rigid) or mu0 where it is known.
+        Inputs that are not columns: ``Fz=10.0, y0=2e-6, f=20e3``, and k or mu0 where it is known.
 
     Returns
     -------
@@ -65,7 +66,7 @@ def fit(
     >>> f"{found.values['k']:.2g} {found.values['mu0']:.3f}"
     '1e+06 0.300'
     """
-    names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
+    names = (unknowns,) if isinstance(unknowns, str) else None if unknowns is None else tuple(unknowns)
     problem = _Problem(data, names, contact, direction, surrogate or _bundled(), fixed)
     with np.errstate(all="ignore"):  # numbers of any size: what they cannot tell is infinite
         found = problem.solve()
@@ -130,7 +131,8 @@ class _Problem(Measured):
         lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
         refined = sorted((self._refine(scan, int(i)) for i in lowest), key=lambda one: one[0])
         chi2, dof = refined[0][0], self.n - len(self.unknowns)
-        variance = 1.0 if self.std is not None else chi2 / dof if dof else math.inf
+        rounding = 1e-30 * size  # of exact points: mu_macro has sixteen digits
+        variance = 1.0 if self.std is not None else max(chi2 / dof, rounding) if dof else math.inf
         width = quantile(dof if self.std is None else None)
         least = 1e-12 * size if math.isinf(variance) else max(variance, 1e-14 * size)
         solutions: list[tuple[float, dict[str, float], int]] = []
@@ -145,6 +147,11 @@ class _Problem(Measured):
         off = np.sqrt(np.diag(logs))
         std = dict(zip(values, (scale * off).tolist(), strict=True))
         interval = self._interval(scan, chi2, width, variance, values, off)
+        for _, other, _ in solutions[1:]:  # one of which is the truth
+            apart = width * np.sqrt(np.diag(self._covariance(other, variance)))
+            ends = _around(other, apart)
+            interval = {name: (min(low, ends[name][0]), max(high, ends[name][1]))
+                        for name, (low, high) in interval.items()}  # fmt: skip
         listed = tuple({**found, "chi2": value} for value, found, _ in solutions)
         points = {**self.columns, "mu_macro": self.mu, **({} if self.std is None else {STD: self.std})}
         return Fit(
@@ -171,7 +178,8 @@ class _Problem(Measured):
 
         start = np.log(list(values.values()))
         bounds = start - 2.5, start + 2.5
-        found = least_squares(residuals, start, slopes, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+        # by the step alone: what the points hardly determine changes chi2 and its slope by next to nothing
+        found = least_squares(residuals, start, slopes, bounds, xtol=1e-12, ftol=None, gtol=None)
         if not np.isfinite(found.x).all():  # scipy divides 0 by 0 where no point tells k
             return float(scan.chi2[node]), values, node
         return 2.0 * float(found.cost), self._values(found.x), node
@@ -203,9 +211,7 @@ class _Problem(Measured):
         room = width**2 * variance - (scan.chi2 - chi2)
         inside = room >= 0.0
         if np.count_nonzero(inside) < 6 or math.isinf(variance):
-            with np.errstate(over="ignore"):
-                return {name: (float(x * np.exp(-width * o)) if x < math.inf else 0.0, float(x * np.exp(width * o)))
-                        for (name, x), o in zip(values.items(), off, strict=True)}  # fmt: skip
+            return _around(values, width * off)
         found = {"k": (scan.k[inside], scan.k[inside]), "mu0": (scan.mu0[inside], scan.mu0[inside])}
         if len(self.unknowns) == 2:
             mu0, k = scan.mu0[inside], scan.k[inside]
@@ -239,7 +245,7 @@ class _Problem(Measured):
                 said.append(f"y~ >= {y.min():.3g} in all points: above {HARDLY:g} mu_macro hardly depends on k")
         if len(solutions) > 1:
             told = "; ".join(", ".join(f"{name} = {one[name]:.4g}" for name in values) for one in solutions)
-            said.append(f"{len(solutions)} solutions fit within 95 %: {told}")
+            said.append(f"{len(solutions)} solutions fit within 95 %, the interval covers them all: {told}")
         if self.std is not None and dof:
             from scipy.special import chdtrc
 
@@ -248,3 +254,10 @@ class _Problem(Measured):
         if self.contact == "ball" and "k" in values and np.ptp(self.columns["Fz"]) > 0.0:
             said.append("one k for all loads, while k of a ball grows like Fz^(1/3): fit each load alone")
         return said
+
+
+def _around(values: Mapping[str, float], apart: Array) -> dict[str, tuple[float, float]]:
+    """Intervals about values whose logarithms may be off by ``apart`` (unknowns,)."""
+    with np.errstate(over="ignore"):
+        return {name: (float(x * np.exp(-o)) if x < math.inf else 0.0, float(x * np.exp(o)))
+                for (name, x), o in zip(values.items(), apart, strict=True)}  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
 from mumacro.inputs import UNITS_OF, Scale, read_quantity, real, unknown_name
-from mumacro.stiffness import AXES, Contact, Material, ball_on_flat, cylinder_on_flat, flat_punch
+from mumacro.stiffness import AXES, Contact, Material, flat_punch, hertz_ball, hertz_cylinder
 
 
 class Argument(NamedTuple):
@@ -43,18 +43,19 @@ ARGUMENTS = {
 #: arguments of every geometry; the first two are required
 BODIES = ("E", "nu", "E2", "nu2")
 GEOMETRIES = {
-    "ball": Geometry(ball_on_flat, "a ball on a flat, or two balls", ("radius", "Fz")),
+    "ball": Geometry(hertz_ball, "a ball on a flat, or two balls", ("radius", "Fz")),
     "flat": Geometry(
         flat_punch, "a flat circular end in full contact, such as a pin that has run in", ("radius", "Fz")
     ),
-    "cylinder": Geometry(cylinder_on_flat, "a lying cylinder", ("radius", "length", "Fz", "oscillation")),
+    "cylinder": Geometry(hertz_cylinder, "a lying cylinder", ("radius", "length", "Fz", "oscillation")),
 }
 
 
 def contact_of(geometry: str, /, **given: Any) -> Contact:
     """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
 
-    InputError for an unknown geometry, and an argument that is missing, unknown, no number or out of bounds.
+    Its warnings are in it.  InputError for an unknown geometry, and an argument that is missing, unknown, no number or
+    out of bounds.
 
     >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
     'ball'

@@ -2,9 +2,10 @@
 
 The library, the files, the command line, the service and the exports take their fields from here.  A frequency
 ``f`` [Hz] may be given in place of the angular frequency ``omega`` [rad/s], exactly one of them.  The stiffness ``k``
-is always said: a number, or rigid contact by infinity, by the word ``rigid``, or by None as a single value.
+is always said: a positive number, or rigid contact by the word ``rigid`` or by infinity.
 
-**A gap is never rigid**: an empty cell, null or NaN in a column ``k`` makes its case illegal, see :data:`GAP`.
+**A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column ``k`` makes its case
+illegal, see :data:`GAP`.
 """
 
 import difflib
@@ -40,6 +41,8 @@ BOUNDS = {name: "finite and > 0" if name in POSITIVE else "finite and >= 0" for 
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
+#: what a stiffness must be, told by :class:`InputError`
+STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
 MOST_HZ = sys.float_info.max / RAD_PER_CYCLE  # above, omega is beyond double range
 
 
@@ -104,6 +107,7 @@ _OTHER_NAMES |= {name.lower(): name for name in NAMES}
 _IN_BRACKETS = re.compile(r"\s*(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))\s*", re.DOTALL)
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\d\s.,+-].*)", re.ASCII)
+_DASHED = re.compile(rf"({_NUMBER})\s*(?:-|–|to)\s*({_NUMBER})\s*(\D.*)?")  # an interval, as people write it
 PLAIN = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 
 
@@ -211,7 +215,7 @@ def number_hint(name: str, value: object) -> str:
 'must be a number, not a text: leave out the quotes', 'must be a number')
     """
     if not isinstance(value, str):
-        return "must be a number"
+        return GAP if name == "k" and value is None else "must be a number"
     text = value.strip()[:80]
     if PLAIN.fullmatch(text):
         number = float(text)
@@ -220,6 +224,8 @@ def number_hint(name: str, value: object) -> str:
         return "must be a number, or rigid" if name == "k" else "must be finite"
     if re.fullmatch(r"[+-]?\d+,\d+", text):
         return f"must be a number with a decimal point: {text.replace(',', '.')}"
+    if name == "k" and ".." in text:
+        return "must be a number, or rigid; an interval is k_range in JSON, columns k_low and k_high in a file"
     found = _WITH_UNIT.fullmatch(text)
     if found is None:
         return "must be a number, or rigid" if name == "k" else "must be a number"
@@ -257,9 +263,31 @@ def read_quantity(name: str, text: str, words: str, units: Mapping[str, Scale], 
         return scale.si(float(with_unit[1]))
     if PLAIN.fullmatch(text.replace(",", ".")):
         raise ValueError(f"{name}={text}: the decimal sign is a point, {text.replace(',', '.')}")
+    if meant := _meant(name, text, units):
+        raise ValueError(f"{name}={text}: {meant}")
     known = ", ".join([unit for unit in units if unit][:4])
     hint = ", or rigid" if rigid else ""
     raise ValueError(f"{name}={text}: give {words} as a plain number such as 2e-6, or with a unit: {known}, ...{hint}")
+
+
+def _meant(name: str, text: str, units: Mapping[str, Scale]) -> str | None:
+    """What was probably meant by a text that is no quantity: an interval, a unit in other case, f for omega.
+
+    >>> _meant("k", "0.8-1.2N/um", UNITS_OF["k"]), _meant("omega", "20kHz", UNITS_OF["omega"])
+    ('write an interval as k=0.8..1.2N/um', 'did you mean f=20kHz? omega is in rad/s')
+    """
+    if name == "k" and (ends := _DASHED.fullmatch(text)):
+        return f"write an interval as k={ends[1]}..{ends[2]}{ends[3] or ''}"
+    if not (found := _WITH_UNIT.fullmatch(text)):
+        return None
+    number, unit = found[1], found[2].replace(" ", "")
+    near = [known for known in units if known.lower() == unit.lower()]
+    other = {"omega": "f", "f": "omega"}.get(name)
+    if near:
+        return f"did you mean {' or '.join(f'{number}{known}' for known in near)}?"
+    if other and (there := next((known for known in UNITS_OF[other] if known.lower() == unit.lower()), None)):
+        return f"did you mean {other}={number}{there}? {name} is in {SI[name][0]}"
+    return None
 
 
 def read_range(name: str, text: str) -> tuple[float, float]:
@@ -269,7 +297,8 @@ def read_range(name: str, text: str) -> tuple[float, float]:
     (800000.0, 1200000.0)
     """
     low, _, high = text.partition("..")
-    if PLAIN.fullmatch(low.strip()) and (found := _WITH_UNIT.fullmatch(high.strip())):
+    plain = [PLAIN.fullmatch(end.strip()) for end in (low, high)]  # 1.2e6 is not 1.2 of a unit e6
+    if plain[0] and not plain[1] and (found := _WITH_UNIT.fullmatch(high.strip())):
         low = f"{low} {found[2]}"
     ends = read_number(name, low), read_number(name, high)
     if not 0.0 < ends[0] < ends[1] < math.inf:
@@ -301,7 +330,7 @@ def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
 def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
     """The six inputs as float64 arrays; InputError where one is missing, given twice, or no real number.
 
-    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array, None or
+    ``given`` holds the fields, ``f`` [Hz] in place of ``omega`` if not None, and ``k``: a number, an array or
     ``rigid``; an array may hold the word, too.
     """
     converted: dict[str, Array] = {}
@@ -314,22 +343,28 @@ def as_columns(given: Mapping[str, Any]) -> dict[str, Array]:
                 raise InputError("omega", given.get("omega"), f"given or f [Hz] in its place, {told}")
             source = "omega" if both else "f"
         if source not in given:
-            hint = ": a number [N/m], or None for rigid contact" if name == "k" else f" [{UNITS[name]}]"
+            hint = f": {STIFFNESS}" if name == "k" else f" [{UNITS[name]}]"
             raise InputError(name, None, f"given{hint}")
         value = given[source]
-        if name == "k" and value is None:
-            value = math.inf
         try:
             array = real(source, value)
         except InputError:
             if name != "k":
                 raise
-            array = real(source, _rigid_as_infinity(value))
+            array = _stiffness(value)
         if source == "f":
             with np.errstate(over="ignore"):  # infinite, which is refused as a value of f
                 array = array * RAD_PER_CYCLE
         converted[name] = array
     return converted
+
+
+def _stiffness(value: Any) -> Array:
+    """A stiffness, or an array of them, which may say ``rigid``; InputError with the remedy for a gap."""
+    try:
+        return real("k", _rigid_as_infinity(value))
+    except InputError as error:
+        raise InputError("k", value, STIFFNESS) from error
 
 
 def _rigid_as_infinity(value: Any) -> Any:
@@ -374,6 +409,7 @@ def check_inputs(columns: Mapping[str, Array], frequency: Any = None) -> None:
             field, told = ("f", real("f", frequency)) if name == "omega" and frequency is not None else (name, values)
             value = float(told.ravel()[i])
             bound = refusal(field, value).removeprefix("must be ") if field == "f" else BOUNDS[name]
+            bound = STIFFNESS if field == "k" and math.isnan(value) else bound
             raise InputError(field, value, bound, i if values.ndim else None)
 
 

@@ -130,8 +130,8 @@ def friction_law(
     values : ndarray
         Its values [SI], ascending, shape (n,), such as :func:`sweep_values` makes.
     case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``; ``k_range``, lowest
-        and highest stiffness, for ``k``: the law has a band, see :attr:`Law.band`.
+        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand for ``omega``;
+        ``k_range``, lowest and highest stiffness, for ``k``: the law has a band, see :attr:`Law.band`.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
     refine : bool

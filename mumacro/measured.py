@@ -1,6 +1,6 @@
 """Measured points of friction: their columns, checked, and the model at them; for :mod:`mumacro.fitting`."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,11 @@ _SCATTER, _SHARE = 5.0, 0.05
 _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
 
 
+def unknowns_beside(columns: Container[str]) -> list[str]:
+    """What is fitted by default: k and mu0, or k alone where mu0 is a column."""
+    return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
+
+
 class Measured:
     """Points (n,) with their friction, and the model at them; parameters and errors are those of :func:`mumacro.fit`.
 
@@ -28,9 +33,11 @@ class Measured:
     """
 
     def __init__(
-        self, data: Any, unknowns: tuple[str, ...], contact: str, direction: str, surrogate: Surrogate,
+        self, data: Any, unknowns: tuple[str, ...] | None, contact: str, direction: str, surrogate: Surrogate,
         fixed: Mapping[str, Any],
     ) -> None:  # fmt: skip
+        both = picked("data", data, UNKNOWNS)
+        unknowns = tuple(unknowns_beside(both)) if unknowns is None else unknowns
         if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
             raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
         self.unknowns, self.contact, self.direction, self.surrogate = unknowns, contact, direction, surrogate
@@ -48,6 +55,8 @@ class Measured:
             if name not in (*known, "mu_macro", STD):
                 raise InputError(name, fixed[name], f"one of {', '.join(known)}; {unknown_name(name, known)}")
         columns = picked("data", data, [*known, "mu_macro", STD])
+        if twice := [name for name in picked("data", data, UNKNOWNS) if name in self.unknowns]:
+            raise InputError(twice[0], "a column", f"left out, or taken from unknowns={self.unknowns}: it is fitted")
         if twice := sorted(columns.keys() & fixed.keys()):
             raise InputError(twice[0], fixed[twice[0]], "given once: as a column or as a keyword")
         given = {**columns, **fixed}

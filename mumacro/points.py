@@ -18,14 +18,15 @@ from mumacro.errors import InputError
 from mumacro.fitted import Fit
 from mumacro.fitting import fit
 from mumacro.inputs import LIKE, SI, unit_of
-from mumacro.measured import STD, UNKNOWNS
-from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head
+from mumacro.measured import STD, UNKNOWNS, unknowns_beside
+from mumacro.tabular import SEPARATORS, absent, find_heads, read_cell, read_head, read_text
 from mumacro.validity import digits
 
 FIT = "mumacro fit measured.csv 'Fz=10N y0=2um f=20kHz' -o fit.png"
 _COLUMNS = f"""\
 columns by name, in SI or with a unit as in v0 [mm/s]; others are ignored:
   v0 and mu_macro, of each point; what varies of Fz, y0 (or {AMPLITUDE}), omega or f; {STD}: of mu_macro, if known
+  mu0, if it is known at each point, such as from the force without oscillation: then k alone is fitted
 what is neither a column nor unknown is given as name=value
 
 examples:
@@ -41,15 +42,21 @@ def fit_points(words: Sequence[str]) -> str:
     first = "points", {"help": "a file of CSV; - is standard input"}
     told = "k and mu0 of a contact from measured friction."
     parser = command.question("fit", told, _COLUMNS, "the other inputs", "*", first)
-    parser.add_argument("--unknown", nargs="+", default=[*UNKNOWNS], metavar="NAME", help="k, mu0; default: both")
+    parser.add_argument(
+        "--unknown", nargs="+", metavar="NAME", help="k, mu0; default: both, k alone beside a column mu0"
+    )
     command.add_format(parser)
     chosen = parser.parse_intermixed_args(words)
-    unknown, more = ([x for x in chosen.unknown if ("=" in x) == given] for given in (False, True))
+    unknown, more = ([x for x in chosen.unknown or () if ("=" in x) == given] for given in (False, True))
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
     kind = command.kind_in(chosen)
-    text = sys.stdin.read() if chosen.points == "-" else Path(chosen.points).read_text("utf-8-sig", "replace")
+    try:
+        text = sys.stdin.read() if chosen.points == "-" else read_text(Path(chosen.points).read_bytes(), chosen.points)
+    except ValueError as error:
+        raise ImpossibleError(str(error)) from None
     points = read_points(text, chosen.points, SEPARATORS[chosen.sep], chosen.decimal)
+    unknown = unknown or unknowns_beside(points)
     there = [*unknown, *(name for name in points if name in kind.columns)]
     given = command.read_case(
         [*chosen.words, *more], kind, there, one_k="one k is needed; or leave it out, and it is fitted"
@@ -103,7 +110,7 @@ def read_points(text: str, where: str, sep: str = ",", decimal: str = ".") -> di
     """
     lines = text.removeprefix("\ufeff").splitlines()
     try:
-        header = read_head("".join(lines[:1]), lines[1:50], sep, decimal)
+        header = read_head("".join(lines[:1]), lines[1:50], sep, decimal, ("mu_macro", STD))
     except ValueError as error:
         raise ImpossibleError(f"{where}: line 1: {error}") from None
     rows = [row for row in csv.reader(lines[1:], delimiter=sep) if any(map(str.strip, row))]

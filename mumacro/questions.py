@@ -19,7 +19,6 @@ LAW = "mumacro law 'mu0=0.3 Fz=10N k=1N/um y0=2um f=20.69kHz' --along v0 0.1mm/s
 SOLVE_FOR = "mumacro solve-for y0 'mu0=0.3 Fz=10N k=1N/um f=20.69kHz v0=1cm/s' --target 0.15"
 STIFFNESS = "mumacro stiffness ball --radius 5mm --Fz 10N --E 210GPa --nu 0.3"
 CURVE = 400  # points of a curve in a picture
-ONE_K = "one k is needed: over an interval of it a wanted mu_macro has no single answer; solve for both ends"
 _UNITS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
 
 
@@ -82,31 +81,37 @@ def solve(words: Sequence[str]) -> str:
     kind = command.kind_in(chosen)
     if unknown not in kind.columns:
         raise UsageError(f"{unknown} does not belong to --direction {chosen.direction}: {', '.join(kind.columns)} do")
-    case = read_case(chosen.words, kind, [unknown], one_k=ONE_K)
+    case = read_case(chosen.words, kind, [unknown])
     if chosen.ratio and unknown == "mu0":
         raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
     target = chosen.target * case["mu0"] if chosen.ratio else chosen.target
     ends = [scale * end for end in command.read_values((unknown, text) for text in chosen.between or ())]
     surrogate = open_table(chosen.table)
     found = solve_for(surrogate, inner, target, case, (ends[0], ends[1]) if ends else None, **kind.names)
-    reach = found.reach
-    if not found.roots[0]:
+    reach, two = found.reach, found.ends
+    if not found.roots[0] and not (two and any(end.roots[0] for end in two)):
         where = f"{unknown} from {reach.low / scale:.6g} to {reach.high / scale:.6g} {unit}"
         if found.constant:
             raise ImpossibleError(f"{unknown} has no influence here: mu_macro is {reach.mu_min:.12g} for {where}")
         raise ImpossibleError(
             f"mu_macro = {target:.12g} is out of reach: {where} gives {reach.mu_min:.12g} to {reach.mu_max:.12g}"
         )
-    roots = [(r.value / scale, r.low / scale, r.high / scale, r.mu_macro, r.regime) for r in found.roots[0]]
-    names = (unknown, "low", "high", "mu_macro", "regime")
+    places = {command.middle_of(case).get("k"): found}
+    if two:
+        places = dict(sorted({**places, **dict(zip(case["k_range"], two, strict=True))}.items()))
+    roots = [
+        (*((k,) if two else ()), r.value / scale, r.low / scale, r.high / scale, r.mu_macro, r.regime)
+        for k, one in places.items() for r in one.roots[0]
+    ]  # fmt: skip
+    names = (*(("k",) if two else ()), unknown, "low", "high", "mu_macro", "regime")
     if chosen.json:
         listed = [dict(zip(names, root, strict=True)) for root in roots]
         return as_json(
             {"unknown": unknown, "unit": unit, "target": target, "roots": listed, "table": command.about(surrogate)}
         )
-    heads = [f"{unknown} [{unit}]", "between", "and", "mu_macro [-]", "regime"]
+    heads = [*(["k [N/m]"] if two else []), f"{unknown} [{unit}]", "between", "and", "mu_macro [-]", "regime"]
     if chosen.out is not None:
-        at = [root.value for root in found.roots[0]]
+        at = [root.value for one in places.values() for root in one.roots[0]]
         # a decade around the roots; what is at 0 is shown up to 1
         low, high = ends or (0.1 * min(at) or 1e-6 * (max(at) or 1.0), 10.0 * max(at) or 1.0)
         values = sweep_values(inner, low, high, CURVE, "log" if low > 0.0 else "linear")
@@ -116,8 +121,11 @@ def solve(words: Sequence[str]) -> str:
         return command.write_result(
             chosen.out, columns, lambda axes: plotting.plot_law(curve, axes, roots=at, target=target)
         )  # fmt: skip
-    form = command.format_for(chosen, surrogate, {**case, inner: found.roots[0][0].value}, kind)
-    return in_columns([heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)])
+    at_one = next(one.roots[0][0].value for one in places.values() if one.roots[0])
+    form = command.format_for(chosen, surrogate, {**case, inner: at_one}, kind)
+    text = in_columns([heads, *([*(f"{x:{form}}" for x in numbers), regime] for *numbers, regime in roots)])
+    none = [f"no {unknown} gives that for k = {k:.6g} N/m" for k, one in places.items() if not one.roots[0]]
+    return "\n".join([text, *none])
 
 
 def map_(words: Sequence[str]) -> str:
@@ -172,4 +180,4 @@ def stiffness_of(words: Sequence[str]) -> str:
     rows = [(name, f"{found[name]:{form}}", f"[{unit}]") for name, unit in _UNITS.items()]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
-    return in_columns(rows)
+    return "\n".join([in_columns(rows), *(f"warning: {text}" for text in contact.warnings)])

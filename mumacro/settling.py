@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 
 from mumacro.contact import kind_of
 from mumacro.errors import InputError
+from mumacro.inputs import RAD_PER_CYCLE
 from mumacro.surrogate import Surrogate
 
 
@@ -45,16 +46,17 @@ class Settling:
 
 
 def settling(
-    surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike | None, y0: ArrayLike, omega: ArrayLike,
-    v0: ArrayLike, remaining: float = 0.01, contact: str = "spring", direction: str = "across",
+    surrogate: Surrogate, *, mu0: ArrayLike, Fz: ArrayLike, k: ArrayLike, y0: ArrayLike, v0: ArrayLike,
+    omega: ArrayLike | None = None, f: ArrayLike | None = None, remaining: float = 0.01, contact: str = "spring",
+    direction: str = "across",
 ) -> Settling:  # fmt: skip
     """Periods until a disturbance of the contact has decayed to ``remaining`` of its size.
 
     Parameters
     ----------
     surrogate : Surrogate
-    mu0, Fz, k, y0, omega, v0 : array_like
-        The case [-, N, N/m, m, rad/s, m/s], as in :meth:`mumacro.Surrogate.evaluate`.
+    mu0, Fz, k, y0, v0, omega or f : array_like
+        The case [-, N, N/m, m, m/s, rad/s or Hz], as in :meth:`mumacro.Surrogate.evaluate`.
     remaining : float
         What is left of the disturbance [-], 0 < remaining < 1.
     contact : str
@@ -86,8 +88,10 @@ def settling(
     kind = kind_of(contact, direction)
     if kind.direction:
         raise InputError("direction", direction, "across: how a disturbance decays is derived for no other")
-    answer = surrogate.evaluate({"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "v0": v0}, groups=True)
-    amplitude, frequency, speed = (np.asarray(x, dtype=np.float64) for x in (y0, omega, v0))
+    case = {"mu0": mu0, "Fz": Fz, "k": k, "y0": y0, "omega": omega, "f": f, "v0": v0}
+    answer = surrogate.evaluate({name: x for name, x in case.items() if x is not None or name == "k"}, groups=True)
+    amplitude, speed = (np.asarray(x, dtype=np.float64) for x in (y0, v0))
+    frequency = np.asarray(omega, dtype=np.float64) if f is None else RAD_PER_CYCLE * np.asarray(f, dtype=np.float64)
     share = 1.5 if kind.contact else 1.0  # load of the middle spring of a ball over the mean
     v, y, l0 = answer.v_tilde / share, answer.y_tilde / share, share * answer.length_scale
     still = (amplitude == 0.0) | (frequency == 0.0)  # no oscillation: dragged only, mu~ = 1

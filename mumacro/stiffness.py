@@ -15,7 +15,8 @@ all of it slips at once, and one spring is exact.  A result holds both, k and th
 
     surrogate.evaluate(**ball_on_flat(5e-3, 10.0, steel, steel), mu0=0.3, Fz=10.0, y0=2e-6, f=20e3, v0=0.01)
 
-Every function raises :class:`mumacro.InputError` for a value out of bounds and for two rigid bodies.
+Every function raises :class:`mumacro.InputError` for a value out of bounds or no number, for two rigid bodies, and
+where Hertz's theory has no meaning: a contact wider than the ball.  Above a tenth of the ball's radius it warns.
 
 Not included: roughness, which adds compliance in series (:func:`in_series`); layers; plastic flow, which begins below
 the surface at a Hertz pressure of about 1.6 times the yield strength; the compliance of the holder, in series as well.
@@ -28,17 +29,29 @@ V. L. Popov, "Contact Mechanics and Friction", Springer (2010), Secs. 5.2, 8.2; 
 """
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 from mumacro.errors import InputError
+from mumacro.inputs import real
 
 SMALLEST, LARGEST = 1e-60, 1e60  # of numbers in SI: every product of them below is a double
 AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
+WIDE = 0.1  # of the radius of a ball or cylinder: the half width of a contact above which Hertz's theory is off
+SOFT = 1e6  # [Pa]; a modulus below it may be meant in GPa
 
 
-def _positive(**values: float) -> None:
-    for name, value in values.items():
+def _number(name: str, value: Any) -> float:
+    found = real(name, value)
+    if found.ndim:
+        raise InputError(name, value, "one number")
+    return float(found)
+
+
+def _positive(**values: Any) -> None:
+    for name, given in values.items():
+        value = _number(name, given)
         if not SMALLEST <= value <= LARGEST:
             raise InputError(name, value, f"finite and > 0, from {SMALLEST:g} to {LARGEST:g}")
 
@@ -56,9 +69,8 @@ class Material:
     nu: float
 
     def __post_init__(self) -> None:
-        rigid = math.isinf(self.E) and self.E > 0.0
-        _positive(E=LARGEST if rigid else self.E)
-        if not -1.0 < self.nu <= 0.5:
+        _positive(E=LARGEST if _number("E", self.E) == math.inf else self.E)
+        if not -1.0 < _number("nu", self.nu) <= 0.5:
             raise InputError("nu", self.nu, "> -1 and <= 0.5")
 
     @property
@@ -76,6 +88,7 @@ class Contact:
     half_width: float  #: radius of a circular contact, half width of a line contact [m]
     pressure: float  #: the largest [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge
     contact: str = "spring"  #: the kind that ``evaluate`` computes with this k: "spring" or "ball"
+    warnings: tuple[str, ...] = ()  #: where the theory behind k is off; also issued by ``warnings``
 
     def keys(self) -> tuple[str, ...]:
         """What is passed on: k, and the kind of contact where it is not the usual one."""
@@ -94,11 +107,46 @@ class Contact:
 
 def _moduli(first: Material, second: Material) -> tuple[float, float]:
     """E* and G* [Pa]."""
+    for name, body in (("first", first), ("second", second)):
+        if not isinstance(body, Material):
+            raise InputError(name, body, "a Material, such as Material(E=210e9, nu=0.3)")
     compliance = (1.0 - first.nu**2) / first.E + (1.0 - second.nu**2) / second.E
     shear = (2.0 - first.nu) / first.G + (2.0 - second.nu) / second.G
     if not compliance > 0.0:
         raise InputError("E", math.inf, "finite in at least one of the two bodies")
     return 1.0 / compliance, 1.0 / shear
+
+
+def _narrow(half_width: float, radius: float, first: Material, second: Material, power: float) -> tuple[str, ...]:
+    """What to say of a Hertzian contact beside the radius of the body; InputError where it is the wider one.
+
+    The half width is proportional to E* to the power -``power``.
+    """
+    share = half_width / radius
+    if share <= WIDE:
+        return ()
+    if share <= 1.0:
+        return (
+            f"the contact's half width {half_width:.3g} m is {share:.2g} of the radius: "
+            f"Hertz's theory holds well below {WIDE:g}, k is rough",
+        )
+    soft = [body for body in (first, second) if body.E < SOFT]
+    if soft:
+        meant = (Material(1e9 * body.E, body.nu) if body in soft else body for body in (first, second))
+        sound = share * (_moduli(first, second)[0] / _moduli(*meant)[0]) ** power
+        if sound <= WIDE:
+            given = soft[0].E
+            told = f"in pascals: did you mean {given:g} GPa? With {given:g} Pa the contact is {share:.3g} radii wide"
+            raise InputError("E", given, told)
+    told = f">= {half_width:.3g}, the half width of the contact: Hertz's theory holds for a small contact only"
+    raise InputError("radius", radius, told)
+
+
+def _warned(contact: Contact) -> Contact:
+    """The contact, whose warnings are issued to the caller of the caller."""
+    for text in contact.warnings:
+        warnings.warn(text, stacklevel=3)
+    return contact
 
 
 def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) -> Contact:
@@ -115,8 +163,8 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
 
     Notes
     -----
-    Johnson (1985), eqs. (4.22), (7.42).  Holds for half_width << radius, below 0.3 of it to about 10 %.  The normal
-    stiffness is the tangent dFz/dz.
+    Johnson (1985), eqs. (4.22), (7.42).  Holds for half_width << radius: above 0.1 of it there is a warning, above
+    the radius an error.  The normal stiffness is the tangent dFz/dz.
 
     Examples
     --------
@@ -127,10 +175,16 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
     >>> f"{1e6 * contact.length_scale(mu0=0.3, Fz=10.0):.2f} um"
     '0.23 um'
     """
+    return _warned(hertz_ball(radius, Fz, first, second))
+
+
+def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> Contact:
+    """:func:`ball_on_flat`, whose warnings are in the result alone."""
     _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
-    return Contact(8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball")
+    told = _narrow(a, radius, first, second, 1.0 / 3.0)
+    return Contact(8.0 * a * shear, 2.0 * a * modulus, a, 1.5 * Fz / (math.pi * a * a), "ball", told)
 
 
 def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> Contact:
@@ -200,12 +254,20 @@ def cylinder_on_flat(
     across 1.67e+08 N/m, 33.2 um
     along 1.32e+08 N/m, 33.2 um
     """
+    return _warned(hertz_cylinder(radius, length, Fz, first, second, oscillation))
+
+
+def hertz_cylinder(
+    radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
+) -> Contact:
+    """:func:`cylinder_on_flat`, whose warnings are in the result alone."""
     if oscillation not in AXES:
         raise InputError("oscillation", oscillation, f"{' or '.join(AXES)} the axis: its k is the one of the model")
     along = oscillation == "along"
     _positive(radius=radius, length=length, Fz=Fz)
     modulus, _ = _moduli(first, second)
     b = math.sqrt(4.0 * (Fz / length) * radius / (math.pi * modulus))
+    told = _narrow(b, radius, first, second, 0.5)
     if 2.0 * b > length:
         raise InputError("length", length, f">= {2.0 * b:.3g}, the width of the contact; a shorter one is a punch")
     scale = 2.0 / math.sqrt(math.pi)  # of the ellipse whose area is that of the rectangle
@@ -213,7 +275,7 @@ def cylinder_on_flat(
     shear = 1.0 / sum(_ellipse_compliance(narrow, wide, body, along) for body in (first, second))
     normal = 1.0 / sum(_ellipse_compliance(narrow, wide, Material(body.E, 0.0), along) * (1.0 - body.nu**2)
                        for body in (first, second))  # fmt: skip
-    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length))
+    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length), warnings=told)
 
 
 def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool) -> float:
@@ -239,8 +301,10 @@ def in_series(*stiffnesses: float) -> float:
     >>> round(in_series(3e6, 6e6))
     2000000
     """
+    if not stiffnesses:
+        raise InputError("stiffnesses", stiffnesses, "at least one")
     for value in stiffnesses:
-        if not value > 0.0:
+        if not _number("stiffness", value) > 0.0:
             raise InputError("stiffness", value, "> 0")
     total = sum(1.0 / value for value in stiffnesses)
     return math.inf if total == 0.0 else 1.0 / total

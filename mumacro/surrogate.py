@@ -335,16 +335,16 @@ class Surrogate:
 
     @overload
     def evaluate(
-        self, *, mu0: float, Fz: float, k: float | None, y0: float, v0: float, omega: float = ..., f: float = ...,
-        gradient: Literal[True], groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
+        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
+        f: float = ..., gradient: Literal[True], groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
         direction: DirectionName = ...,
     ) -> AnswerWithGradient[float]: ...  # fmt: skip
 
     @overload
     def evaluate(
-        self, *, mu0: float, Fz: float, k: float | None, y0: float, v0: float, omega: float = ..., f: float = ...,
-        gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ..., contact: ContactName = ...,
-        direction: DirectionName = ...,
+        self, *, mu0: float, Fz: float, k: float | Literal["rigid"], y0: float, v0: float, omega: float = ...,
+        f: float = ..., gradient: Literal[False] = ..., groups: bool = ..., illegal: str = ...,
+        contact: ContactName = ..., direction: DirectionName = ...,
     ) -> Answer[float]: ...  # fmt: skip
 
     @overload
@@ -386,8 +386,8 @@ class Surrogate:
             Coulomb friction coefficient [-], > 0.
         Fz : array_like
             Normal force [N], > 0.
-        k : array_like or None
-            Tangential stiffness [N/m], > 0; None or inf is rigid contact, eq. (37).  It must always be given.
+        k : array_like
+            Tangential stiffness [N/m], > 0; "rigid" or infinity is rigid contact, eq. (37).  It must always be given.
         y0 : array_like
             Amplitude of the transverse oscillation [m], >= 0.
         omega : array_like
@@ -431,7 +431,7 @@ class Surrogate:
         Examples
         --------
         >>> s = Surrogate.open()
-        >>> a = s.evaluate(mu0=0.3, Fz=10, k=[1e6, None][0], y0=[0.0, 2e-6, -1.0], f=20e3, v0=0.01)
+        >>> a = s.evaluate(mu0=0.3, Fz=10, k=1e6, y0=[0.0, 2e-6, -1.0], f=20e3, v0=0.01)
         >>> a.source_code.tolist()
         [13, 5, -1]
         >>> case = dict(mu0=0.3, Fz=10, y0=2e-6, f=20e3, v0=0.01)
@@ -640,11 +640,10 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
 
 
 def _six(inputs: Mapping[str, Any]) -> tuple[Any, ...] | None:
-    """The six inputs by name, omega from f, an infinite k for None; None where one of them is missing."""
+    """The six inputs by name, omega from f; None where one of them is missing."""
     try:
-        k = inputs["k"]
         return (
-            inputs["mu0"], inputs["Fz"], math.inf if k is None else k, inputs["y0"],
+            inputs["mu0"], inputs["Fz"], inputs["k"], inputs["y0"],
             inputs["omega"] if "omega" in inputs else inputs["f"] * RAD_PER_CYCLE, inputs["v0"],
         )  # fmt: skip
     except (KeyError, TypeError, OverflowError):

@@ -21,12 +21,13 @@ from mumacro.inputs import (
 #: what may stand between the cells of CSV, by the word for it
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 TOO_LARGE = "is beyond double range"
+NO_UTF8 = "is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)"
 _SIGNED = r"[+-]?\d*[{}]\d+([eE][+-]?\d+)?"  # a number with a decimal sign
 
 
-def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | None:
+def _advice(header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]) -> str | None:
     """The options to give, where a file is not as they say; None where it is."""
-    found, sign = _recognised(header, rows, sep, decimal)
+    found, sign = _recognised(header, rows, sep, decimal, more)
     if (found, sign) == (sep, decimal):
         return None
     word = next(word for word, known in SEPARATORS.items() if known == found)
@@ -34,12 +35,12 @@ def _advice(header: str, rows: Sequence[str], sep: str, decimal: str) -> str | N
     return f"{told}: give --sep '{word}' --decimal '{sign}'"
 
 
-def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tuple[str, str]:
-    """The separator that gives the most names of inputs, and the decimal sign of most numbers; if unsure, as given."""
+def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str]) -> tuple[str, str]:
+    """The separator that gives most names of inputs or ``more``, and the decimal sign of most numbers; or as given."""
 
     def inputs(given: str) -> list[int]:
-        names = header.replace('"', "").split(given)
-        return [i for i, name in enumerate(names) if suggestion(split_unit(name)[0], loosely=False)]
+        names = [split_unit(name)[0] for name in header.replace('"', "").split(given)]
+        return [i for i, name in enumerate(names) if name in more or suggestion(name, loosely=False)]
 
     best = max({sep, *SEPARATORS.values()}, key=lambda s: (len(inputs(s)), s in header, s == sep))
     places = inputs(best)
@@ -51,8 +52,24 @@ def _recognised(header: str, rows: Sequence[str], sep: str, decimal: str) -> tup
     return best, max(".,", key=lambda sign: (cells_with(sign), sign == decimal))
 
 
-def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[str]:
+def read_text(data: bytes, where: str) -> str:
+    """A file of CSV as text, without the mark of byte order; ValueError with the remedy where it is no UTF-8.
+
+    >>> read_text(b"v0 [mm/s];\\xb5", "points.csv")
+    Traceback (most recent call last):
+    ValueError: points.csv: line 1 is not in UTF-8; save the file as UTF-8 (Excel: CSV UTF-8)
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"{where}: line {line} {NO_UTF8}") from None
+
+
+def read_head(line: str, rows: Sequence[str], sep: str, decimal: str, more: Sequence[str] = ()) -> list[str]:
     """The names in the first line of CSV; ValueError where it is none, or the ``rows`` behind it ask for other options.
+
+    ``more`` are names of columns that are no inputs.
 
     >>> read_head("mu0;Fz;v0", ["0,3;10;0,01"], ",", ".")
     Traceback (most recent call last):
@@ -64,7 +81,7 @@ def read_head(line: str, rows: Sequence[str], sep: str, decimal: str) -> list[st
         raise ValueError(f"is no header of CSV ({error})") from None
     if not any(map(str.strip, cells)):
         raise ValueError("must name the columns, and is empty")
-    if remedy := _advice(line, rows, sep, decimal):
+    if remedy := _advice(line, rows, sep, decimal, more):
         raise ValueError(remedy)
     return cells
 
@@ -134,7 +151,8 @@ def read_cell(name: str, cell: str, decimal: str = ".") -> float:
         return math.inf
     plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
     if not PLAIN.fullmatch(plain):
-        raise ValueError(number_hint(name, text) if decimal == "." else f"must be a number such as 0{decimal}5")
+        told = decimal == "." or (name == "k" and ".." in text)
+        raise ValueError(number_hint(name, text) if told else f"must be a number such as 0{decimal}5")
     value = float(plain)
     if math.isinf(value) and any(map(str.isdigit, plain)):  # too many digits must not pass for an infinite stiffness
         raise ValueError(TOO_LARGE)

@@ -78,7 +78,7 @@ def asked_of(given: Iterable[str], kind: ContactKind = SPRING) -> Asked:
 # --- one value, one case ------------------------------------------------------------------------------
 
 
-def number(name: str, value: object, null_is_rigid: bool = True) -> tuple[float, str | None]:
+def number(name: str, value: object) -> tuple[float, str | None]:
     """The value of an input and None; or NaN and the reason why it is none.  A rigid contact is infinite."""
     if type(value) is float or type(value) is int:
         try:
@@ -88,7 +88,7 @@ def number(name: str, value: object, null_is_rigid: bool = True) -> tuple[float,
         if LEAST[name] <= found <= _MOST[name]:
             return found, None
         return math.nan, refusal(name, found)
-    if name == "k" and ((isinstance(value, str) and is_rigid(value)) or (value is None and null_is_rigid)):
+    if name == "k" and isinstance(value, str) and is_rigid(value):
         return math.inf, None
     if value is None:
         return math.nan, GAP if name == "k" else "is required"
@@ -117,13 +117,12 @@ def faults_in(given: Iterable[str], left_out: Iterable[str] = (), asked: Asked =
 
 
 def checked(
-    given: Mapping[str, Any], left_out: Iterable[str] = (), null_is_rigid: bool = True, known: Iterable[str] = INPUTS,
-    asked: Asked = PLAIN,
+    given: Mapping[str, Any], left_out: Iterable[str] = (), known: Iterable[str] = INPUTS, asked: Asked = PLAIN,
 ) -> tuple[dict[str, Any], list[FieldFault]]:  # fmt: skip
     """The inputs of one case by field, with ``omega`` for ``f``, and all of its faults.
 
-    ``left_out`` are the inputs that the request asks for, which must not be given.  A k of null is a rigid contact in a
-    single case; in a batch it is a gap.  ``known`` are all names that the request may have, for the advice on others.
+    ``left_out`` are the inputs that the request asks for, which must not be given.  ``known`` are all names that the
+    request may have, for the advice on others.
     """
     values: dict[str, float] = {}
     faults: list[FieldFault] = []
@@ -135,7 +134,7 @@ def checked(
             told = stranger(name, asked, known) if len(faults) < 100 else "unknown"
             faults.append(FieldFault.of(name, told, value))
         elif value is not None or name not in ("omega", "f"):
-            values[name], reason = number(name, value, null_is_rigid)
+            values[name], reason = number(name, value)
             if reason is not None:
                 faults.append(FieldFault.of(name, reason, value))
     if asked is not PLAIN or left_out or len(values) != 6 or not ("omega" in values) ^ ("f" in values):
@@ -224,7 +223,7 @@ def columns_of(
     if any(len(value) > max_batch for value in lists.values()):
         raise too_large(max_batch)
     alone = {name: 1.0 if name in lists else value for name, value in given.items()}
-    plain, of_values = checked(alone, null_is_rigid=False, known=known, asked=asked)
+    plain, of_values = checked(alone, known=known, asked=asked)
     size = len(next(iter(lists.values()), "1"))
     told = "lists must have one length; given " + ", ".join(f"{name}: {len(value)}" for name, value in lists.items())
     of_lengths = [FieldFault.of(name, told) for name, value in lists.items() if len(value) != size]
@@ -245,7 +244,7 @@ def numbers(name: str, values: Sequence[Any], reasons: dict[int, Reason], first:
     """A column, NaN where there is no number; why, for the first MAX_ERRORS of them, by its place from ``first`` on."""
     column, told = np.empty(len(values)), 0
     for i, value in enumerate(values):
-        column[i], reason = number(name, value, null_is_rigid=False)
+        column[i], reason = number(name, value)
         if reason is not None and told < MAX_ERRORS:
             told += 1
             reasons.setdefault(first + i, (name, reason))

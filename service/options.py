@@ -191,8 +191,7 @@ def kind_in(given: Mapping[str, Any]) -> Kind:
 
 
 def input_fields(
-    optional: Iterable[str] = ("omega", "f", "k", "y0"), null: bool = True, listed: bool = False,
-    shown: Iterable[str] = example,
+    optional: Iterable[str] = ("omega", "f", "k", "y0"), listed: bool = False, shown: Iterable[str] = example
 ) -> Any:  # fmt: skip
     """The inputs as fields of a model; those that are ``shown`` have an example."""
     fields: dict[str, Any] = {}
@@ -200,7 +199,7 @@ def input_fields(
         kind: Any = Positive if LEAST[name] else _Hertz if name == "f" else NotNegative
         entry: Any = float | Literal["rigid"] if name == "k" else float
         kind = kind | Literal["rigid"] if name == "k" else kind
-        kind = kind | None if name in ("omega", "f") or (name == "k" and null) else kind
+        kind = kind | None if name in ("omega", "f") else kind
         more = {"examples": [example[name]]} if name in shown else {}
         default = None if name in optional or name in LIKE else ...
         info = bounded(BOUNDS[name], f"{text} [{unit_of(name)}]", default, **more)
@@ -217,7 +216,7 @@ Five = model("Five", "", **input_fields(INPUTS, shown=[name for name in example 
 CaseColumns = model(
     "CaseColumns", "Cases as columns: lists of one length; a plain number holds for every case.", Options,
     example={**example, "v0": [0.001, 0.01, 0.1], "Fz": [10.0, 20.0, 30.0]},
-    **input_fields(null=False, listed=True, shown=()),
+    **input_fields(listed=True, shown=()),
 )  # fmt: skip
 
 

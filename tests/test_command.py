@@ -43,13 +43,16 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(capsys: Capture
     row = next(line for line in text.splitlines() if line.startswith("mu_macro"))
     assert float(row.split()[1]) == close(expected.mu_macro, rel=1e-14)
     assert "[-]" in row
-    assert f"+- {expected.error_bound:.2g}" in row
+    assert text.splitlines()[-1] == f"numerical error  {expected.error_bound:.2g}"
+    assert "+-" not in text
     for part in (expected.regime, expected.source, surrogate.id):
         assert part in text
     shown, *rows = said(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
     told = [f"model  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
-    assert rows[-len(told) :] == told
+    told = [line.replace("k_range", "k=9e+05..1.1e+06") for line in told]
+    assert rows[-len(told) - 1 : -1] == told
+    assert said(capsys, 0, CASE.replace("k=1e6", "k=9e+05..1.1e+06")).splitlines()[1].startswith("from ")
     assert json.loads(said(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(surrogate, VALUES)
     assert "model" not in json.loads(said(capsys, 0, CASE, "--json"))
 
@@ -64,6 +67,9 @@ def test_a_table_is_picked_by_path_or_tolerance(capsys: Capture, tables_dir: Pat
 
 
 WRONG = {
+    CASE.replace("f=20690", "f=20.69khz"): "f=20.69khz: did you mean 20.69kHz?",
+    CASE.replace("f=20690", "omega=20kHz"): "did you mean f=20kHz? omega is in rad/s",
+    CASE.replace("k=1e6", "k=0.8-1.2N/um"): "write an interval as k=0.8..1.2N/um",
     CASE.replace("Fz", "Fzz"): "unknown input 'Fzz': did you mean Fz?", CASE.replace("k=", "K="): "did you mean k?",
     CASE.replace("k=1e6", "stiffness=1e6"): "did you mean k?", CASE + " Fz=11": "Fz is given twice",
     CASE.replace("k=1e6 ", ""): "missing: k [N/m] (k=rigid for a rigid contact)",
@@ -176,7 +182,7 @@ def test_a_range_of_k_is_told_with_that_of_mu_macro_and_checked(capsys: Capture)
 
 NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
 KINDS: dict[str, tuple[str, Case, Case]] = {
-    "spring": (CASE, {}, {}), "rigid": (CASE.replace("1e6", "rigid"), {}, {"k": None}),
+    "spring": (CASE, {}, {}), "rigid": (CASE.replace("1e6", "rigid"), {}, {"k": "rigid"}),
     "ball": (CASE, {"contact": "ball"}, {}), "along": (CASE, {"direction": "along"}, {}),
     "ball along": (CASE, {"contact": "ball", "direction": "along"}, {}),
     "normal": (NORMAL, {"direction": "normal"}, {"Fz_amplitude": 1.0}),
@@ -227,7 +233,8 @@ def test_law_and_solve_for_know_them_too(capsys: Capture, tmp_path: Path, surrog
         assert [float(row[column]) for row in rows] == getattr(expected, column).tolist()
     assert [row["regime"] for row in rows] == expected.regime.tolist()
     if "k_range" in inputs:
-        assert "one k is needed" in said(capsys, 2, "solve-for", "v0", words, "--target", "0.25", *options)
+        both = json.loads(said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json"))["roots"]
+        assert [root["k"] for root in both][:: len(both) - 1] == list(inputs["k_range"])
         return
     found = json.loads(said(capsys, 0, "solve-for", "v0", words, "--target", "0.29", *options, "--json"))
     for root in found["roots"]:
@@ -327,6 +334,25 @@ def test_bad_points_are_refused(capsys: Capture, tmp_path: Path, text: str, word
     assert all(part in message for part in parts), message
 
 
+def test_a_misspelt_choice_gets_the_one_that_was_meant(capsys: Capture) -> None:
+    assert "invalid choice: 'Ball', did you mean ball?" in ended(capsys, 2, CASE, "--contact", "Ball")
+    assert "choose from" in ended(capsys, 2, CASE, "--contact", "xyz")
+
+
+def test_a_file_in_another_encoding_or_with_an_interval_in_k_gets_a_remedy(capsys: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    pytest.importorskip("pyarrow")
+    path, out = tmp_path / "points.csv", str(tmp_path / "out.csv")
+    path.write_bytes("v0,mu_macro,y0 [µm]\n1,0.2,2\n2,0.21,2\n".encode("cp1252"))
+    assert "line 1 is not in UTF-8; save the file as UTF-8" in said(capsys, 1, "fit", str(path), "Fz=10N", "f=20kHz")
+    path.write_bytes("mu0,Fz,k,y0 [µm],f,v0\n0.3,10,1e6,2,2e4,0.01\n".encode("cp1252"))
+    assert "line 1 is not in UTF-8; save the file as UTF-8" in said(capsys, 1, "eval", str(path), "-o", out)
+    path.write_text("mu0,Fz,k,y0,f,v0\n0.3,10,0.8..1.2,2e-6,2e4,0.01\n")
+    main(["eval", str(path), "-o", out])
+    capsys.readouterr()
+    assert "columns k_low and k_high in a file" in Path(f"{out}.rejects.csv").read_text()
+
+
 def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measured: Any) -> None:
     pytest.importorskip("scipy")
     path, _ = measured
@@ -334,6 +360,23 @@ def test_points_of_a_german_file_are_read(capsys: Capture, tmp_path: Path, measu
     words = (*RIG, "--sep", ";", "--decimal", ",", "--json")
     german = json.loads(said(capsys, 0, "fit", str(tmp_path / "german.csv"), *words))
     assert german["values"] == json.loads(said(capsys, 0, "fit", str(path), *RIG, "--json"))["values"]
+
+
+def test_a_german_file_of_two_columns_gets_advice_that_works(capsys: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    path = tmp_path / "german.csv"
+    path.write_text("v0 [mm/s];mu_macro\n1;0,069\n5;0,174\n20;0,247\n100;0,289\n")
+    words = ("fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz")
+    assert "give --sep ';' --decimal ','" in said(capsys, 1, *words)
+    assert said(capsys, 0, *words, "--sep", ";", "--decimal", ",").startswith("k ")
+
+
+def test_a_fit_takes_mu0_of_each_point(capsys: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    path = tmp_path / "points.csv"
+    path.write_text("v0 [mm/s],mu_macro,mu0\n1,0.069,0.31\n5,0.174,0.305\n20,0.247,0.3\n100,0.289,0.295\n")
+    found = json.loads(said(capsys, 0, "fit", str(path), "Fz=10N", "y0=0.4um", "f=20kHz", "--json"))
+    assert [*found["values"]] == ["k"]
 
 
 PICTURES = {"law": ("law", CASE.replace("v0=0.01", ""), "--along", "v0", "1mm/s", "1m/s"),
@@ -411,12 +454,19 @@ def test_what_stiffness_prints_goes_into_a_command(capsys: Capture, words: Any, 
     found = json.loads(said(capsys, 0, "stiffness", *words, "--json"))
     expected = contact_of(geometry, radius=5e-3, Fz=10.0, E=210e9, nu=0.3, **given)
     assert (found["k"], found["contact"]) == (expected.k, expected.contact)
-    lines = said(capsys, 0, "stiffness", *words).splitlines()
+    lines = said(capsys, 0, "stiffness", *words).partition("\nwarning")[0].splitlines()
     assert lines[-2].split() == ["contact", expected.contact]
     pasted = lines[-1].split()[1:]
     answer = json.loads(said(capsys, 0, CASE.replace("k=1e6", ""), *pasted, "--json"))
     assert answer.get("contact", "spring") == expected.contact
     assert answer["inputs"]["k"] == close(expected.k, rel=1e-3)
+
+
+def test_a_wide_contact_is_told_below_its_stiffness(capsys: Capture) -> None:
+    words = "stiffness", "ball", "--radius", "5mm", "--Fz", "10N", "--nu", "0.3", "--E"
+    assert said(capsys, 0, *words, "1MPa").splitlines()[-1].startswith("warning: the contact's half width 0.00409 m")
+    assert "did you mean 210 GPa?" in said(capsys, 2, *words, "210")
+    assert "warning" not in said(capsys, 0, *words, "210GPa")
 
 
 def test_the_arguments_of_a_stiffness_are_those_of_its_geometry(capsys: Capture) -> None:

@@ -70,7 +70,7 @@ def test_static_and_continuous(table: Surrogate) -> None:
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 0.99, 1.0, 2.0])
 def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones(table: Surrogate, ratio: Any) -> None:
     case = {**CASE, "v0": ratio * CASE["y0"] * CASE["omega"]}
-    rigid = table.evaluate(**{**case, "k": None}, **ALONG, gradient=True)
+    rigid = table.evaluate(**{**case, "k": "rigid"}, **ALONG, gradient=True)
     assert rigid.mu_macro == close(0.3 * 2.0 / math.pi * math.asin(min(ratio, 1.0)), rel=1e-15)
     assert table.evaluate(**{**case, "k": 1e18}, **ALONG).mu_macro == close(
         rigid.mu_macro, abs=1e-6 if ratio < 1.0 else 1e-3
@@ -90,7 +90,7 @@ def test_normal_is_the_master_curve_and_a_marched_spring(table: Surrogate) -> No
     assert {SOURCES[code] for code in source} == {"normal_continuous", "normal_stick_slip"}
     case = {**without(CASE, "y0"), "Fz_amplitude": 4.0}
     assert table.evaluate(**{**case, "v0": 0.0}, **NORMAL).mu_macro == close(0.3 * 0.6, rel=1e-15)
-    assert table.evaluate(**{**case, "k": None}, **NORMAL).mu_macro == 0.3
+    assert table.evaluate(**{**case, "k": "rigid"}, **NORMAL).mu_macro == 0.3
     speed, share, steps, u = 0.05, 0.6, 200_000, 1.0
     limit = 1.0 + share * np.cos(2.0 * np.pi * np.arange(1, steps + 1) / steps)
     rising = speed * 2.0 * np.pi / steps * np.arange(1, steps + 1)

@@ -1,16 +1,21 @@
 """From SI inputs to dimensionless groups: legal values, messages for illegal values, and the ends of the range."""
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mumacro import InputError, Surrogate
-from mumacro.inputs import BOUNDS, FIELDS, POSITIVE
+from mumacro import InputError, Surrogate, fit
+from mumacro.inputs import BOUNDS, FIELDS, POSITIVE, STIFFNESS
+from mumacro.inverse import solve_for
+from mumacro.law import friction_law
+from mumacro.settling import settling
 from tests.cases import CASE, Case, log_uniform, tables, without
 from tests.comparing import close
 
@@ -66,8 +71,8 @@ def test_groups_are_right_whatever_overflows_and_the_answer_is_finite(table: Sur
 
 
 @pytest.mark.parametrize("stillness", [{"y0": 0.0}, {"omega": 0.0}, {"y0": 0.0, "omega": 0.0}, {"y0": 0.0, "v0": 0.0}])
-@pytest.mark.parametrize("k", [1e6, None, 5e-324, 1e308])
-def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: Case, k: float | None) -> None:
+@pytest.mark.parametrize("k", [1e6, "rigid", 5e-324, 1e308])
+def test_no_oscillation_is_coulomb_friction(table: Surrogate, stillness: Case, k: Any) -> None:
     found = table.evaluate(**{**CASE, **stillness, "k": k})
     answer = found.mu_macro, found.mu_ratio, found.error_bound, found.source
     assert answer == (CASE["mu0"], 1.0, 0.0, "no_oscillation")
@@ -93,7 +98,7 @@ def test_no_drive_is_the_static_limit(table: Surrogate, y: float) -> None:
         ({"v0": 1e300, "omega": 1e-300}, 1.0),
         # at rest: y~ overflows, or the contact is rigid
         ({"v0": 0.0, "Fz": 1e-300, "k": 1e300, "y0": 1.0}, 0.0),
-        ({"v0": 0.0, "k": None}, 0.0),
+        ({"v0": 0.0, "k": "rigid"}, 0.0),
     ],
 )
 def test_groups_that_leave_double_precision_have_their_limit(table: Surrogate, inputs: Case, expected: float) -> None:
@@ -136,10 +141,11 @@ def test_illegal_value_is_named_with_field_and_bound(table: Surrogate, field: st
         with pytest.raises(InputError) as caught:
             table.evaluate(given_inputs, gradient=True, illegal="raise")
         error = caught.value
-        assert (error.field, error.index, error.bound) == (field, index, BOUNDS[field])
+        bound = STIFFNESS if field == "k" and math.isnan(bad) else BOUNDS[field]
+        assert (error.field, error.index, error.bound) == (field, index, bound)
         assert repr(error.value) == repr(bad)
         where = "" if index is None else " at index 1"
-        assert str(error) == f"{field}{where} must be {BOUNDS[field]}, got {bad!r}"
+        assert str(error) == f"{field}{where} must be {bound}, got {bad!r}"
         assert isinstance(error, ValueError)
 
 
@@ -183,7 +189,7 @@ def test_zero_is_legal_only_where_documented(table: Surrogate, field: str) -> No
 @pytest.mark.parametrize("field", FIELDS)
 def test_every_input_must_be_given(table: Surrogate, field: str) -> None:
     rest = without(CASE, field)
-    said = {"omega": r" or f \[Hz\]", "k": ".*None for rigid contact"}.get(field, "")
+    said = {"omega": r" or f \[Hz\]", "k": ': .*"rigid" or math.inf'}.get(field, "")
     for cases, keywords in (((), rest), ((rest,), {})):
         with pytest.raises(InputError, match=f"^{field} must be given{said}"):
             table.evaluate(*cases, **keywords)
@@ -222,8 +228,8 @@ def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> Non
         table.evaluate(**CASE, illegal="ignore")
 
 
-def test_rigid_is_given_as_none_or_infinity_in_numbers_and_in_arrays(table: Surrogate) -> None:
-    expected = table.evaluate(**{**CASE, "k": None})
+def test_rigid_is_given_as_the_word_or_infinity_in_numbers_and_in_arrays(table: Surrogate) -> None:
+    expected = table.evaluate(**{**CASE, "k": "rigid"})
     assert expected.source == "rigid"
     assert table.evaluate(**{**CASE, "k": math.inf}).mu_macro == expected.mu_macro
     elastic = table.evaluate(**CASE)
@@ -237,10 +243,25 @@ def test_rigid_is_given_as_none_or_infinity_in_numbers_and_in_arrays(table: Surr
     assert worded.source.tolist() == ["rigid", elastic.source, ""]
 
 
-@pytest.mark.parametrize("gap", [None, "", "much"])
-def test_a_gap_in_a_list_is_no_rigid_contact(table: Surrogate, gap: Any) -> None:
-    with pytest.raises(InputError, match=r"^k must be a real number"):
-        table.evaluate(**{**CASE, "k": ["rigid", gap]})
+@pytest.mark.parametrize("gap", [None, math.nan, "", "much", ["rigid", None], ["rigid", ""], [1e6, "much"]])
+def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap: Any) -> None:
+    told = '^k must be a number > 0 .*"rigid" or math.inf'
+    rest = without(CASE, "k", "v0")
+    asked: list[Callable[[], Any]] = [
+        lambda: table.evaluate(**{**CASE, "k": gap}),
+        lambda: table.evaluate({**CASE, "k": gap}),
+        lambda: settling(table, **{**CASE, "k": gap}),
+        lambda: friction_law(table, "v0", np.array([1e-3, 1e-2]), {**rest, "k": gap}),
+        lambda: solve_for(table, "v0", 0.2, {**rest, "k": gap}),
+        lambda: fit({"v0": [0.01, 0.02], "mu_macro": [0.2, 0.2]}, "mu0", k=gap, **without(rest, "mu0")),
+    ]
+    for ask in asked[: 2 if isinstance(gap, list) else None]:
+        with pytest.raises(InputError, match=told):
+            ask()
+    series = pd.Series([0.01, 0.02])
+    if gap is None:
+        with pytest.raises(InputError, match=told):
+            table.evaluate(**{**CASE, "k": gap, "v0": series})
 
 
 def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate) -> None:

@@ -67,6 +67,39 @@ def test_inputs_lie_within_their_covariance(surrogate: Surrogate, contact: Any, 
     assert np.all((low <= intervals) & (intervals <= high))
 
 
+def test_the_variance_is_that_of_the_scatter_over_the_degrees_of_freedom(surrogate: Surrogate) -> None:
+    mu = [0.28, 0.31, 0.3, 0.29]  # without oscillation mu_macro is mu0: its mean, and the deviation of a mean
+    found = fit({"v0": np.ones(4), "mu_macro": mu}, "mu0", k=1e6, **{**RIG, "y0": 0.0})
+    assert found.values["mu0"] == close(np.mean(mu), rel=1e-8)
+    assert found.std["mu0"] == close(np.std(mu, ddof=1) / 2.0, rel=1e-8)
+    both = fit({"v0": V0[::4], "mu_macro": noisy(surrogate, 3e-3, v0=V0[::4])}, **RIG)
+    case: Case = {**both.values, **RIG, "v0": V0[::4]}
+    slopes: Any = surrogate.evaluate(case, gradient=True).gradient
+    rows = np.stack([slopes["k"], slopes["mu0"]])
+    assert both.covariance == close(both.chi2 / (5 - 2) * np.linalg.inv(rows @ rows.T), rel=1e-6)
+
+
+def test_exact_points_that_hardly_tell_k_give_it(surrogate: Surrogate) -> None:
+    rig: Case = {"Fz": 10.0, "y0": 0.004 * 3.0 / 3e4, "f": 20e3}  # y~ = 0.004
+    v0 = np.geomspace(1e-3, 3.0, 20) * 1e-4 * 2.0 * math.pi * 20e3
+    asked: list[tuple[str, Case]] = [("k mu0", {}), ("k", {"mu0": 0.3})]
+    for names, known in asked:
+        mu = np.asarray(surrogate.evaluate(mu0=0.3, k=3e4, v0=v0, **rig).mu_macro)
+        found = fit({"v0": v0, "mu_macro": mu}, names.split(), **{**rig, **known})
+        assert found.values["k"] == close(3e4, rel=1e-7)
+        assert found.interval["k"][0] <= 3e4 <= found.interval["k"][1]
+
+
+def test_mu0_may_be_known_at_each_point(surrogate: Surrogate) -> None:
+    mu0 = np.linspace(0.35, 0.25, V0.size)
+    points = {"v0": V0, "mu0": mu0, "mu_macro": friction(surrogate, v0=V0, mu0=mu0)}
+    for unknowns in (None, "k"):
+        assert fit(points, unknowns, **RIG).values == {"k": close(1e6, rel=1e-8)}
+    for name, both in (("mu0", ["mu0"]), ("k", ["k", "mu0"]), ("k", ["k"])):
+        with pytest.raises(InputError, match=f"{name} must be left out, or taken from unknowns"):
+            fit({**points, "k": 1e6}, both, **RIG)
+
+
 @pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize("k", [2e5, 1e6, 1e7])
 def test_points_without_noise_give_the_inputs(surrogate: Surrogate, contact: Any, k: Any) -> None:
@@ -126,7 +159,7 @@ def test_stiff_contacts_have_a_lower_bound_only_soft_ones_an_upper_one(surrogate
     low, high = stiff.interval["k"]
     assert 1e7 < low < 1e9 < high == math.inf
     assert stiff.interval["mu0"][0] < 0.3 < stiff.interval["mu0"][1]
-    rigid = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0, k=None)}, **RIG)
+    rigid = fit({"v0": V0, "mu_macro": friction(surrogate, v0=V0, k=math.inf)}, **RIG)
     assert rigid.values == {"k": math.inf, "mu0": close(0.3, rel=1e-9)}
     assert rigid.std["k"] == rigid.interval["k"][1] == math.inf
     soft, large = measured(1e3), measured(5e7, 1e-4)
@@ -149,6 +182,10 @@ def test_all_solutions_are_found(surrogate: Surrogate) -> None:
         found = fit({"v0": [v0], "mu_macro": [target], **std}, "k", mu0=0.3, **RIG)
         assert sorted(one["k"] for one in found.solutions) == [close(one, rel=1e-3) for one in expected]
         assert any("3 solutions" in text for text in found.warnings)
+    for draw in np.random.default_rng(0).normal(scale=1e-5, size=10):  # any of which may be the truth
+        found = fit({"v0": [v0], "mu_macro": [target + draw], "std": 1e-5}, "k", mu0=0.3, **RIG)
+        assert found.interval["k"][0] < expected[0] < expected[-1] < found.interval["k"][1]
+        assert any("3 solutions fit within 95 %, the interval covers them all" in text for text in found.warnings)
     # with the scatter of a usual measurement the three are one
     assert len(fit({"v0": [v0], "mu_macro": [target], "std": 0.02}, "k", mu0=0.3, **RIG).solutions) == 1
 

@@ -84,7 +84,7 @@ def test_it_answers_and_goes_on_when_its_host_is_gone(open_page: Any, folder: Pa
     page.type("#field-v0", "200 mm/s")
     assert page.number() == page.rounded(table.evaluate(**{**START, "v0": 0.2}).mu_macro)
     page.click("#rigid")
-    assert page.number() == page.rounded(table.evaluate(**{**START, "k": None, "v0": 0.2}).mu_macro)
+    assert page.number() == page.rounded(table.evaluate(**{**START, "k": "rigid", "v0": 0.2}).mu_macro)
     page.choose("#along", "y0")
     assert "at y₀ = " in page.find("#law").get_attribute("aria-label")
     assert page.text("#law-status") == page.text("#status") == ""

@@ -20,7 +20,7 @@ def run(heading: str, *needs: str) -> dict[str, Any]:
     for package in needs:
         pytest.importorskip(package)
     section = PAGE.split(f"# {heading}\n")[1].split("\n##")[0]
-    names: dict[str, Any] = {"__name__": "recipe"}
+    names: dict[str, Any] = {"__name__": "__main__"}  # as a script
     for block in re.findall(r"^```python\n(.*?)^```$", section, re.MULTILINE | re.DOTALL):
         exec(compile(block, heading, "exec"), names)  # noqa: S102 (our own page)
     return names

@@ -87,7 +87,7 @@ def test_layers_at_the_largest_amplitudes_depend_on_one_number(table: Surrogate,
 
 def test_a_ratio_beyond_double_range_is_bounded(table: Surrogate) -> None:
     """y0 omega/v0 beyond double range: eq. (35) is 2.5e-306 there, not 0."""
-    case: Case = {"mu0": 1.0, "Fz": 1.0, "k": None, "y0": 1.7976931348623157e308, "v0": 1e160}
+    case: Case = {"mu0": 1.0, "Fz": 1.0, "k": "rigid", "y0": 1.7976931348623157e308, "v0": 1e160}
     inside, beyond = (table.evaluate(**case, omega=omega) for omega in (1e160, np.nextafter(1e160, 1e161)))
     assert inside.mu_ratio > 2.5e-306
     assert abs(inside.mu_ratio - beyond.mu_ratio) <= inside.error_bound + beyond.error_bound

@@ -63,6 +63,17 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
     assert "no influence" in result["reason"]
 
 
+def test_both_ends_of_an_interval_of_k_are_solved_for(client: Any) -> None:
+    rest = {name: value for name, value in SOLVE.items() if name != "k"}
+    whole = answered(client, "solve-for", {**rest, "k_range": [8e5, 1.25e6]})
+    for k, one in zip((8e5, 1.25e6), whole.pop("ends"), strict=True):
+        alone = answered(client, "solve-for", {**rest, "k": k})
+        assert one == {"k": k, **{name: alone[name] for name in ("results", "range", "reachable")}}
+    assert whole["results"][0]["roots"][0]["value"] == close(
+        answered(client, "solve-for", {**rest, "k": 1e6})["results"][0]["roots"][0]["value"], rel=1e-9
+    )
+
+
 def test_folded_roots_are_all_returned_within_the_range(client: Any) -> None:
     request = {**SOLVE, "unknown": "k", "target": 0.3 * 0.0023, "v0": 1e-4, "y0": CASE["y0"], "k": None}
     values = [root["value"] for root in answered(client, "solve-for", request)["results"][0]["roots"]]
@@ -136,11 +147,20 @@ BODIES = [
 ]  # fmt: skip
 
 
+def test_a_wide_contact_is_told_with_its_stiffness(client: Any) -> None:
+    soft = {"geometry": "ball", "radius": 5e-3, "Fz": 10.0, "nu": 0.3}
+    (told,) = answered(client, "stiffness", {**soft, "E": 1e6})["warnings"]
+    assert "0.82 of the radius" in told
+    refused = client.post("/v1/stiffness", json={**soft, "E": 210})
+    assert refused.status_code == 422
+    assert "did you mean 210 GPa?" in refused.text
+
+
 @pytest.mark.parametrize(("geometry", "given"), BODIES)
 def test_a_stiffness_is_the_librarys(client: Any, geometry: Any, given: Any) -> None:
     found = contact_of(geometry, **STEEL, **{name: np.inf if x == "rigid" else x for name, x in given.items()})
     answer = answered(client, "stiffness", {"geometry": geometry, **STEEL, **given})
-    assert answer == {"geometry": geometry, **vars(found), "api_version": "1"}
+    assert answer == {"geometry": geometry, **vars(found), "warnings": [], "api_version": "1"}
 
 
 def test_a_fit_is_the_librarys(client: Any, surrogate: Surrogate) -> None:

@@ -27,6 +27,9 @@ REFUSED = [
     # names
     ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
     ("GET mu-macro", {"k": ...}, "?k", "rigid"),
+    *((f"POST {path}", {"k": None}, "#/k", "is missing; write rigid or a number") for path in ("mu-macro", "law")),
+    ("POST solve-for", {"k": None}, "#/k", "is missing; write rigid or a number"),
+    ("POST fit", {"k": None, "unknowns": ["mu0"]}, "#/k", "is missing; write rigid or a number"),
     ("POST mu-macro", {"v0": ...}, "#/v0", "is required"),
     ("POST mu-macro", {"omega": ...}, "#/omega", "is required: omega [rad/s], or f [Hz]"),
     ("POST mu-macro", {"f": 1.0}, "#/f", "exactly one of omega"),
@@ -115,7 +118,6 @@ REFUSED = [
         ("mu0", ..., "is required"), ("target", [], "a list of 1 to 10000"), ("target", [0.1] * 10_001, "10000"),
         ("Fz", 0, "finite and > 0"), ("Fz", "10", "must be a number"), ("range", [1], "two numbers"),
         ("range", [2, 1], "ascending"), ("extra", 1, "unknown"), ("omega", -1, "finite and >= 0"))),
-    ("POST solve-for", RANGE, "#/k_range", "solve for both ends"),
     ("POST solve-for", {"target": -0.1}, "#/target/0", "finite and >= 0"),
     *(("POST solve-for", {"target": [0.1, value]}, "#/target/1", "must be a number") for value in ("0.1", True)),
     ("POST solve-for", {"range": [0, -1]}, "#/range/1", "finite and >= 0"),

@@ -80,12 +80,22 @@ def test_any_disturbance_is_gone_in_time(surrogate: Surrogate, v: Any, y: Any) -
     ("changed", "periods"),
     [
         ({"v0": 0.0}, math.inf), ({"v0": 0.0, "y0": 0.0}, math.inf), ({"v0": 0.0, "omega": 0.0}, math.inf),
-        ({"k": None, "v0": 0.0, "y0": 0.0}, math.inf), ({"k": None}, 0.0), ({"k": math.inf}, 0.0),
+        ({"k": "rigid", "v0": 0.0, "y0": 0.0}, math.inf), ({"k": "rigid"}, 0.0), ({"k": math.inf}, 0.0),
     ],
 )  # fmt: skip
 def test_without_slip_nothing_settles_and_rigid_at_once(surrogate: Surrogate, changed: Any, periods: Any) -> None:
     found = settling(surrogate, **{**CASE, **changed})
     assert (found.periods, found.time, found.slip_path) == (periods, periods, 0.0 if periods else math.inf)
+
+
+def test_the_frequency_may_be_f(surrogate: Surrogate) -> None:
+    rest = {name: value for name, value in CASE.items() if name != "omega"}
+    expected = settling(surrogate, **rest, omega=2.0 * math.pi * 2e4)
+    assert settling(surrogate, **rest, f=2e4) == expected
+    wrong: list[Any] = [{}, {"f": 2e4, "omega": 1e5}]
+    for told in wrong:
+        with pytest.raises(InputError, match="omega must be given or f"):
+            settling(surrogate, **rest, **told)
 
 
 def test_without_oscillation_the_drag_decides(surrogate: Surrogate) -> None:

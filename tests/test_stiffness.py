@@ -1,5 +1,6 @@
 """Contact stiffness: the textbook's relations, the ellipse by brute force, bounds, the list of geometries."""
 
+import functools
 import inspect
 import itertools
 import math
@@ -33,7 +34,7 @@ def test_the_ball_follows_hertz() -> None:
     assert found.k_normal == close(2.0 * modulus * math.sqrt(5e-3 * depth), rel=1e-13)
     assert found.pressure * 2.0 / 3.0 * math.pi * found.half_width**2 == close(10.0, rel=1e-13)
     assert ball_on_flat(5e-3, 80.0, STEEL, RIGID).k == close(2.0 * found.k, rel=1e-13)
-    soft, alone = (ball_on_flat(1e-2, 1.0, RUBBER, other).k for other in (STEEL, RIGID))
+    soft, alone = (ball_on_flat(1e-2, 0.5, RUBBER, other).k for other in (STEEL, RIGID))
     assert soft == close(alone, rel=1e-3)  # the soft body decides
 
 
@@ -105,6 +106,9 @@ def test_stiffness_has_its_scaling_laws_and_adds_in_series() -> None:
         ("oscillation", cylinder_on_flat, (1.0, 1.0, 1.0, STEEL, STEEL, "axial")),
         ("length", cylinder_on_flat, (1.0, 1e-6, 1e3, STEEL, STEEL, "across")),
         ("radius", flat_punch, (0.0, 1.0, STEEL, STEEL)), ("stiffness", in_series, (1.0, -1.0)),
+        ("stiffnesses", in_series, ()), ("stiffness", in_series, ("1e6",)), ("E", Material, ("210 GPa", 0.3)),
+        ("nu", Material, (1e9, "0.3")), ("radius", ball_on_flat, ("5mm", 1.0, STEEL, STEEL)),
+        ("Fz", flat_punch, (1.0, "10N", STEEL, STEEL)), ("second", ball_on_flat, (1.0, 1.0, STEEL, "steel")),
         ("mu0", Contact(1.0, 1.0, 1.0, 1.0).length_scale, (0.0, 1.0)),
     ],
 )  # fmt: skip
@@ -112,6 +116,36 @@ def test_a_bad_value_is_named(field: str, function: Any, arguments: Any) -> None
     with pytest.raises(InputError) as caught:
         function(*arguments)
     assert caught.value.field == field
+
+
+def test_hertz_wants_a_small_contact() -> None:
+    shapes: list[tuple[Any, Any]] = [(ball_on_flat, ()), (cylinder_on_flat, ("across",))]
+    for function, more in shapes:
+        length = (1.0,) if more else ()
+        for share in (0.099, 0.101, 0.99, 1.01):
+            # of a half width that is proportional to a power of Fz
+            one: Any = function(5e-3, *length, 1e-4, RUBBER, RIGID, *more)
+            Fz = 1e-4 * (share * 5e-3 / one.half_width) ** (2 if more else 3)
+            ask = functools.partial(function, 5e-3, *length, Fz, RUBBER, RIGID, *more)
+            if share > 1.0:
+                with pytest.raises(InputError, match=r"radius must be >= 0.00505, the half width of the contact"):
+                    ask()
+            elif share > 0.1:
+                with pytest.warns(UserWarning, match=f"is {share:.2g} of the radius: Hertz's theory holds well below"):
+                    assert len(ask().warnings) == 1
+            else:
+                assert ask().warnings == ()
+
+
+@pytest.mark.parametrize("second", [{}, {"E2": math.inf}])
+@pytest.mark.parametrize("shape", [("ball", {}), ("cylinder", {"length": 5e-3, "oscillation": "across"})])
+def test_forgotten_gigapascals_are_told(second: Any, shape: tuple[str, Any]) -> None:
+    given = {"radius": 5e-3, "Fz": 10.0, "E": 210, "nu": 0.3, **second, **shape[1]}
+    with pytest.raises(InputError, match=r"^E must be in pascals: did you mean 210 GPa\?"):
+        contact_of(shape[0], **given)
+    assert contact_of(shape[0], **{**given, "E": 210e9}).warnings == ()
+    with pytest.raises(InputError, match=r"^radius must be"):  # GPa do not explain it
+        contact_of(shape[0], **{**given, "E": 210, "Fz": 1e12})
 
 
 # --- geometries by name -----------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.dataset
 
 from mumacro.files.answering import FilesError
-from mumacro.tabular import read_head
+from mumacro.tabular import NO_UTF8, read_head
 
 FORMATS = {".parquet": "parquet", ".csv": "csv", ".ndjson": "ndjson", ".jsonl": "ndjson"}
 ENDINGS = f"{', '.join(FORMATS)} (text also .gz)"
@@ -187,7 +187,9 @@ def _head(path: Path, sep: str, decimal: str) -> list[str]:
     first, *rows = [*islice(_Lines(path), 51)] or [b""]
     try:
         cells = read_head(first.decode("utf-8-sig"), [row.decode("utf-8", "replace") for row in rows], sep, decimal)
-    except ValueError as error:  # also of UTF-8
+    except UnicodeDecodeError:
+        raise FilesError(f"{path}: line 1 {NO_UTF8}") from None
+    except ValueError as error:
         raise FilesError(f"{path}: line 1: {error}") from None
     return ["\ufeff" * (first[:3] == b"\xef\xbb\xbf") + cells[0], *cells[1:]]
 

@@ -4,7 +4,6 @@ The inputs of one call come from one of these libraries, with plain numbers and 
 """
 
 import importlib
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -52,7 +51,7 @@ def evaluate_labelled(
     error_bound and source (regime and source of pandas as categories).  InputError for Series whose indexes differ,
     objects of two libraries in one call, and what ``evaluate`` refuses.
     """
-    given = {name: math.inf if name == "k" and value is None else value for name, value in inputs.items()}
+    given = dict(inputs)
     kinds = {name: type(value).__module__.partition(".")[0] for name, value in {"": cases, **given}.items()}
     libraries = set(kinds.values()) & set(_APPLY)
     if "pandas" in libraries and len(libraries) > 1:

@@ -48,6 +48,8 @@ class Solution:
     roots: tuple[tuple[Root, ...], ...]  #: of each target, ascending; empty where it is not reachable
     reach: Reach  #: what is reachable in the range that was searched
     constant: bool  #: True when the unknown has no influence on mu_macro, such as v0 without oscillation
+    #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and its highest value
+    ends: tuple["Solution", "Solution"] | None = None
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Crossing:
 def checked_case(case: Mapping[str, Any], without: str, kind: Kind = SPRING) -> dict[str, float]:
     """The five known inputs [SI], each one legal number, by the names of ``kind.fields``; an infinite ``k`` is rigid.
 
-    ``f`` [Hz] may stand for ``omega`` [rad/s], None or the word ``rigid`` for an infinite ``k``.
+    ``f`` [Hz] may stand for ``omega`` [rad/s], the word ``rigid`` for an infinite ``k``.
     """
     if without not in kind.fields:
         raise InputError("unknown", without, f"one of {', '.join(kind.fields)}")

@@ -37,6 +37,7 @@ from mumacro.arrays import Array, Bools, Places
 from mumacro.contact import AMPLITUDE, kind_of
 from mumacro.errors import InputError
 from mumacro.inputs import POSITIVE
+from mumacro.interval import without_interval
 from mumacro.inverse.results import Crossing, Reach, Root, Solution, checked_case
 from mumacro.inverse.rootfinding import TINY, Curve, Sweep, curves_between, last_double, samples
 from mumacro.surrogate import Surrogate
@@ -57,7 +58,7 @@ _Y_CLOSEST = 1.290791
 
 
 def solve_for(
-    surrogate: Surrogate, unknown: str, targets: ArrayLike, case: Mapping[str, float | None],
+    surrogate: Surrogate, unknown: str, targets: ArrayLike, case: Mapping[str, Any],
     within: tuple[float, float] | None = None, *, contact: str = "spring", direction: str = "across",
 ) -> Solution:  # fmt: skip
     """Every value of one input at which mu_macro has the wanted value.
@@ -70,7 +71,8 @@ def solve_for(
     targets : array_like
         Wanted mu_macro [-], >= 0, shape (n,) or a scalar.
     case : mapping
-        The other five inputs [SI]; ``k`` None is rigid contact; ``f`` [Hz] may stand for ``omega``.
+        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand for ``omega``;
+        ``k_range``, lowest and highest stiffness, for ``k``: see :attr:`Solution.ends`.
     within : (float, float), optional
         Search range [SI].  Left out: everywhere for v0, y0, omega and Fz_amplitude (below Fz); for k, Fz and mu0 from
         where the contact is so soft that it does not matter to where it is as good as rigid.
@@ -80,7 +82,7 @@ def solve_for(
     Raises
     ------
     InputError
-        A value out of bounds, an unknown that is given or does not exist, an invalid range, an interval of k.
+        A value out of bounds, an unknown that is given or does not exist, an invalid range.
 
     Examples
     --------
@@ -91,6 +93,13 @@ def solve_for(
     [['2.8570e-06 m'], []]
     """
     kind = kind_of(contact, direction)
+    case, interval = without_interval(case, unknown)
+    if interval:
+        softest, middle, stiffest = (
+            solve_for(surrogate, unknown, targets, {**case, "k": k}, within, contact=contact, direction=direction)
+            for k in (interval["k_low"], case["k"], interval["k_high"])
+        )
+        return replace(middle, ends=(softest, stiffest))
     sweep = Sweep(surrogate, checked_case(case, unknown, kind), unknown, kind)
     wanted = np.asarray(targets, dtype=np.float64).ravel()
     bad = np.flatnonzero(~(np.isfinite(wanted) & (wanted >= 0.0)))
@@ -118,7 +127,7 @@ def solve_for(
 
 
 def border_crossings(
-    surrogate: Surrogate, along: str, case: Mapping[str, float | None], low: float, high: float, *,
+    surrogate: Surrogate, along: str, case: Mapping[str, Any], low: float, high: float, *,
     contact: str = "spring", direction: str = "across",
 ) -> tuple[Crossing, ...]:  # fmt: skip
     """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends, ascending.

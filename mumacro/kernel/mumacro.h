@@ -3,7 +3,7 @@
  *     #include "mumacro.h"
  *     mumacro_answer a;
  *     int error = mumacro_evaluate(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01, &a);
- *     if (error) puts(mumacro_error_text(error)); else printf("%.6f +- %.1e\n", a.mu_macro, a.error_bound);
+ *     if (error) puts(mumacro_error_text(error)); else printf("%.6f, numerical error %.1e\n", a.mu_macro, a.error_bound);
  *
  * C99 and C++17; of the mathematical library only sqrt and fabs.  No memory is taken, nothing is stored between calls,
  * any thread may call; a call needs up to 100 kB of stack.  Infinities and NaN are needed: no -ffast-math.

@@ -127,14 +127,14 @@ class Asking(NamedTuple):
     @classmethod
     def made(
         cls, tables: Tables, model: Any, given: Mapping[str, Any], left_out: Sequence[str] = (),
-        null_is_rigid: bool = True, one: bool = False,
+        one: bool = False,
     ) -> "Asking":  # fmt: skip
         """Check what is given; ``left_out`` are the inputs that are asked for, of which a null says the same."""
         form, rest, faults = options_of(model, given)
         if left_out:
             rest = {name: value for name, value in rest.items() if value is not None or name not in left_out}
         asked = asked_of(rest, form.kind if form is not None else kind_in(given))
-        values, more = checked(rest, left_out, null_is_rigid, names_in(model)[1], asked)
+        values, more = checked(rest, left_out, names_in(model)[1], asked)
         if form is None or more:
             refuse([*faults, *more])
         return cls(tables.pick(form.tolerance), form, values, form.wanted(asked, one))

@@ -169,7 +169,7 @@ class _Answer(Response):
         """The answer to one case of a stream, where a null is a gap."""
         if not isinstance(given, dict):
             refuse([FieldFault((), "must be an object or a list of rows", given)])
-        table, _, case, wanted = Asking.made(self._app.tables, Options, self._both(given), null_is_rigid=False)
+        table, _, case, wanted = Asking.made(self._app.tables, Options, self._both(given))
         values, source = answer_case(table.surrogate, case, wanted)
         self._app.metrics.case(table, source)
         return dump({**values, **table.signature})

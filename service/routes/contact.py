@@ -66,7 +66,7 @@ StiffnessAnswer = model(
     k_normal=told(float, "Normal stiffness [N/m]"),
     half_width=told(float, "Radius of a circular contact, half width of a line contact [m]"),
     pressure=told(float, "Largest pressure [Pa]: Hertz's, or the mean one under a flat punch"),
-    contact=ContactName, api_version=str,
+    contact=ContactName, warnings=told(many(str), "Where the theory behind k is off"), api_version=str,
 )  # fmt: skip
 
 
@@ -90,7 +90,8 @@ async def post_fit(request: Request) -> Response:
     """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word rigid."""
     given = await given_in_body(request)
     form, points, faults = options_of(FitOptions, given)
-    columns = {name: _column(name, value, faults) for name, value in points.items() if value is not None}
+    gap = "k" if form is not None and "k" not in form.unknowns else ""  # which null is in it; elsewhere it says nothing
+    columns = {n: _column(n, value, faults) for n, value in points.items() if value is not None or n == gap}
     if form is not None:
         told = stranger("y0", Asked(form.kind), ())
         wrong = {"y0" if form.kind.normal else AMPLITUDE: told}
@@ -154,7 +155,7 @@ def _curve(fit: Fit) -> dict[str, Any] | None:
 
 _Numbers = Annotated[list[float], Field(min_length=1, max_length=MAX_POINTS)]
 _Stiffness = float | Literal["rigid"] | None
-_inputs = input_fields(INPUTS, null=False, listed=True, shown=())
+_inputs = input_fields(INPUTS, listed=True, shown=())
 _columns = {name: _inputs[name] for name in NAMES} | {
     "k": (Positive | Literal["rigid"] | _Numbers | None, _inputs["k"][1]),  # the word stands alone
     "v0": told(Positive | _Numbers, "Sliding velocity of each point [m/s]"),

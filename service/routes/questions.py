@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -133,12 +134,24 @@ def post_solve_for(found: Asking) -> Response:
     (table, form, case, wanted), (name, per) = found, field_of(found.form.unknown)
     unit = case["mu0"] if form.quantity == "mu_ratio" else 1.0
     within = (form.range[0] * per, form.range[1] * per) if form.range is not None else None
-    if wanted.asked.interval:  # which is refused, by the name that the user gave
-        case = {**case, "k_range": (case["k_low"], case["k_high"])}
     solution = solve_for(
         table.surrogate, name, [x * unit for x in form.target], case, within, **wanted.asked.kind.names
     )
-    reach, more = solution.reach, iter(_included(found, name, solution))
+    answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity}
+    answer |= _results(form, solution, _included(found, name, solution), unit, per)
+    if solution.ends:
+        ks = case["k_low"], case["k_high"]
+        answer["ends"] = [
+            {"k": k, **_results(form, end, None, unit, per)} for k, end in zip(ks, solution.ends, strict=True)
+        ]
+    return Reply(dump({**answer, **table.signature}))
+
+
+def _results(
+    form: SolveForOptions, solution: Solution, included: list[dict[str, Any]] | None, unit: float, per: float
+) -> dict[str, Any]:
+    """The roots of every target, what was searched, and what is reachable there."""
+    reach, more = solution.reach, itertools.repeat({}) if included is None else iter(included)
     results: list[dict[str, Any]] = []
     for target, roots in zip(form.target, solution.roots, strict=True):
         in_unit = [root._replace(value=root.value / per, low=root.low / per, high=root.high / per) for root in roots]
@@ -149,9 +162,8 @@ def post_solve_for(found: Asking) -> Response:
         "min": reach.mu_min / unit, "max": reach.mu_max / unit,
         "min_included": reach.min_included, "max_included": reach.max_included,
     }  # fmt: skip
-    answer = {"unknown": form.unknown, "unit": unit_of(form.unknown), "quantity": form.quantity, "results": results}
     searched = [reach.low / per, None if reach.high > _NO_LIMIT else reach.high / per]
-    return Reply(dump({**answer, "range": searched, "reachable": reachable, **table.signature}))
+    return {"results": results, "range": searched, "reachable": reachable}
 
 
 def _included(found: Asking, unknown: str, solution: Solution) -> list[dict[str, Any]]:
@@ -213,10 +225,14 @@ Reachable = model(
     "Reachable", "Range of mu_macro for all values of the unknown in its range.", min=float, max=float,
     min_included=told(bool, "false: approached, never reached"), max_included=bool,
 )  # fmt: skip
+_solved: dict[str, Any] = {
+    "results": told(many(TargetAnswer), "One per target, in order"),
+    "range": told(list[float | None], "The searched range [SI]; null: without limit"), "reachable": Reachable,
+}  # fmt: skip
+SolveForEnd = model("SolveForEnd", "The same for one end of an interval of k.", k=told(float, "[N/m]"), **_solved)
 SolveForAnswer = model(
     "SolveForAnswer", "Answer to the inverse problem.", Answered, unknown=Name, unit=str, quantity=_Quantity,
-    range=told(list[float | None], "The searched range [SI]; null: without limit"), reachable=Reachable,
-    results=told(many(TargetAnswer), "One per target, in order"),
+    **_solved, ends=optional(many(SolveForEnd), "Only with k_range: for k_low and k_high; the rest is for the middle"),
 )  # fmt: skip
 ENDPOINTS = [
     Endpoint("/v1/law", "POST", post_law, "mu_macro over a range of one input", LawRequest, LawAnswer),

@@ -181,7 +181,7 @@ def _rows(found: list[Any], max_batch: int, kind: ContactKind) -> Columns:
     reasons: dict[int, Reason] = {}
     for i, row in enumerate(found):
         if isinstance(row, dict):
-            values, faults = checked(row, null_is_rigid=False, known=names, asked=asked)
+            values, faults = checked(row, known=names, asked=asked)
             if not faults:
                 six[:, i] = [values[name] for name in fields]
                 continue

@@ -144,9 +144,10 @@ export function stiffness(use) {
       return [name, word ? text.trim().toLowerCase() : within(name, () => readQuantity(name, text, unit)).low];
     });
     return { geometry, Fz: valueOf(state, "Fz"), ...Object.fromEntries(entries) };
-  }, ({ k, contact }, { Fz }) => {
+  }, ({ k, contact, warnings }, { Fz }) => {
     const model = contact === "ball" ? "ball (Hertz)" : "one spring";
-    const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}`;
+    const said = (warnings ?? []).map((text) => `. Warning: ${text}`).join("");
+    const told = `k = ${inUnit("k", k)} at Fz = ${inUnit("Fz", Fz)}; contact: ${model}${said}`;
     list("stiffness-result", [[told, { k }, 6, about.knows.includes("contact") ? { contact } : {}]], use);
   });
 }

@@ -85,7 +85,10 @@ function showAnswer({ asked, ...found }) {
   $("regime").textContent = inWords(found.regime);
   $("interval").textContent = wide ? `${friction(low, width)} to ${friction(high, width)} for k = ${k.text}` : "";
   $("model").textContent = `Model: ${kind}, ${about.choices.direction[direction]}; not compared with measured points.`;
-  $("rows").replaceChildren(...(found.model ?? []).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
+  const rows = found.model ?? [];
+  const units = rows.find(({ row }) => row === "units"); // beside the number: it is probably wrong
+  $("units").textContent = units ? `Check the units: ${units.text}` : "";
+  $("rows").replaceChildren(...rows.filter((one) => one !== units).map(({ row, text }) => make("li", {}, `${row}: ${text}.`)));
   list("values", {
     "µ/µ₀": all ? friction(found.mu_ratio, bound / valueOf(asked, "mu0"), 15) : show(found.mu_ratio, 4),
     "static µ (v₀ → 0)": show(limits.mu_static, 4),
@@ -97,7 +100,7 @@ function showAnswer({ asked, ...found }) {
     "ṽ = v₀/(l₀ω)": group(groups.v_tilde), [normal ? "ỹ = ΔFz/Fz" : "ỹ = y₀/l₀"]: group(groups.y_tilde),
   });
   list("origin", {
-    "error bound of µ": bound === null ? "not known" : `± ${show(bound, 2)}`, "answered by block": found.source,
+    "numerical error of µ": bound === null ? "not known" : `≤ ${show(bound, 2)}`, "answered by block": found.source,
     "of table": `${found.table.id}, tolerance ${show(found.table.tolerance)}`,
   });
   showBars(found, asked);
