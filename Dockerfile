@@ -28,7 +28,7 @@ RUN find venv -type d \( -name tests -o -name test \) -path '*/site-packages/*' 
 # Sources and headers for compilers, and stubs for type checkers.
     && find venv -type f \( -name '*.[ach]' -o -name '*.cpp' -o -name '*.hpp' -o -name '*.p[xy][xdi]' \) -delete \
 # Builders of Fortran and C extensions, which nothing here calls.
-    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/lib/python3*/site-packages/numpy/distutils \
+    && rm -rf venv/lib/python3*/site-packages/numpy/f2py venv/lib/python3*/site-packages/numpy/distutils venv/bin/f2py \
 # Symbols for debuggers, where the build image has binutils.  Not of *.libs, which were edited after linking.
     && if command -v strip >/dev/null; then \
         find venv -name '*.so' -not -path '*.libs/*' -exec strip --strip-unneeded {} +; fi \
@@ -40,10 +40,12 @@ COPY service service
 COPY tables tables
 COPY hatch_build.py pyproject.toml /build/
 COPY mumacro/kernel /build/mumacro/kernel
-# The kernel holds code for several processors and chooses when it is loaded: the image also runs on other machines than
-# the one that built it.  Every user of the container may read all files, whatever the umask of the checkout; no user
-# may write them.
+# The kernel holds code for several processors and chooses when it is loaded: the image also runs on
+# other machines than the one that built it.  Its sources stay in this stage, apart from the three
+# headers that the library reads.  Every user of the container may read all files, whatever the
+# umask of the checkout; no user may write them.
 RUN /build/venv/bin/python /build/hatch_build.py mumacro \
+    && find mumacro/kernel -type f -not -name data.h -not -name records.h -not -name library.h -delete \
     && venv/bin/python -m compileall -q mumacro service \
     && chmod -R a+rX,go-w .
 

@@ -4,10 +4,18 @@
 Exit codes: 0 stopped by a signal (or ready), 1 could not run (or not ready), 2 bad setting or argument.
 """
 
-import argparse
 import os
 import signal
 import sys
+
+# A requested stop is a success, also during the start: exit code 0.  Set before the slow imports, because the first
+# process of a container ignores a signal that has no handler.  Nothing runs yet that would have to be ended, so the
+# process ends at once; an exception could be lost in an import.  A health check that is stopped is no success, and
+# worker processes, which import this file by another name, get the handler of the server.
+if __name__ == "__main__" and "healthcheck" not in sys.argv:
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+
+import argparse
 import urllib.request
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -60,16 +68,17 @@ def _check(settings: Settings) -> int:
 
 
 def _serve(settings: Settings) -> int:
-    # The server shuts down gracefully, then raises the signal again, which by default would end the process with the
-    # signal's exit status.  A requested stop is a success: exit code 0.
-    # Set before the slow imports: the first process of a container ignores a signal that has no handler.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    # Also from the command mumacro, which has not set it.
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
 
     # Imported here: a health check must not load the server.
     import uvicorn
 
     from .observe import log_config, shared_counters
 
+    # The server shuts down gracefully, then raises the signal again, which by default would end the process with the
+    # signal's exit status.  From here on there are things to clean up.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         with shared_counters() if settings.workers > 1 else nullcontext():
             # By name, so that only worker processes import it, and not their parent.  It reads the headers of proxies.

@@ -48,6 +48,28 @@ def test_the_parts_of_the_manifest_belong_together(repository: Path) -> None:
     assert pod["terminationGracePeriodSeconds"] > load_settings().shutdown_grace_s + 3.0  # preStop
 
 
+@pytest.mark.slow
+def test_the_image_was_built_and_tried() -> None:
+    """.ci/run has done it before the tests; where it could not, this is a skip that has a name."""
+    if "container-engine" in os.environ.get("CI_MISSING", "").split():
+        pytest.skip("container-engine is not here: the image was neither built nor tried")
+    if "CI_CONTAINER" not in os.environ:
+        pytest.skip("the image is built and tried by .ci/run, or by bash deploy/container.sh")
+    assert os.environ["CI_CONTAINER"] == "0"
+
+
+def test_the_manifests_give_each_worker_the_memory_that_was_tried(repository: Path) -> None:
+    def read(name: str) -> str:
+        return (repository / name).read_text("utf-8")
+
+    (tried,) = re.findall(r"^WORKER_MB=(\d+) ", read("deploy/container.sh"), re.MULTILINE)
+    assert re.findall(r"limits: \{memory: (\d+)Mi\}", read("deploy/kubernetes.yaml")) == [tried]
+    assert re.findall(r"mem_limit: (\d+)m", read("deploy/compose.yaml")) == [tried]
+    assert f"{tried} MiB for each worker" in read("docs/operations.md")
+    (largest,) = re.findall(r"^LARGEST_MB=\S+:-(\d+)\}", read("deploy/container.sh"), re.MULTILINE)
+    assert f"at most {largest} MB over its base" in read("docs/operations.md")
+
+
 BUILD = "import runpy; runpy.run_path('hatch_build.py', run_name='__main__')"
 REQUIREMENTS = "import hatchling.build as b; print(*b.get_requires_for_build_wheel())"
 

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -57,6 +58,64 @@ def test_a_requested_stop_is_a_success(serving: Any, surrogate: Surrogate, case:
         "level": "info", "logger": "mumacro.access", "message": "request", "request_id": "the-last", "method": "POST",
         "path": SINGLE, "status": 200, "client": "127.0.0.1",
     }  # fmt: skip
+
+
+#: run before the service: sends SIGTERM to the own process when the module of this name is about to be imported
+STOPPED_AT = """
+import os, signal, sys
+
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == os.environ["STOPPED_AT"]:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+sys.meta_path.insert(0, Finder())
+"""
+
+
+def begun(repository: Path, surrogate: Surrogate, **variables: str) -> Any:
+    """A service that has only been started."""
+    words = [sys.executable, "-m", "service", "--port", "0", "--tables", str(surrogate.path)]
+    return subprocess.Popen(
+        words, cwd=repository, env={**os.environ, **variables}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("module", "workers"),
+    [("argparse", "1"), ("pydantic", "1"), ("uvicorn", "1"), ("uvicorn", "2"), ("service.observe", "2"),
+     ("service.app", "1")],
+)  # fmt: skip
+def test_a_stop_at_an_import_of_the_start_is_a_success(
+    repository: Path, surrogate: Surrogate, tmp_path: Path, module: str, workers: str
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(STOPPED_AT)
+    path = os.pathsep.join([str(tmp_path), os.getcwd()])
+    variables = {"PYTHONPATH": path, "STOPPED_AT": module, "MUMACRO_WORKERS": workers}
+    with begun(repository, surrogate, **variables) as process:
+        told = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0, told
+    assert "Traceback" not in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("after", [0.05, 0.2, 0.5, 1.0])
+def test_a_stop_soon_after_the_start_is_a_success(
+    repository: Path, surrogate: Surrogate, after: float, workers: str
+) -> None:
+    with begun(repository, surrogate, MUMACRO_WORKERS=workers) as process:
+        status, caught = Path(f"/proc/{process.pid}/status"), 0
+        while not caught >> (signal.SIGTERM - 1) & 1:  # before, it is not yet the service, but Python, that starts
+            caught = int(re.findall(r"^SigCgt:\s*(\w+)$", status.read_text(), re.MULTILINE)[0], 16)
+        time.sleep(after)
+        process.terminate()
+        told = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0, told
+    assert "Traceback" not in told
 
 
 @pytest.mark.slow
