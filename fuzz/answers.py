@@ -1,11 +1,12 @@
 """Properties of the answers, checked over the full double range of every input.
 
-    python fuzz/answers.py [--only promises] [--share 0.01] [--write]
+    python fuzz/answers.py [--only promises|driven] [--share 0.01] [--write]
 
 Cases are drawn in three ways: any positive double for each input, by its bits; inputs of any size with groups v~ and
 y~ in the range of the table; and a share of inputs at the ends of the double range.
 """
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -20,6 +21,8 @@ from builder.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.inputs import FIELDS
 from mumacro.library import kernels
+from tests import extended
+from tests.test_driven_bounds import answered, hard, ordinary
 
 Array = NDArray[np.float64]
 Cases = dict[str, Array]
@@ -186,6 +189,50 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
     return count
 
 
+def nearby(rng: np.random.Generator, v: Array, y: Array, size: float) -> tuple[Array, Array]:
+    """Points around others, with v~ < y~: the amplitude and the distance to v~ = y~ moved by a factor."""
+    moved = y * np.exp(size * rng.standard_normal(y.size))
+    x, gap = v / y, (y - v) / y
+    with np.errstate(all="ignore"):
+        x, gap = x * np.exp(size * rng.standard_normal(y.size)), gap * np.exp(size * rng.standard_normal(y.size))
+    slow = np.where(v / y < 0.5, moved * np.minimum(x, 0.999), moved * (1.0 - np.minimum(gap, 0.999)))
+    return np.where(slow < moved, slow, v), np.where(slow < moved, moved, y)
+
+
+def driven(share: float) -> str:
+    """Bounds of oscillation along and of the normal force, against more digits: random, hard, around the worst."""
+    if not extended.HAS_EXTENDED:
+        return "numpy.longdouble has the digits of a double on this machine: no reference."
+    table, rng, rows = Surrogate.open(1e-10), np.random.default_rng(21), []
+    for contact, direction, n in (("spring", "along", N), ("spring", "normal", N), ("ball", "along", N // 50)):
+        normal, count = direction == "normal", max(500, int(n * share))
+
+        def exact(v: Array, y: Array, contact: str = contact, normal: bool = normal) -> Any:
+            return extended.ball(v, y, 48) if contact == "ball" else extended.spring(v, y, not normal)
+
+        def shares(v: Array, y: Array, contact: str = contact, direction: str = direction, exact: Any = exact) -> Any:
+            parts = [slice(low, low + 20_000) for low in range(0, v.size, 20_000)]
+            found = [(answered(table, v[part], y[part], contact, direction), exact(v[part], y[part])) for part in parts]
+            error = np.concatenate([np.abs(rows[:, 0].astype(np.longdouble) - true) for rows, true in found], axis=1)
+            bound = np.concatenate([rows[:, 1] for rows, _ in found], axis=1)
+            return np.nan_to_num((error / np.maximum(bound, 1e-300)).astype(float))
+
+        v, y = ordinary(count, 22, normal)
+        worst = shares(v, y)
+        medians = [float(np.median(1.0 / row[row > 0])) if (row > 0).any() else math.nan for row in worst]
+        if not normal:
+            hard_v, hard_y = hard(count // 20, 23)
+            v, y, worst = np.append(v, hard_v), np.append(y, hard_y), np.hstack([worst, shares(hard_v, hard_y)])
+        for size in (0.3, 0.03, 0.003):
+            best = np.argsort(worst.max(axis=0))[-max(50, int(1000 * share)) :]
+            close_v, close_y = nearby(rng, np.repeat(v[best], 4), np.repeat(y[best], 4), size)
+            v, y, worst = np.append(v, close_v), np.append(y, close_y), np.hstack([worst, shares(close_v, close_y)])
+        for name, row, median in zip(extended.ROWS, worst, medians, strict=True):
+            if not math.isnan(median):  # direction normal has no power
+                rows.append([contact, direction, name, f"{v.size:,}", f"{row.max():.2f}", quantity(median)])
+    return markdown(("contact", "direction", "row", "points", "largest error, bound = 1", "median bound / error"), rows)
+
+
 PROMISES: dict[str, Callable[[Surrogate, float], Count]] = {
     "finite, in [0, mu0], with a finite bound": finite,
     "rises with v0, falls with y0 and omega": monotone,
@@ -208,4 +255,4 @@ def promises(share: float) -> str:
 
 
 if __name__ == "__main__":
-    main(__doc__, sections(promises), share=1.0)
+    main(__doc__, sections(promises, driven), share=1.0)

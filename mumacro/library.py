@@ -45,7 +45,7 @@ class Data:
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _new("mumacro_data *")
         self._kept: list[Any] = []
-        #: points (nodes, 2) and errors (2, 8) of the pieces of a ball, see ``mumacro_rule``; none until they are put
+        #: points (nodes, 2) and errors (2, 5) of the pieces of a ball, see ``mumacro_rule``; none until they are put
         self.rules: list[tuple[Array, Array]] = []
         #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
@@ -65,12 +65,14 @@ class Data:
             self._keep(place, "slope_errors", slope_errors),
         )
 
-    def put_rules(self, rules: Sequence[tuple[Array, Array]]) -> None:
-        """Add the quadrature of a ball, see :attr:`rules`."""
+    def put_rules(self, rules: Sequence[tuple[Array, Array]], driven: Array) -> None:
+        """Add the quadrature of a ball, see :attr:`rules` and ``mumacro_driven_rule``."""
         for place, (points, errors) in zip(self.pointer.rules, rules, strict=True):
             self._keep(place, "points", points)
             place.errors = errors.tolist()
             place.nodes = points.shape[0]
+        self._keep(self.pointer.driven, "points", driven)
+        self.pointer.driven.nodes = driven.shape[0]
         self.rules = list(rules)
 
     def _keep(self, place: Any, name: str, array: Array) -> Array:

@@ -16,7 +16,7 @@ import mumacro
 from mumacro import charts
 from mumacro.arrays import Array
 from mumacro.cells import block_rows, border_cells, outer_cells, quantity_cells
-from mumacro.contact import rules
+from mumacro.contact import driven_rule, rules
 from mumacro.errors import MumacroError
 from mumacro.table import Table
 from mumacro.version import __version__
@@ -151,6 +151,8 @@ def table_text(table: Table, linkage: str) -> str:
         numbers = ("{" + ",".join(map(_number, row)) + "}" for row in errors.tolist())
         quadrature.append(f"{{{len(points)}, mumacro_table_rule_{place}, {{{', '.join(numbers)}}}}}")
     rows.append("{" + ",\n      ".join(quadrature) + "}")
+    arrays["rule_driven"] = driven_rule()
+    rows.append(f"{{{len(arrays['rule_driven'])}, mumacro_table_rule_driven}}")
     text = f'{float(about["tolerance"])!r}, "{about["content_sha256"]}", "{__version__}"'
     whole = (
         f"{linkage}const mumacro_export mumacro_table = {{\n    {{{f',{chr(10)}     '.join(rows)}}},\n    {text}}};\n\n"

@@ -11,7 +11,8 @@ enum { MU_SPRING, MU_BALL, MU_CONTACTS };
 /* The pieces: before stick-slip; in it below y~ = 1, just above that, further above; after it. */
 enum { MU_BEFORE, MU_BELOW, MU_CLOSE, MU_ABOVE, MU_BEYOND, MU_RULES };
 /* Errors of a rule: first those of the quantities. */
-enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y, MU_ERROR_ALONG, MU_ERROR_ALONG_SLOPE, MU_ERROR_ALONG_STICK };
+enum { MU_ERROR_V = MU_QUANTITIES, MU_ERROR_Y };
+#define MU_DRIVEN_COLUMNS 5 /* of a node of the rule of oscillation along */
 
 #define MU_MIDDLE 1.5 /* load of the middle spring over the mean: gross slip begins at y0 = 1.5 l0 */
 #define MU_STEEPEST 0.33516779066085 /* the largest v~crit / y~, and its amplitude */
@@ -248,76 +249,188 @@ typedef struct {
     double bound, bound_v, bound_y, power_bound, stick_bound;
 } mu_driven;
 
-#define MU_LINE_ROUNDING 5e-16 /* of v~ and y~ four roundings each, and of mu~, relative */
+/* v~ and y~ may be off by four roundings each; a formula adds as many, relative to the sum of its terms. */
+#define MU_LINE_ROUNDING 5e-16
 
-/* Bounds of one spring: rounding and the last digits of v~ and y~.  They count where a - v~ has few digits; and at
- * D = 2, where reverse slip begins, the slopes jump, and the duration of stick has a square root on one side. */
+/* Without reverse slip.  The error of h is that of c = arccos x over the slope dc/dh.  c follows y~ - v~ like a root:
+ * twice its differential bounds it where y~ - v~ has digits. */
+static void mu_bound_stick(const mu_turning *at, const mu_stuck *stuck, double v, mu_driven *out) {
+    const mu_line *line = &out->line;
+    const double h = stuck->h, deficit = -(line->along_v + line->along_y);
+    const double inputs = fabs(line->along_v) + fabs(line->along_y);
+    const double off = at->x > 0.0 ? 2.0 * at->x / (at->sine * stuck->slope) : 0.0;
+    out->stick_bound = MU_LINE_ROUNDING * (off + h) / MU_PI;
+    out->bound = MU_LINE_ROUNDING * (line->terms + inputs);
+    out->bound_v = 2.0 * v * h * out->stick_bound + MU_LINE_ROUNDING * line->along_v;
+    out->bound_y = MU_LINE_ROUNDING * (4.0 * deficit + inputs) + out->bound_v;
+    out->power_bound = v * MU_LINE_ROUNDING * (4.0 * deficit + inputs);
+}
+
+/* The rounding of D/y~ - 2/y~, whose sign tells whether there is reverse slip. */
+static double mu_turn_rounding(const mu_turning *at, double y) {
+    return MU_LINE_ROUNDING * (2.0 / y + 2.0 * at->sine + 2.0 * at->x * at->c);
+}
+
+/* With reverse slip.  m is the root of F(m) = 2/y~: its error is that of F over its slope, or a root where the slope
+ * vanishes.  mu~ is stationary in m; its slopes and the duration of stick are not. */
+static void mu_bound_reverse(const mu_turning *at, double v, double y, const mu_reverse *found, mu_driven *out) {
+    const mu_line *line = &out->line;
+    const double m = found->m, p = found->p, ill = at->x * y / (y - v);
+    const double off = MU_LINE_ROUNDING * (2.0 / y + 2.0 * p * at->x) * (1.0 + ill);
+    const double flat = 4.0 * sqrt(off / at->travel);
+    const double of_m = found->slope > 0.0 ? mu_min(2.0 * off / found->slope, flat) : flat;
+    const double of_p = mu_min(found->of_p, 1.0) * of_m + MU_LINE_ROUNDING * p * (1.0 + ill);
+    const double inputs = fabs(line->along_v) + fabs(line->along_y);
+    out->stick_bound = of_m / MU_PI + MU_LINE_ROUNDING * line->stick;
+    out->bound = MU_LINE_ROUNDING * (line->terms + inputs);
+    out->bound_v = v * (m * of_m + p * of_p) / MU_PI + MU_LINE_ROUNDING * line->along_v;
+    out->bound_y = 2.0 / MU_PI * of_p + out->bound_v + MU_LINE_ROUNDING * (line->terms + inputs);
+    out->power_bound = v * (out->bound + MU_LINE_ROUNDING) +
+                       MU_LINE_ROUNDING * (y * at->travel + 2.0 + 2.0 * at->c * v + 2.0 * y * at->sine) / MU_PI;
+}
+
+/* A spring with v~ < y~, of which y~ - v~ has digits. */
 static mu_driven mu_drive_spring(int direction, double v, double y) {
-    mu_driven out = {mu_line_at(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0};
-    const mu_line *line = &out.line;
-    const double near = 2.0 * MU_ROUNDING, size = 1.0 + fabs(line->along_v) + fabs(line->along_y);
-    double gap, turn, m, off, root, jump;
-    mu_turning at;
-    if (line->source < 0 || line->source == MU_NO_OSCILLATION || v > y * (1.0 + near)) return out;
-    gap = mu_max((y - v) / y, near);
-    at = mu_turning_of(mu_min(v, y * (1.0 - near)), y);
-    /* nearer than that the deficit is at most y~ c^4 / 9 pi times 81/16, or 2 c / pi */
-    out.bound = gap > near ? MU_LINE_ROUNDING * size : mu_min(4.0 * y * near * near, sqrt(near));
-    /* reverse slip begins at 2/y~ = D/y~, both known to `off` of the latter; m follows like a root */
-    turn = at.travel - 2.0 / y;
-    off = MU_ROUNDING * (2.0 / y + 2.0 * at.sine + 2.0 * at.x * at.c);
-    m = MU_PI * line->stick;
-    root = direction == MU_ALONG && turn > -off ? 2.0 * m / at.c * off / sqrt(at.travel * mu_max(turn, off)) : 0.0;
-    jump = direction == MU_ALONG && fabs(turn) < off ? v + y : 0.0;
-    out.bound_v = 4.0 * MU_ROUNDING * size / gap + jump * at.c + v * m * root;
-    out.bound_y = 4.0 * MU_ROUNDING * size / gap + jump * at.sine + (v * m + 1.0) * root;
-    out.power_bound = v * out.bound + 4.0 * MU_ROUNDING * (line->power + v + 1.0);
-    out.stick_bound = 4.0 * MU_ROUNDING / gap + root;
+    mu_driven out;
+    const mu_turning at = mu_turning_of(v, y);
+    const double turn = at.travel - 2.0 / y, nearest = mu_turn_rounding(&at, y);
+    if (mu_is_reversing(direction, &at, y)) {
+        const mu_reverse found = mu_reverse_of(&at, y, mu_reverse_start(y));
+        out.line = mu_line_of_reverse(&at, v, y, &found);
+        mu_bound_reverse(&at, v, y, &found, &out);
+    } else {
+        const mu_stuck stuck = mu_half_stick(&at);
+        out.line = mu_line_of_stick(v, y, stuck.h, direction == MU_NORMAL ? MU_NORMAL_STICKS : MU_ALONG_STICKS);
+        mu_bound_stick(&at, &stuck, v, &out);
+    }
+    if (v == 0.0) out.line.source = MU_STATIC_LIMIT;
+    if (direction == MU_ALONG && fabs(turn) < nearest) { /* where reverse slip begins slopes jump, and m has a root */
+        const double root = 2.0 * MU_PI * out.line.stick / at.c * sqrt(nearest / at.travel);
+        out.stick_bound += root;
+        out.power_bound += y * nearest;
+        out.bound_v += (v + y) * at.c + v * MU_PI * out.line.stick * root;
+        out.bound_y += (v + y) * at.sine + (v * MU_PI * out.line.stick + 1.0) * root;
+    }
     return out;
 }
 
-/* One spring; or a ball, whose springs all turn at the same phase: those further out than 1 - xi = `reversed` slip
+/* The rows that a ball sums over its springs. */
+enum { MU_SUM_MU, MU_SUM_V, MU_SUM_Y, MU_SUM_STICK, MU_SUMS };
+/* A rule of n nodes misses what Legendre polynomials of degree 2n and more carry.  The three highest that it can tell
+ * apart, of degree n - 3 to n - 1, carry more: the largest of them, times this, is the bound. */
+#define MU_NULL_SAFETY 16.0
+
+/* A ball with v~ < y~.  Its springs all turn at the same phase: those further out than 1 - xi = `reversed` slip
  * backwards, too. */
-static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
-    mu_driven out = mu_drive_spring(direction, v, y);
-    mu_turning at;
-    mu_springs c;
-    double reversed, still, load, h, deficit, rest = 0.0, slopes = 0.0;
-    const double (*errors)[8] = data->rules[MU_ABOVE].errors;
-    if (contact == MU_SPRING || !(v >= 0.0 && v < y && y < MU_HUGE)) return out;
-    at = mu_turning_of(v, y);
-    reversed = mu_outside(0.5 * at.travel * y / MU_MIDDLE);
-    still = 1.0 - reversed; /* xi of the last spring without reverse slip, load of these springs */
-    load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
-    h = mu_half_stick(&at);
-    deficit = y * mu_master_deficit(h) * still;
-    out.line.mu = load - deficit;
-    out.line.along_v = v * h * h / MU_PI * still;
-    out.line.along_y = -(deficit + out.line.along_v);
-    out.line.stick = load * h / MU_PI;
-    out.line.power = 0.0;
-    c.n = 0;
-    mu_take_piece(&data->rules[MU_ABOVE], reversed, 0.0, v, y, &c);
-    for (int i = 0; i < c.n; ++i) {
-        const mu_reverse found = mu_reverse_of(&at, c.y[i]);
-        const mu_line line = mu_line_of_reverse(&at, c.v[i], c.y[i], &found);
-        out.line.mu += c.share[i] * line.mu;
-        out.line.along_v += c.share[i] * line.along_v;
-        out.line.along_y += c.share[i] * line.along_y;
-        out.line.stick += c.share[i] * line.stick;
-        slopes += c.share[i] * (fabs(line.along_v) + fabs(line.along_y));
-        rest += c.share[i];
-        out.line.power += c.share[i] * mu_max(y * at.travel - 2.0 * MU_MIDDLE * c.s[i], 0.0) / MU_PI;
+static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
+    const mumacro_driven_rule *rule = &data->driven;
+    const mu_turning at = mu_turning_of(v, y);
+    const double last = 0.5 * at.travel * y / MU_MIDDLE, reversed = mu_outside(last);
+    const double still = 1.0 - reversed; /* xi of the last spring without reverse slip; next the load of these */
+    const double load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
+    const double least = mu_max(y, 1.0) / 1e300, ill = 1.0 + 2.0 * at.x * y / (y - v);
+    double nulls[MU_SUMS][3] = {{0.0}}, share_of[3] = {1.0, 1.0, 1.0};
+    const mu_stuck stuck = mu_half_stick(&at);
+    mu_driven out = {mu_line_of_stick(v, y, stuck.h, MU_ALONG_REVERSES), 0.0, 0.0, 0.0, 0.0, 0.0};
+    mu_line *sum = &out.line;
+    mu_bound_stick(&at, &stuck, v, &out);
+    sum->mu = load + still * (sum->along_v + sum->along_y); /* whose sum is -(1 - mu~) */
+    sum->along_v *= still;
+    sum->along_y *= still;
+    sum->stick *= load;
+    sum->power = reversed * reversed * MU_MIDDLE / MU_PI *
+                 (y * at.travel * (1.0 - reversed / 3.0) -
+                  3.0 * reversed * (4.0 / 3.0 - reversed + 0.2 * reversed * reversed));
+    /* the load has roundings of its own */
+    out.bound = out.bound * mu_max(still, load) + MU_LINE_ROUNDING * load;
+    out.bound_v *= still;
+    out.bound_y *= still;
+    out.stick_bound = (out.stick_bound + MU_LINE_ROUNDING) * load;
+    for (int64_t i = rule->nodes - 1; i >= 0; --i) { /* from outside, where m is that of rigid contact, to the middle */
+        const double *point = rule->points + MU_DRIVEN_COLUMNS * i;
+        const double rest = reversed * point[0], s = mu_max(rest * (2.0 - rest), least);
+        const double share = MU_MIDDLE * s * reversed * point[1], a = y / (MU_MIDDLE * s), slow = v / (MU_MIDDLE * s);
+        const double start = mu_reverse_start(a);
+        const double guess = start * mu_max(3.0 * (share_of[0] - share_of[1]) + share_of[2], 0.5);
+        mu_reverse found;
+        mu_driven one;
+        double values[MU_SUMS];
+        if (!(a * at.travel > 2.0)) continue;
+        found = mu_reverse_of(&at, a, guess);
+        one.line = mu_line_of_reverse(&at, slow, a, &found);
+        mu_bound_reverse(&at, slow, a, &found, &one);
+        share_of[2] = i == rule->nodes - 1 ? found.m / start : share_of[1];
+        share_of[1] = i == rule->nodes - 1 ? found.m / start : share_of[0];
+        share_of[0] = found.m / start;
+        values[MU_SUM_MU] = share * one.line.mu;
+        values[MU_SUM_V] = share * one.line.along_v;
+        values[MU_SUM_Y] = share * one.line.along_y;
+        values[MU_SUM_STICK] = share * one.line.stick;
+        for (int row = 0; row < MU_SUMS; ++row)
+            for (int j = 0; j < 3; ++j) nulls[row][j] += point[2 + j] * values[row];
+        sum->mu += values[MU_SUM_MU];
+        sum->along_v += values[MU_SUM_V];
+        sum->along_y += values[MU_SUM_Y];
+        sum->stick += values[MU_SUM_STICK];
+        out.bound += share * one.bound;
+        out.bound_v += share * one.bound_v;
+        out.bound_y += share * one.bound_y;
+        out.stick_bound += share * one.stick_bound;
     }
-    out.line.mu = mu_min(mu_max(out.line.mu, 0.0), 1.0);
-    out.line.power += v * (1.0 - out.line.mu);
-    out.line.source = v == 0.0 ? MU_STATIC_LIMIT : MU_ALONG_REVERSES;
-    out.bound += mu_min(errors[0][MU_ERROR_ALONG] * rest, errors[1][MU_ERROR_ALONG] * out.line.mu);
-    slopes = errors[0][MU_ERROR_ALONG_SLOPE] * rest + errors[1][MU_ERROR_ALONG_SLOPE] * slopes;
-    out.bound_v += slopes;
-    out.bound_y += slopes;
-    out.power_bound += v * out.bound + MU_ROUNDING * y;
-    out.stick_bound += errors[0][MU_ERROR_ALONG_STICK] * rest;
+    {
+        double missed[MU_SUMS];
+        for (int row = 0; row < MU_SUMS; ++row) {
+            const double *of = nulls[row];
+            missed[row] = MU_NULL_SAFETY * mu_max(fabs(of[0]), mu_max(fabs(of[1]), fabs(of[2])));
+        }
+        out.bound += missed[MU_SUM_MU];
+        out.bound_v += missed[MU_SUM_V];
+        out.bound_y += missed[MU_SUM_Y];
+        out.stick_bound += missed[MU_SUM_STICK];
+    }
+    if (last < 1.0 + 4.0 * MU_LINE_ROUNDING * ill) { /* a spring at the edge may belong to the others: slopes jump */
+        const double room = mu_max(1.0 - last, MU_LINE_ROUNDING * ill);
+        const double moved = mu_min(MU_LINE_ROUNDING * ill * last / sqrt(room), 1.0) * MU_MIDDLE;
+        out.bound_v += moved * (v + y) * at.c / MU_MIDDLE;
+        out.bound_y += moved * (v + y) * at.sine / MU_MIDDLE;
+        out.stick_bound += moved * last * MU_LINE_ROUNDING;
+    }
+    sum->mu = mu_min(mu_max(sum->mu, 0.0), 1.0);
+    sum->power += v * (1.0 - sum->mu);
+    sum->source = v == 0.0 ? MU_STATIC_LIMIT : MU_ALONG_REVERSES;
+    out.power_bound = v * (out.bound + MU_LINE_ROUNDING) +
+                      MU_LINE_ROUNDING * reversed * reversed * MU_MIDDLE / MU_PI *
+                          (y * at.travel + 4.0 * reversed + 2.0 * at.c * v + 2.0 * y * at.sine);
+    return out;
+}
+
+static mu_driven mu_drive_inside(const mumacro_data *data, int contact, int direction, double v, double y) {
+    return contact == MU_BALL && y < MU_HUGE ? mu_drive_ball(data, v, y) : mu_drive_spring(direction, v, y);
+}
+
+/* Any v~ and y~.  Where y~ - v~ has no digits it is not known whether the contact sticks: there a bound is that a little
+ * inside, and the way from there. */
+static mu_driven mu_drive(const mumacro_data *data, int contact, int direction, double v, double y) {
+    const double inside = y * (1.0 - 2.0 * MU_LINE_ROUNDING);
+    mu_driven out = {mu_line_of_sliding(direction, v, y), 0.0, 0.0, 0.0, 0.0, 0.0}, near;
+    const mu_line *line = &out.line;
+    if (line->source < 0 || y == 0.0 || v > y * (1.0 + 2.0 * MU_ROUNDING)) return out;
+    if (!(inside < y) && !(v < y)) { /* the last of the denormal numbers */
+        out.bound = out.bound_v = out.bound_y = out.power_bound = 4.0 * y;
+        out.stick_bound = 1.0;
+        return out;
+    }
+    near = mu_drive_inside(data, contact, direction, v < y ? v : inside, y);
+    if (v <= inside) return near;
+    if (v < y) { /* the answer is that just inside, where it can be told */
+        out.line = near.line;
+        near = mu_drive_inside(data, contact, direction, inside, y);
+    }
+    out.bound = near.bound + fabs(line->mu - near.line.mu);
+    out.bound_v = near.bound_v + fabs(line->along_v - near.line.along_v);
+    out.bound_y = near.bound_y + fabs(line->along_y - near.line.along_y);
+    out.power_bound = near.power_bound + fabs(line->power - near.line.power);
+    out.stick_bound = near.stick_bound + fabs(line->stick - near.line.stick);
     return out;
 }
 

@@ -15,13 +15,20 @@ typedef struct {
 /* Quadrature over one piece of a ball: points (nodes, 2), the share of the piece beyond a node, and its weight;
  * the largest errors, times the load of the piece, and times the smaller of mu~'s integral and what it lacks of that
  * load, of which the smaller counts: of mu~, power (relative to power), stick fraction, slopes along v~ and along y~
- * (absolute: times mu_slope_scale; relative to its absolute value); for oscillation along the sliding direction of mu~
- * (relative to it), of slopes (the sum of both, relative to their absolute values), of the stick fraction (absolute). */
+ * (absolute: times mu_slope_scale; relative to its absolute value). */
 typedef struct {
     int64_t nodes;
     const double *points;
-    double errors[2][8];
+    double errors[2][5];
 } mumacro_rule;
+
+/* Quadrature over the springs of a ball that slip backwards, under oscillation along the sliding direction: points
+ * (nodes, 5), as above and then three null rules, which are the coefficients of the integrand's three highest Legendre
+ * polynomials. */
+typedef struct {
+    int64_t nodes;
+    const double *points;
+} mumacro_driven_rule;
 
 /* border (border_cells, 8): polynomials of v~crit, highest power first; pieces (3, 4): first cell, offset, step,
  * relative error; blocks (sources + 1, 8): first cell, cells along b, offset and step of a, of b, and two unused; step
@@ -33,6 +40,7 @@ typedef struct {
     const double *border, *pieces, *blocks, *outer;
     mumacro_cells quantities[8];
     mumacro_rule rules[5];
+    mumacro_driven_rule driven;
 } mumacro_data;
 
 /* A table as the export writes it: mumacro_table. */

@@ -11,9 +11,10 @@
 
 enum { MU_ACROSS, MU_ALONG, MU_NORMAL, MU_DIRECTIONS };
 
-/* What one spring does; slopes are along ln v~ and ln y~ (normal: ln z); stick is a share of the period. */
+/* What one spring does; slopes are along ln v~ and ln y~ (normal: ln z); stick is a share of the period; terms is the
+ * sum of the absolute values that mu is the sum of, for its rounding. */
 typedef struct {
-    double mu, along_v, along_y, stick, power;
+    double mu, along_v, along_y, stick, power, terms;
     int source;
 } mu_line;
 
@@ -85,11 +86,17 @@ static mu_turning mu_turning_of(double v, double a) {
     return out;
 }
 
-/* h of N0.  Newton's method for the angle c(h) with tan c = (h - sin h cos h) / sin^2 h; 7 steps at most. */
-static double mu_half_stick(const mu_turning *at) {
+/* Half the duration of stick, h, of N0, and dc/dh there. */
+typedef struct {
+    double h, slope;
+} mu_stuck;
+
+/* Newton's method for the angle c(h) with tan c = (h - sin h cos h) / sin^2 h; 7 steps at most. */
+static mu_stuck mu_half_stick(const mu_turning *at) {
     const double start = 0.5 * at->b + sqrt(0.25 * at->b * at->b + MU_PI * at->b);
     double h = at->c < 0.3 ? 1.5 * at->c : MU_PI - mu_min(start, MU_PI);
-    if (at->x < 1e-18) return MU_PI - sqrt(MU_PI * at->x);
+    mu_stuck out = {MU_PI - sqrt(MU_PI * at->x), 2.0 * sqrt(at->x / MU_PI)};
+    if (at->x < 1e-18) return out;
     for (int i = 0; i < 20; ++i) {
         const mu_arc arc = mu_arc_of(h);
         const double square = arc.sine * arc.sine, norm = arc.rest * arc.rest + square * square;
@@ -97,9 +104,11 @@ static double mu_half_stick(const mu_turning *at) {
         const double slope = 2.0 * arc.sine * (square * arc.sine - arc.cosine * arc.rest) / norm;
         const double step = off * (1.0 + off * off / 6.0) / slope, next = h - step;
         h = next > MU_PI ? 0.5 * (h + MU_PI) : next < 0.5 * h ? 0.5 * h : next;
-        if (fabs(step) < 1e-9 * h) break;
+        out.slope = slope;
+        if (fabs(step) < 1e-9 * mu_min(h, MU_PI - h)) break; /* slow speeds: pi - h is what changes */
     }
-    return h;
+    out.h = h;
+    return out;
 }
 
 /* 1 - N0(x) for half the duration of stick h. */
@@ -114,6 +123,7 @@ static mu_line mu_line_of_stick(double v, double a, double h, int source) {
     const double deficit = a * mu_master_deficit(h);
     mu_line out;
     out.mu = 1.0 - deficit;
+    out.terms = 1.0 + deficit;
     out.along_v = v * h * h / MU_PI;
     out.along_y = -(deficit + out.along_v);
     out.stick = h / MU_PI;
@@ -125,13 +135,14 @@ static mu_line mu_line_of_stick(double v, double a, double h, int source) {
 /* Reverse slip: the spring sticks over m + p after the first turn and over m - p after the second, on which both
  * follow from x = cos c: cos(c - p) = x m / sin m, and F(m) = sin c - cos m sin(c - p) - p cos c = 2/y~. */
 typedef struct {
-    double m, p, bent, left, slope; /* bent = 1 - m cot m; left = F(m) and its slope, infinite and 0 beyond the end */
+    double m, p, bent, of_p; /* bent = 1 - m cot m; of_p = dp/dm */
+    double left, slope;      /* F(m) and its slope, infinite and 0 beyond the end */
 } mu_reverse;
 
 static mu_reverse mu_reverse_at(const mu_turning *at, double m) {
     const mu_arc arc = mu_arc_of(m);
     const double more = arc.lag / arc.sine, cosine = at->x * (1.0 + more);
-    mu_reverse out = {0.0, 0.0, 0.0, HUGE_VAL, 0.0};
+    mu_reverse out = {0.0, 0.0, 0.0, 1.0, HUGE_VAL, 0.0};
     double root, apart, turn;
     out.m = m;
     if (!(arc.sine > 0.0 && cosine <= 1.0)) return out;
@@ -140,14 +151,18 @@ static mu_reverse mu_reverse_at(const mu_turning *at, double m) {
     turn = at->x * (arc.versed - arc.cosine * more);
     out.p = mu_arcsine(mu_min(at->x * (more * at->sine + apart), 1.0));
     out.bent = arc.bent / arc.sine;
+    out.of_p = at->x * out.bent / (arc.sine * root);
     out.left = apart + arc.versed * root - out.p * at->x;
     if (m + out.p < 2.0 * at->c) out.slope = arc.sine * root - turn * turn / (arc.sine * root);
     return out;
 }
 
+/* m for rigid contact, nearly: where Newton's method may start. */
+static double mu_reverse_start(double a) { return 2.0 * mu_arcsine(mu_min(1.0 / sqrt(a), 1.0)); }
+
 /* m by Newton's method between bounds; where D is near 2 the root is double, but mu~ is stationary in m. */
-static mu_reverse mu_reverse_of(const mu_turning *at, double a) {
-    double low = 0.0, high = MU_PI, m = 2.0 * mu_arcsine(mu_min(1.0 / sqrt(a), 1.0));
+static mu_reverse mu_reverse_of(const mu_turning *at, double a, double start) {
+    double low = 0.0, high = MU_PI, m = mu_min(mu_max(start, 0.0), MU_PI);
     for (int i = 0; i < 100; ++i) {
         const mu_reverse found = mu_reverse_at(at, m);
         const double off = found.left - 2.0 / a;
@@ -181,11 +196,20 @@ static double mu_way_in_stick(const mu_turning *at, double a, double s, double w
 static mu_line mu_line_of_reverse(const mu_turning *at, double v, double a, const mu_reverse *found) {
     const double m = found->m, p = found->p, both = m * m + p * p;
     const double sweep = 2.0 / MU_PI * (at->b + p); /* of rigid contact, for p = 0 */
-    double layers; /* what stick adds */
+    double layers, size; /* what stick adds, and the sum of its absolute terms */
     mu_line out;
-    if (a > 1e100) layers = 0.0; /* to rounding, while m^3 underflows */
-    else if (at->x < 0.5) layers = a * (at->x * (both - 2.0 * found->bent) - 2.0 * p * at->sine);
-    else layers = mu_way_in_stick(at, a, m - p, -1.0) - mu_way_in_stick(at, a, m + p, 1.0);
+    if (a > 1e100) { /* nothing to rounding, while m^3 underflows */
+        layers = size = 0.0;
+    } else if (at->x < 0.5) {
+        const double first = at->x * both, second = 2.0 * at->x * found->bent, third = 2.0 * p * at->sine;
+        layers = a * (first - second - third);
+        size = a * (first + second + third);
+    } else {
+        const double back = mu_way_in_stick(at, a, m - p, -1.0), forth = mu_way_in_stick(at, a, m + p, 1.0);
+        layers = back - forth;
+        size = fabs(back) + fabs(forth);
+    }
+    out.terms = sweep + size / (2.0 * MU_PI);
     out.mu = mu_min(mu_max(sweep + layers / (2.0 * MU_PI), 0.0), 1.0);
     out.along_v = v * both / (2.0 * MU_PI);
     out.along_y = layers / (2.0 * MU_PI) - out.along_v;
@@ -195,22 +219,17 @@ static mu_line mu_line_of_reverse(const mu_turning *at, double v, double a, cons
     return out;
 }
 
-/* One spring at any v~, y~ (normal: z); NaN and -1 where illegal. */
-static mu_line mu_line_at(int direction, double v, double y) {
-    mu_line out = {1.0, 0.0, 0.0, 0.0, 0.0, direction == MU_NORMAL ? MU_NORMAL_SLIDES : MU_ALONG_SLIDES};
-    mu_turning at;
+/* Whether a spring slips backwards, too, and for which turning. */
+static int mu_is_reversing(int direction, const mu_turning *at, double y) {
+    return direction == MU_ALONG && y * at->travel > 2.0;
+}
+
+/* One spring that slips all the time, or does not oscillate; NaN and -1 where illegal.  The others follow. */
+static mu_line mu_line_of_sliding(int direction, double v, double y) {
+    mu_line out = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, direction == MU_NORMAL ? MU_NORMAL_SLIDES : MU_ALONG_SLIDES};
     if (!(v >= 0.0 && y >= 0.0 && y < (direction == MU_NORMAL ? 1.0 : HUGE_VAL))) {
         out.mu = out.along_v = out.along_y = out.stick = out.power = NAN;
         out.source = -1;
     } else if (y == 0.0) out.source = MU_NO_OSCILLATION;
-    if (out.source < 0 || y == 0.0 || !(v < y)) return out;
-    at = mu_turning_of(v, y);
-    if (direction == MU_ALONG && y * at.travel > 2.0) {
-        const mu_reverse found = mu_reverse_of(&at, y);
-        out = mu_line_of_reverse(&at, v, y, &found);
-    } else {
-        out = mu_line_of_stick(v, y, mu_half_stick(&at), direction == MU_NORMAL ? MU_NORMAL_STICKS : MU_ALONG_STICKS);
-    }
-    if (v == 0.0) out.source = MU_STATIC_LIMIT;
     return out;
 }

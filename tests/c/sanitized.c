@@ -216,7 +216,7 @@ static double any(int input) { return (void)input, anything(); }
 
 static void ask_nonsense(const mumacro_kernel *kernel) {
     mumacro_data data;
-    double *held[18];
+    double *held[19];
     int n = 0;
     memset(&data, 0, sizeof data);
     data.border_cells = 1 + (int)(drawn() * 30);
@@ -236,6 +236,8 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
         data.rules[i].nodes = (int)(drawn() * 200.0);
         data.rules[i].points = held[n++] = nonsense(2 * (size_t)data.rules[i].nodes + 1);
     }
+    data.driven.nodes = (int)(drawn() * 40.0);
+    data.driven.points = held[n++] = nonsense(5 * (size_t)data.driven.nodes + 1);
     ask_all(kernel, &data, 61, ordinary, -1);
     ask_all(kernel, &data, 19, any, -1);
     while (n) free(held[--n]);
