@@ -7,7 +7,6 @@
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
     python3 dev.py wheels          the wheel of every platform and the source distribution, checked, in dist
-    python3 dev.py page            the page as a folder for any static host, in build/page; needs zig, or clang and lld
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 
@@ -159,13 +158,6 @@ def docs() -> int:
     return execute("sphinx-build", "-W", "--keep-going", "-q", "docs", "build/docs")
 
 
-def page() -> int:
-    table, module = "tables/mumacro-1e-7.nc", "build/mumacro.wasm"
-    (ROOT / "build").mkdir(exist_ok=True)
-    made = execute("python", "-m", "builder", "export", table, "--format", "wasm", "--out", module)
-    return made or run("python", "-m", "builder.export_page", table, module, "build/page")
-
-
 def wheels() -> int:
     ensure()
     install_locks("zig")
@@ -173,7 +165,7 @@ def wheels() -> int:
 
 
 COMMANDS: dict[str, Callable[..., int]] = {
-    **{command.__name__: command for command in (demo, test, check, docs, serve, wheels, page)},
+    **{command.__name__: command for command in (demo, test, check, docs, serve, wheels)},
     "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py"),
 }  # fmt: skip
 

@@ -50,7 +50,7 @@ def test_every_example_is_listed_and_tested(repository: Path) -> None:
     there = {path.name for path in (repository / "examples").iterdir() if not path.name.startswith(("_", "."))}
     readme = (repository / "examples" / "README.md").read_text("utf-8")
     tests = "".join(path.read_text("utf-8") for path in (repository / "tests").glob("*.py"))
-    untested = {"README.md", "modelica.md", "demo.py"}  # to be read, or run by a person
+    untested = {"README.md", "demo.py"}  # to be read, or run by a person
     assert [name for name in there - {"README.md"} if f"`{name}" not in readme] == []
     assert [name for name in there - untested if Path(name).stem not in tests] == []
 
