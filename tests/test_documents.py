@@ -151,6 +151,7 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
     from service.app import create_app
     from service.settings import Settings
 
+    pytest.importorskip("sphinx")
     monkeypatch.syspath_prepend(DOCS / "_ext")
     from interface import _operations
 
