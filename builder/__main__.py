@@ -92,7 +92,8 @@ def _export(chosen: Namespace) -> str:
         surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
         written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
         return as_json({"table": str(surrogate.path), "format": kind, "out": written})
-    from .export import FORMATS, ExportError, check_format, export_table
+    from .c.source import ExportError
+    from .export import FORMATS, check_format, export_table
 
     try:
         check_format(kind)

@@ -304,7 +304,7 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
         table.evaluate(**{**CASE, "v0": lazy["v0"]})
 
 
-@pytest.mark.parametrize("kind", ["pyarrow.table", "pyarrow.record_batch", "polars.DataFrame"])
+@pytest.mark.parametrize("kind", ["pyarrow.table", "pyarrow.record_batch"])
 def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> None:
     library, name = kind.split(".")
     make: Any = getattr(pytest.importorskip(library), name)

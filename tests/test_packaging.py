@@ -1,7 +1,6 @@
 """The distribution: one version, tables with the library, a one-line message if something is missing."""
 
 import importlib
-import json
 import os
 import re
 import shutil
