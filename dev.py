@@ -7,7 +7,6 @@
     python3 dev.py docs            build the documentation as a site, into build/docs
     python3 dev.py serve [ARGS]    run the service until a signal stops it
     python3 dev.py wheels          the wheel of every platform and the source distribution, checked, in dist
-    python3 dev.py page            the page as a folder for any static host, in build/page; needs zig, or clang and lld
     python3 dev.py exec CMD [ARGS] run one command inside the development environment
     python3 dev.py lock [ARGS]     pin the dependencies again (ARGS, e.g. --upgrade, go to uv)
 
@@ -34,8 +33,8 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = str(BIN / ("python.exe" if os.name == "nt" else "python"))
 MARKER = VENV / "mumacro-installed.json"
 OLDEST, NEWER_NAMES = (3, 11), ("python3.13", "python3.12", "python3.11")
-# dev.txt holds all of build and service at the same versions; zig.txt is added where a compiler is missing
-SETS = {"service": ("build", "service"), "dev": ("dev",)}
+# Each set holds those before it, at the same versions; zig.txt is added where a compiler is missing.
+SETS = {"service": ("build", "service"), "test": ("test",), "tools": ("test", "tools")}
 
 
 class FailedError(Exception):
@@ -66,7 +65,7 @@ def digest(*paths: Path) -> str:
 
 
 def current() -> dict[str, str]:
-    """Digests of what each part of ``.venv`` is made from: two sets of locks, the kernel and its sources."""
+    """Digests of what each part of ``.venv`` is made from: sets of locks, the kernel and its sources."""
     kernel = sorted([*(ROOT / "mumacro" / "kernel").glob("*.[ch]"), *(ROOT / "mumacro").glob("_kernel.*")])
     locks = {key: digest(*(ROOT / "requirements" / f"{name}.txt" for name in names)) for key, names in SETS.items()}
     return {**locks, "kernel": digest(ROOT / "hatch_build.py", *kernel)}
@@ -79,7 +78,11 @@ def installed() -> dict[str, str]:
         works = subprocess.run([PYTHON, "-c", ""], check=False).returncode == 0  # noqa: S603 (a link may be broken)
     except (OSError, ValueError):
         return {}
-    return dict(found.items() & current().items()) if isinstance(found, dict) and works else {}
+    if not isinstance(found, dict) or not works:
+        return {}
+    held = dict(found.items() & current().items())
+    old = found.keys() & SETS.keys() - held.keys()  # packages that newer locks dropped must go too
+    return {name: made for name, made in held.items() if not old or name not in SETS}
 
 
 def pip(*arguments: str) -> None:
@@ -94,10 +97,10 @@ def install_locks(*names: str) -> None:
     pip("--require-hashes", *(word for name in names for word in ("-r", f"requirements/{name}.txt")))
 
 
-def ensure(set_name: str = "dev") -> None:
+def ensure(set_name: str = "tools") -> None:
     """Install the locked set into ``.venv`` and compile the kernel; do nothing if both are there already."""
     have = installed()
-    complete = set_name in have or "dev" in have
+    complete = any(name in have for name in list(SETS)[list(SETS).index(set_name) :])
     if complete and "kernel" in have:
         return
     MARKER.unlink(missing_ok=True)
@@ -151,19 +154,15 @@ def serve(*arguments: str) -> int:
 
 
 def execute(*command: str) -> int:
-    ensure()
+    ensure("test" if command[:1] in (("pytest",), ("python",)) else "tools")
     return run(*command)
 
 
 def docs() -> int:
-    return execute("sphinx-build", "-W", "--keep-going", "-q", "docs", "build/docs")
-
-
-def page() -> int:
-    table, module = "tables/mumacro-1e-7.nc", "build/mumacro.wasm"
-    (ROOT / "build").mkdir(exist_ok=True)
-    made = execute("python", "-m", "builder", "export", table, "--format", "wasm", "--out", module)
-    return made or run("python", "-m", "builder.export_page", table, module, "build/page")
+    code = execute("sphinx-build", "-W", "--keep-going", "-q", "docs", "build/docs")
+    if not code:
+        print(f"The site is in {ROOT / 'build' / 'docs' / 'index.html'}", flush=True)
+    return code
 
 
 def wheels() -> int:
@@ -173,7 +172,7 @@ def wheels() -> int:
 
 
 COMMANDS: dict[str, Callable[..., int]] = {
-    **{command.__name__: command for command in (demo, test, check, docs, serve, wheels, page)},
+    **{command.__name__: command for command in (demo, test, check, docs, serve, wheels)},
     "exec": execute, "lock": partial(run, sys.executable, "requirements/lock.py"),
 }  # fmt: skip
 

@@ -89,7 +89,6 @@ def build(folder: Path, platform: str | None = None) -> tuple[Path, str]:
     sources, has = ROOT / "mumacro" / "kernel", levels(platform)
     objects = {f"{level}.o": ["level.c", f"-DMUMACRO_LEVEL={level}", *flags] for level, flags in has.items()}
     objects["dispatch.o"] = ["dispatch.c", *(f"-DMUMACRO_HAS_{level.upper()}" for level in has)]
-    objects["xla.o"] = ["xla.c", f"-I{ROOT / 'third_party'}", "-std=c11"]
     compiling = [[f"{sources / file}", *words, "-c", "-o", made] for made, (file, *words) in objects.items()]
     with tempfile.TemporaryDirectory(dir=folder) as place:
         for words in (compiling, [["-shared", *objects, "-o", name, *libraries]]):  # each list at the same time

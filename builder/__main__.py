@@ -92,10 +92,13 @@ def _export(chosen: Namespace) -> str:
         surrogate = open_table(which or repr(DEFAULT_TOLERANCE))
         written = [str(path) for path in write_c(surrogate.table, out or Path("mumacro.h"))]
         return as_json({"table": str(surrogate.path), "format": kind, "out": written})
-    from .export import FORMATS, export_table
+    from .c.source import ExportError
+    from .export import FORMATS, check_format, export_table
 
-    if kind not in FORMATS:
-        raise UsageError(f"--format must be one of {', '.join(FORMATS)}, got {kind!r}")
+    try:
+        check_format(kind)
+    except ExportError as error:
+        raise UsageError(f"--{error}") from None
     path = open_table(which).path
     out = out or Path(FORMATS[kind][0].format(path.stem))
     if out.is_dir():
@@ -159,7 +162,7 @@ def _parser(prog: str) -> OneLineParser:
     one.add_argument("path", nargs="?", metavar="TABLE", help="a table file, the same as --table")
     text = "a table file, or a tolerance; default: the tightest bundled table, for c that of 1e-7"
     one.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
-    one.add_argument("--format", required=True, help="c, csv, fmu, fmu3, mat, modelica, parquet or wasm")
+    one.add_argument("--format", required=True, help="c, csv, fmu or fmu3")
     text = "the file to write; for c a header .h or a folder for three files; default: here, by the name of the table"
     one.add_argument("--out", type=Path, help=text)
     one = command(_figures, "Draw the paper's Fig. 4 to 11 from the solver and a table, as PNG.")

@@ -2,8 +2,7 @@
 
     python deploy/packages.py FOLDER [--all]
 
-One wheel, of this machine; with ``--all`` one of every platform in pyproject.toml, by zig.  ``build/service.cdx.json``
-is the bill of materials of the service.
+One wheel, of this machine; with ``--all`` one of every platform in pyproject.toml, by zig.
 """
 
 import os
@@ -30,24 +29,15 @@ def build(folder: Path, platforms: Iterable[str]) -> None:
     run("", "hatchling", "build", "-t", "sdist", "-d", folder)
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # each compiles in a folder of its own
         list(pool.map(lambda platform: run(platform, "hatchling", "build", "-t", "wheel", "-d", folder), platforms))
-    run("", "twine", "check", "--strict", *folder.iterdir())
     run("", "check-wheel-contents", *folder.glob("*.whl"))
     for wheel in folder.glob("*linux*.whl") if sys.platform == "linux" else ():
         # a folder without libraries: those of this machine must not count
         run("", "auditwheel", "show", "--ldpaths", folder, wheel)
 
 
-def describe(out: Path) -> None:
-    """Write what the service is installed with, versions and hashes, as CycloneDX."""
-    lock = ("requirements/service.txt", "--pyproject", "pyproject.toml")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    run("", "cyclonedx-py", "requirements", *lock, "--output-reproducible", "-o", out)
-
-
 if __name__ == "__main__":
     table = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mumacro"]
     try:
         build(ROOT / sys.argv[1], table["wheels"] if "--all" in sys.argv else [""])
-        describe(ROOT / "build" / "service.cdx.json")
     except subprocess.CalledProcessError as error:
         raise SystemExit(f"FAILED: {error}") from None

@@ -50,12 +50,13 @@ class Friction(om.ExplicitComponent):
         for name, slope in found.gradient.items():
             partials["mu_macro", name] = slope
         if self.options["power"]:
-            p, along_v, along_y = self.table.slopes(found.v_tilde, found.y_tilde, "power")
-            by_speed, by_amplitude = self.table.derivatives(found.v_tilde, found.y_tilde, "power")
+            # at rest the partials are those just beside it
+            v, y = np.maximum(found.v_tilde, 1e-9), np.maximum(found.y_tilde, 1e-9)
+            p, along_v, along_y = self.table.slopes(v, y, "power")
             unit, by_force = force * found.length_scale, 2.0 * p - along_v - along_y
             for name in ("mu0", "Fz"):
                 partials["oscillation_power", name] = omega * unit * by_force / inputs[name]
             partials["oscillation_power", "k"] = omega * unit * (along_v + along_y - p) / inputs["k"]
             partials["oscillation_power", "omega"] = unit * (p - along_v)
-            partials["oscillation_power", "y0"] = force * omega * by_amplitude
-            partials["oscillation_power", "v0"] = force * by_speed
+            partials["oscillation_power", "y0"] = force * omega * along_y / y
+            partials["oscillation_power", "v0"] = force * along_v / v

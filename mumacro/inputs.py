@@ -311,7 +311,7 @@ def read_range(name: str, text: str) -> tuple[float, float]:
 
 def picked(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
     """Those of ``names`` that a mapping, a data frame, an Arrow table or stream, or a Dataset has."""
-    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a query of DuckDB
+    if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):  # such as a reader of batches
         import pyarrow as pa  # its columns come from one reading: a second one may have another order
 
         cases = pa.table(cases)

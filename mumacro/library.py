@@ -156,16 +156,6 @@ class Kernel:
         self._one(pointer, mu0, Fz, k, y0, omega, v0, numbers, out)
         return _unpack(out, numbers)  # type: ignore[no-any-return]
 
-    def derivatives(self, data: Data, quantity: int, v: Array, y: Array, order: int) -> Array:
-        """Of a quantity at points (n,), (2, n) or (3, n): d/dv~ and d/dy~; d2/dv~2, d2/dv~ dy~ and d2/dy~2.
-
-        The first ones are one-sided at v~ = 0, the second ones NaN there.
-        """
-        out = np.empty((order + 1, v.size))
-        ask = self._found.partials if order == 1 else self._found.bends
-        ask(data.pointer, quantity, v.size, *map(_numbers, (v, y, *out)))
-        return out
-
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
         """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
         out = np.empty(y.size)
@@ -231,18 +221,3 @@ def _shared() -> Any:
 _LIBRARY = _shared()
 #: the kernels that this processor can run, the best one last
 kernels = [Kernel(one) for one in map(_LIBRARY.mumacro_kernel_at, range(3)) if one != _NOTHING]
-
-
-def open_for_xla(table: int, data: Data) -> Data:
-    """Let compiled programs of JAX find a table by a number; ``data`` must live as long as the process.
-
-    Raises RuntimeError beyond 64 tables.
-    """
-    if _LIBRARY.mumacro_xla_open(table, data.pointer):
-        raise RuntimeError("mumacro.jax: more than 64 tables are open in this process")
-    return data
-
-
-def xla_handler() -> int:
-    """The address of the handler that compiled programs of JAX call."""
-    return int(_FFI.cast("intptr_t", _LIBRARY.mumacro_xla_handler()))

@@ -1,7 +1,6 @@
 """What the interactive page is told: the inputs, the geometries of a contact, and the map of mu~ over (v~, y~).
 
-The service serves it, and ``python -m builder.export_page`` writes it into a folder; the page itself is in
-``service/static/page``.
+The service serves it; the page itself is in ``service/static/page``.
 """
 
 from collections.abc import Iterable, Mapping

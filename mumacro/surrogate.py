@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, Self, overload
+from typing import Any, Literal, NoReturn, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from mumacro.arrays import Array, Places
 from mumacro.bundled import bundled_tables
 from mumacro.cells import Border, block_rows, outer_cells, quantity_cells
 from mumacro.contact import AMPLITUDE, SPRING, ContactName, DirectionName, Kind, kind_of, put_rules
-from mumacro.errors import InputError, TableError
+from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs import FIELDS, RAD_PER_CYCLE, as_columns, check_inputs, length_scale, picked, real
 from mumacro.interval import ENDS, as_ends, extremes, middle
 from mumacro.library import Data, kernels
@@ -275,29 +275,11 @@ class Surrogate:
             self._data.put(code, *quantity_cells(self.table.blocks, code))
         return self._data
 
-    def derivatives(
-        self, v_tilde: ArrayLike, y_tilde: ArrayLike, of: str = "mu_ratio", order: int = 1
-    ) -> tuple[Any, ...]:
-        """Derivatives of a quantity along v~ and y~ themselves; NaN where illegal.
-
-        Order 1 gives (d/dv~, d/dy~), one-sided at v~ = 0, where some are infinite.  Order 2 gives (d2/dv~2, d2/dv~ dy~,
-        d2/dy~2), differences of the first ones, NaN at v~ = 0: right to 2e-4 of the largest, to 3e-2 in the table 1e-7.
-
-        Examples
-        --------
-        >>> [round(x, 6) for x in Surrogate.open().derivatives(0.1, 0.5)]
-        [0.108351, -0.250146]
-        """
-        if order not in (1, 2):
-            raise InputError("order", order, "1 or 2")
-        data, (v, y, shape) = self._with(of, "of"), _points(v_tilde, y_tilde)
-        return tuple(_shaped(row, shape) for row in _KERNEL.derivatives(data, _CODES[of], v, y, order))
-
-    def prepared(self) -> Data:
-        """What the kernel reads, with the cells of every quantity."""
-        for name in self.table.quantities:
-            self._with(name)
-        return self._data
+    def derivatives(self, *_: object, **__: object) -> NoReturn:
+        raise MumacroError(
+            "Surrogate.derivatives is gone: slopes(v_tilde, y_tilde, of) gives v~ d/dv~ and y~ d/dy~, "
+            "evaluate(..., gradient=True) the slopes by the six inputs"
+        )
 
     def quantity(
         self, name: str, v_tilde: ArrayLike, y_tilde: ArrayLike, *, contact: str = "spring", direction: str = "across"

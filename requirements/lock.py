@@ -3,7 +3,7 @@
     python requirements/lock.py [ARGS]     write them (ARGS, e.g. --upgrade, go to uv)
     python requirements/lock.py --check    exit code 1 if pyproject.toml has changed since
 
-dev.txt is made first and constrains the others.  No index is named in the result: the installing machine chooses it.
+test.txt is made first and constrains the others.  No index is named in the result: the installing machine chooses it.
 """
 
 import hashlib
@@ -17,7 +17,7 @@ import venv
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
-EXTRAS = ("arrow", "builder", "dask", "figures", "files", "service")  # that development needs
+EXTRAS = ("arrow", "builder", "dask", "figures", "files", "service")  # that tests need
 UV = "uv==0.13.8"  # pins the resolver too: two people who lock on the same day get the same file
 PROJECT = tomllib.loads((FOLDER.parent / "pyproject.toml").read_text("utf-8"))
 BUILD, ZIG = PROJECT["build-system"]["requires"], PROJECT["tool"]["mumacro"]["zig"]
@@ -46,10 +46,11 @@ def lock(folder: Path, arguments: list[str]) -> None:
     build, zig = folder / "build.in", folder / "zig.in"
     build.write_text("\n".join([*BUILD, "editables"]))  # hatchling needs it to install in place
     zig.write_text(ZIG)
-    dev: list[str | Path] = ["pyproject.toml", "--group=dev", *(f"--extra={extra}" for extra in EXTRAS), build]
-    within: list[str | Path] = ["--constraint", FOLDER / "dev.txt"]
+    test: list[str | Path] = ["pyproject.toml", "--group=test", *(f"--extra={extra}" for extra in EXTRAS), build]
+    within: list[str | Path] = ["--constraint", FOLDER / "test.txt"]
     sources: dict[str, list[str | Path]] = {
-        "dev": dev, "service": ["pyproject.toml", "--extra=service", *within], "build": [build, *within], "zig": [zig],
+        "test": test, "tools": ["--group=tools", *within], "service": ["pyproject.toml", "--extra=service", *within],
+        "build": [build, *within], "zig": [zig],
     }  # fmt: skip
     for name, source in sources.items():
         out = folder / f"{name}.txt"

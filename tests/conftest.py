@@ -160,7 +160,6 @@ def run_builder(repository: Path) -> Callable[..., subprocess.CompletedProcess[s
 
 #: reasons of skips that a run with CI=true may have: what no package index offers there, other users, other systems
 EXPECTED_SKIPS = (
-    r"'?torch'?", r"julia is not installed",
     r"soffice is not installed", r"curl [\d.]+ has no --json",
     r"mounting a small file system", r"only root may run", r"another user cannot run",
     r"this user may write everywhere", r"Python 3\.\d+ is neither on the PATH nor in pyenv",

@@ -4,7 +4,6 @@ import ctypes
 import functools
 import re
 import runpy
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.c import wasm
 from builder.c.source import header_text, write_c
-from builder.export import export_table
 from builder.verify import CASES, draw
 from mumacro import Surrogate, charts
 from mumacro.contact import CONTACTS, DIRECTIONS, kind_of
@@ -45,20 +42,6 @@ int main(void) {
            elsewhere(0.1, 0.5) - mumacro_mu_ratio(0.1, 0.5));
     return mu_values() != 3.0;
 }
-"""
-NODE = """
-const fs = require("fs");
-WebAssembly.instantiate(fs.readFileSync("mumacro.wasm")).then(({ instance: { exports: table } }) => {
-  const held = fs.readFileSync("cases");
-  const given = new Float64Array(held.buffer.slice(held.byteOffset, held.byteOffset + held.length));
-  const n = given.length / 6, found = new Float64Array(17 * n);
-  for (let i = 0; i < n; i += 1) {
-    const at = table.evaluate(...[0, 1, 2, 3, 4, 5].map((j) => given[j * n + i]));
-    found.set(new Float64Array(table.memory.buffer, at, 17), 17 * i);
-  }
-  fs.writeFileSync("answers", found);
-  console.log(table.tolerance());
-});
 """
 OTHER = '#include "mumacro.h"\ndouble elsewhere(double v, double y);\n'
 OTHER += "double elsewhere(double v, double y) { return mumacro_mu_ratio(v, y); }\n"
@@ -349,20 +332,3 @@ def test_only_the_documented_functions_of_the_library_are_called(folder: Path, t
     compilers.run(*words, cwd=folder / "three")
     symbols = compilers.run(*compilers.compiler("nm"), "--undefined-only", tmp_path / "mumacro.o").split()[1::2]
     assert set(symbols) - {"_GLOBAL_OFFSET_TABLE_"} <= {"sqrt", "fabs", "memcpy", "mumacro_table", "memset"}
-
-
-def test_webassembly_has_the_bits_of_the_lowest_level(table: Surrogate, tmp_path: Path) -> None:
-    node = shutil.which("node")
-    if node is None or wasm.compiler() is None:
-        pytest.skip("node, or a compiler for WebAssembly, is not installed")
-    export_table(table.path, "wasm", tmp_path / "mumacro.wasm")
-    x = cases(2000)
-    (tmp_path / "cases").write_bytes(x.tobytes())
-    done = subprocess.run([node, "-e", NODE], cwd=tmp_path, capture_output=True, text=True, check=True)
-    found = np.frombuffer((tmp_path / "answers").read_bytes()).reshape(-1, 17).T
-    assert [float(word) for word in done.stdout.split()] == [table.tolerance]
-    rows, source = np.empty((17, x.shape[1])), np.empty(x.shape[1], dtype=np.int8)
-    kernels[0].cases(table._data, x.shape[1], list(x), rows, source)
-    assert same(found[1:6], rows[:5])
-    assert same(found[6], source)
-    assert same(found[11:], rows[5:11])

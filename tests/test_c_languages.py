@@ -1,4 +1,4 @@
-"""mumacro.h from Fortran, Octave, Abaqus and Modelica: compiled by their tools and compared with Python."""
+"""mumacro.h from Fortran, Octave and Abaqus: compiled by their tools and compared with Python."""
 
 import re
 import shutil
@@ -150,30 +150,6 @@ def test_abaqus_gets_the_shear_stress_its_derivatives_and_the_force_of_nodes(for
     assert nodes == close([-free, 0.0, -0.01, 0.0, 0.0, 0.0], rel=1e-14)
 
 
-def test_modelicas_gradient_is_the_gradient(folder: Path, table: Surrogate) -> None:
-    program = (
-        '#include <stdio.h>\n#include "mumacro_modelica.h"\nint main(void) { double g[6];\n'
-        "mumacro_modelica_gradient(0.3, 10.0, 1e6, 2e-6, 1.3e5, 0.01, g);\n"
-        'for (int i = 0; i < 6; ++i) printf("%.17g ", g[i]);\nreturn 0; }\n'
-    )
-    (folder / "one" / "modelica.c").write_text(program, "ascii")
-    strict = ("-std=c99", *compilers.STRICT)
-    compilers.run(*compilers.compiler("gcc"), *strict, "modelica.c", "-o", "modelica", "-lm", cwd=folder / "one")
-    expected = table.evaluate(CASE, gradient=True).gradient
-    found = numbers(compilers.run(folder / "one" / "modelica"))[0]
-    assert found == close(list(expected.values()), rel=1e-9)
-    text = (folder / "Mumacro.mo").read_text("ascii")
-    assert "mumacro_modelica_gradient(mu0, Fz, k, y0, omega, v0, g)" in text
-    assert "mu = mumacro_mu_macro(mu0, Fz, k, y0, omega, v0)" in text
-
-
-def test_julia_has_the_same_answers(folder: Path, table: Surrogate) -> None:
-    julia = compilers.compiler("julia")
-    compilers.run(*compilers.compiler("gcc"), "-shared", *OBJECTS, "-o", "libmumacro.so", "-lm", cwd=folder)
-    first, *_ = compilers.run(*julia, "--startup-file=no", "friction.jl", cwd=folder).split()
-    assert float(first) == close(table.evaluate(CASE).mu_macro, rel=1e-14)
-
-
 def test_the_files_compile_to_one_library(folder: Path) -> None:
     compilers.run(*compilers.compiler("gcc"), "-shared", *OBJECTS, "-o", "libm.so", "-lm", cwd=folder)
     table = compilers.run(*compilers.compiler("nm"), "-D", "--defined-only", "libm.so", cwd=folder)
@@ -181,11 +157,3 @@ def test_the_files_compile_to_one_library(folder: Path) -> None:
     declared = re.findall(r"MUMACRO_API .*?(mumacro_\w+)\(", (folder / "mumacro.h").read_text("ascii"))
     assert len(declared) == 20
     assert public == {*declared, "mumacro_table"}
-
-
-def test_modelicas_function_and_its_derivative_compile(repository: Path, tmp_path: Path) -> None:
-    rumoca = pytest.importorskip("rumoca", reason="the Modelica compiler rumoca is not installed")
-    source = shutil.copy(repository / "examples" / "c" / "Mumacro.mo", tmp_path)
-    assert [str(found) for found in rumoca.validate(str(source), model="Mumacro.SlidingMass")] == []
-    model = rumoca.Session().load(str(source), model="Mumacro.SlidingMass")
-    assert [one.name for one in model.states] == ["v"]

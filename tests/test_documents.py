@@ -1,6 +1,5 @@
 """Documents: links lead somewhere, formulas survive GitHub, metadata and stated figures agree with the code."""
 
-import json
 import math
 import re
 import tomllib
@@ -152,6 +151,7 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
     from service.app import create_app
     from service.settings import Settings
 
+    pytest.importorskip("sphinx")
     monkeypatch.syspath_prepend(DOCS / "_ext")
     from interface import _operations
 
@@ -167,22 +167,9 @@ def test_the_rest_reference_names_the_fields_within_fields(monkeypatch: pytest.M
 
 def test_metadata_agrees_with_the_package() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    meta = json.loads((ROOT / "codemeta.json").read_text("utf-8"))
-    assert meta["license"].endswith(project["license"])
-    same = {"description": project["description"], "keywords": project["keywords"], "version": __version__,
-            "softwareRequirements": project["dependencies"],
-            "runtimePlatform": f"Python {project['requires-python']}"}  # fmt: skip
-    assert {name: meta[name] for name in same} == same
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
-    (article,) = meta["referencePublication"]
-    said = (f"version: {__version__}\n", f"license: {project['license']}\n", article["name"])
+    said = (f"version: {__version__}\n", f"license: {project['license']}\n", f"title: {project['name']}\n")
     assert [text for text in said if text not in citation] == []
-
-
-def test_every_citation_of_the_paper_is_in_its_bibliography() -> None:
-    cited = set(re.findall(r"@(\w+)", (ROOT / "paper.md").read_text("utf-8")))
-    entries = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "paper.bib").read_text("utf-8"), re.MULTILINE))
-    assert cited == entries
 
 
 def test_the_columns_of_a_law_are_all_described() -> None:

@@ -304,7 +304,7 @@ def test_a_dask_data_frame_gives_one_and_stays_lazy(table: Surrogate) -> None:
         table.evaluate(**{**CASE, "v0": lazy["v0"]})
 
 
-@pytest.mark.parametrize("kind", ["pyarrow.table", "pyarrow.record_batch", "polars.DataFrame"])
+@pytest.mark.parametrize("kind", ["pyarrow.table", "pyarrow.record_batch"])
 def test_columns_of_arrow_tables_give_arrays(table: Surrogate, kind: str) -> None:
     library, name = kind.split(".")
     make: Any = getattr(pytest.importorskip(library), name)
@@ -331,14 +331,3 @@ def test_a_stream_of_arrow_is_read_once(table: Surrogate) -> None:
     rows = pa.table({**{name: [value] * 3 for name, value in CASE.items()}, "v0": [0.01, 0.02, None]})
     found = table.evaluate(rows.to_reader(max_chunksize=2)).mu_macro
     np.testing.assert_array_equal(found, table.evaluate({**CASE, "v0": np.array([0.01, 0.02, math.nan])}).mu_macro)
-
-
-def test_a_query_of_duckdb_gives_arrays(table: Surrogate) -> None:
-    duckdb = pytest.importorskip("duckdb")
-    pytest.importorskip("pyarrow")
-    query = duckdb.sql(
-        "select 0.3::double mu0, 10::double Fz, 1e6::double k, 2e-6::double y0, 1.3e5::double omega, i / 1000.0 v0 "
-        "from range(5000) t(i) order by (i * 7919) % 5000"
-    )
-    v0 = query.fetchnumpy()["v0"]
-    np.testing.assert_array_equal(table.evaluate(query).mu_macro, table.evaluate({**CASE, "v0": v0}).mu_macro)

@@ -48,10 +48,6 @@ def test_designs_and_reductions() -> None:
     assert bool(enough.isel(found["place"]))
 
 
-def test_duckdb(expected: Any) -> None:
-    assert run("DuckDB", "duckdb", "pyarrow")["out"] == [(expected[0],), (expected[1],), (None,)]
-
-
 def test_files_over_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, expected: Any) -> None:
     pq, pa = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
     monkeypatch.chdir(tmp_path)

@@ -41,11 +41,6 @@ typedef struct {
     double (*ratio)(const mumacro_data *data, double v, double y);
     void (*one)(const mumacro_data *data, double mu0, double Fz, double k, double y0, double omega, double v0,
                 int numbers, double *out);
-    /* d/dv~ and d/dy~ of a quantity, one-sided at v~ = 0; d2/dv~2, d2/dv~ dy~, d2/dy~2, NaN at v~ = 0 */
-    void (*partials)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y,
-                     double *along_v, double *along_y);
-    void (*bends)(const mumacro_data *data, int quantity, int64_t n, const double *v, const double *y, double *vv,
-                  double *vy, double *yy);
     /* v~crit(y~) of a contact and direction: 0 at 0, infinite at infinity, NaN for what is no amplitude */
     void (*border_as)(const mumacro_data *data, int contact, int direction, int64_t n, const double *y, double *crit);
     /* blocks of points with 0 < v~, y~ < infinity, and their coordinates as evaluation counts them, which tail_fast
@@ -71,9 +66,4 @@ typedef struct {
 
 /* Levels: 0 runs on any processor of this kind; NULL where this processor or this build has none of that number. */
 const mumacro_kernel *mumacro_kernel_at(int level);
-
-/* For JAX: the table that a compiled program calls by its id, kept for good; 0, or 1 when there are too many. */
-int mumacro_xla_open(int64_t id, const mumacro_data *data);
-/* The address of the handler for XLA's foreign function interface. */
-void *mumacro_xla_handler(void);
 #endif

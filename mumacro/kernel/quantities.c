@@ -49,7 +49,6 @@ typedef struct {
     mu_answer (*limit)(double v, double y);
     mu_answer (*fast)(const mumacro_data *data, double v, double y);
     mu_slopes (*fast_slopes)(const mumacro_data *data, double v, double y);
-    double (*from_rest)(const mumacro_data *data, double y); /* d/dv~ at v~ = 0 */
 } mu_quantity;
 
 /* --- forms ------------------------------------------------------------------------------------------ */

@@ -104,27 +104,6 @@ static mu_slopes mu_stick_fast_slopes(const mumacro_data *data, double v, double
     return none;
 }
 
-/* --- slopes from v~ = 0 on: above y~ = 1 the contact slips on both sides, below it creeps ------------------ */
-
-static double mu_speed_slope_at_zero(const mumacro_data *data, double y, double *bound); /* in points.c */
-
-static double mu_ratio_from_rest(const mumacro_data *data, double y) {
-    double bound;
-    return mu_speed_slope_at_zero(data, y, &bound);
-}
-
-/* The power of creep is v~ y~^2 / sqrt(1 - y~^2) to first order; above y~ = 1 it is even in v~. */
-static double mu_power_from_rest(const mumacro_data *data, double y) {
-    (void)data;
-    return y > 0.0 && y <= 1.0 ? y * y / sqrt((1.0 - y) * (1.0 + y)) : 0.0;
-}
-
-/* The time of slip grows as the root of v~. */
-static double mu_stick_from_rest(const mumacro_data *data, double y) {
-    (void)data;
-    return y > 0.0 && y <= 1.0 ? -HUGE_VAL : 0.0;
-}
-
 /* --- what a bound allows beside the error of q: rounding, and in the corner the last digit of y~ ------- */
 
 /* d ln phi for that digit: d phi / d eta = -2 phi / stiff; where that is no longer linear over a digit, the root itself
@@ -182,17 +161,17 @@ static const mu_quantity MU_QUANTITY[MU_QUANTITIES] = {
      {{MU_ONE, MU_SLIP_DEFICIT}, {MU_NO_BASE, MU_COSINE}, {MU_NO_BASE, MU_COSINE}, {MU_NO_BASE, MU_COSINE},
       {MU_OUTER, MU_V_OVER_Y}, {MU_ONE, MU_DEFICIT}, {MU_NO_BASE, MU_UNITY}, {MU_NO_BASE, MU_PHI},
       {MU_NO_BASE, MU_V_OVER_Y}, {MU_NO_BASE, MU_V_OVER_Y}, {MU_NO_BASE, MU_V_OVER_Y}, {MU_OUTER_LAYER, MU_V_OVER_Y}},
-     mu_ratio_slack, mu_ratio_limit, mu_ratio_fast, mu_ratio_fast_slopes, mu_ratio_from_rest},
+     mu_ratio_slack, mu_ratio_limit, mu_ratio_fast, mu_ratio_fast_slopes},
     {{"power", "power", "mean power of the shaker over mu0 Fz l0 omega", 1, 1},
      HUGE_VAL,
      {{MU_NO_BASE, MU_SLIP_POWER}, {MU_NO_BASE, MU_SWEPT_POWER}, {MU_NO_BASE, MU_SWEPT_POWER},
       {MU_NO_BASE, MU_SWEPT_POWER}, {MU_FIRST_POWER, MU_V2_OVER_Y}, {MU_NO_BASE, MU_V_Y2}, {MU_NO_BASE, MU_UNITY},
       {MU_NO_BASE, MU_V_OVER_PHI}, {MU_NO_BASE, MU_Y}, {MU_NO_BASE, MU_Y}, {MU_NO_BASE, MU_Y}, {MU_NO_BASE, MU_Y}},
-     mu_power_slack, mu_power_limit, mu_power_fast, mu_power_fast_slopes, mu_power_from_rest},
+     mu_power_slack, mu_power_limit, mu_power_fast, mu_power_fast_slopes},
     {{"stick_fraction", "stick", "share of the period during which the contact sticks", 0, 0},
      1.0,
      {{MU_NO_BASE, MU_NOTHING}, {MU_NO_BASE, MU_NOTHING}, {MU_NO_BASE, MU_NOTHING}, {MU_NO_BASE, MU_NOTHING},
       {MU_NO_BASE, MU_NOTHING}, {MU_NO_BASE, MU_UNITY}, {MU_NO_BASE, MU_UNITY}, {MU_NO_BASE, MU_UNITY},
       {MU_NO_BASE, MU_UNITY}, {MU_NO_BASE, MU_UNITY}, {MU_NO_BASE, MU_ROOT_Y}, {MU_NO_BASE, MU_ROOT_Y}},
-     mu_stick_slack, mu_stick_limit, mu_stick_fast, mu_stick_fast_slopes, mu_stick_from_rest},
+     mu_stick_slack, mu_stick_limit, mu_stick_fast, mu_stick_fast_slopes},
 };

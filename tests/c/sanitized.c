@@ -77,10 +77,6 @@ static void ask_points(const mumacro_kernel *kernel, const mumacro_data *data, i
         for (int quantity = 0; quantity < 3; ++quantity)
             kernel->values(data, contact, direction, quantity, n < FEW ? n : FEW, v, y, value, bound, source);
     }
-    for (int quantity = 0; quantity < 3; ++quantity) {
-        kernel->partials(data, quantity, n, v, y, value, bound);
-        kernel->bends(data, quantity, n < FEW ? n : FEW, v, y, value, bound, again);
-    }
     free(value), free(bound), free(again), free(rows), free(source);
 }
 

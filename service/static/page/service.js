@@ -1,4 +1,4 @@
-// Questions to the service.  A page without one has another file in the place of this: ../alone/service.js.
+// Questions to the service.
 import { withKey } from "./ask.js";
 
 const WAIT_MS = 20_000; // for an answer
