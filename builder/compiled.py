@@ -26,7 +26,7 @@ def source_digest() -> str:
     compiler = (numba.__version__, llvmlite.__version__, platform.python_version(), platform.machine())
     h = hashlib.sha256(repr(compiler).encode())
     for folder, pattern in SOURCES:
-        for source in sorted(folder.glob(pattern)):
-            h.update(source.name.encode())
+        for source in sorted(folder.rglob(pattern)):  # folders too: what is moved into one still counts
+            h.update(source.relative_to(folder).as_posix().encode())
             h.update(source.read_bytes())
     return h.hexdigest()[:16]

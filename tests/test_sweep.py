@@ -117,14 +117,16 @@ def test_the_digest_covers_sources_and_compiler(
 ) -> None:
     digests = {compiled.source_digest()}
     copies = tmp_path / "sources"
-    copies.mkdir()
-    for source in place.glob(pattern):
-        (copies / source.name).write_bytes(source.read_bytes())
+    for source in place.rglob(pattern):
+        copy = copies / source.relative_to(place)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(source.read_bytes())
     assert list(copies.iterdir())
     sources = [(copies if entry == (place, pattern) else entry[0], entry[1]) for entry in compiled.SOURCES]
     monkeypatch.setattr(compiled, "SOURCES", sources)
     assert digests == {compiled.source_digest()}  # wherever the sources stand
-    added = copies / pattern.replace("*", "zz").replace("[ch]", "h")
+    added = copies / "folder" / pattern.replace("*", "zz").replace("[ch]", "h")  # a module that moves is not lost
+    added.parent.mkdir()
     for text in ("", "x = 1"):
         added.write_text(text)
         digests.add(compiled.source_digest())
