@@ -329,7 +329,7 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     const double still = 1.0 - reversed; /* xi of the last spring without reverse slip; next the load of these */
     const double load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
     const double least = mu_max(y, 1.0) / 1e300, ill = 1.0 + 2.0 * at.x * y / (y - v);
-    double nulls[MU_SUMS][3] = {{0.0}}, share_of[3] = {1.0, 1.0, 1.0};
+    double nulls[MU_SUMS][3] = {{0.0}}, over_start[3] = {1.0, 1.0, 1.0};
     const mu_stuck stuck = mu_half_stick(&at);
     mu_driven out = {mu_line_of_stick(v, y, stuck.h, MU_ALONG_REVERSES), 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_line *sum = &out.line;
@@ -351,7 +351,8 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
         const double rest = reversed * point[0], s = mu_max(rest * (2.0 - rest), least);
         const double share = MU_MIDDLE * s * reversed * point[1], a = y / (MU_MIDDLE * s), slow = v / (MU_MIDDLE * s);
         const double start = mu_reverse_start(a);
-        const double guess = start * mu_max(3.0 * (share_of[0] - share_of[1]) + share_of[2], 0.5);
+        /* m over its start changes slowly: a parabola through the last three springs */
+        const double guess = start * mu_max(3.0 * (over_start[0] - over_start[1]) + over_start[2], 0.5);
         mu_reverse found;
         mu_driven one;
         double values[MU_SUMS];
@@ -359,9 +360,9 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
         found = mu_reverse_of(&at, a, guess);
         one.line = mu_line_of_reverse(&at, slow, a, &found);
         mu_bound_reverse(&at, slow, a, &found, &one);
-        share_of[2] = i == rule->nodes - 1 ? found.m / start : share_of[1];
-        share_of[1] = i == rule->nodes - 1 ? found.m / start : share_of[0];
-        share_of[0] = found.m / start;
+        over_start[2] = i == rule->nodes - 1 ? found.m / start : over_start[1];
+        over_start[1] = i == rule->nodes - 1 ? found.m / start : over_start[0];
+        over_start[0] = found.m / start;
         values[MU_SUM_MU] = share * one.line.mu;
         values[MU_SUM_V] = share * one.line.along_v;
         values[MU_SUM_Y] = share * one.line.along_y;
@@ -390,10 +391,9 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     }
     if (last < 1.0 + 4.0 * MU_LINE_ROUNDING * ill) { /* a spring at the edge may belong to the others: slopes jump */
         const double room = mu_max(1.0 - last, MU_LINE_ROUNDING * ill);
-        const double moved = mu_min(MU_LINE_ROUNDING * ill * last / sqrt(room), 1.0) * MU_MIDDLE;
-        out.bound_v += moved * (v + y) * at.c / MU_MIDDLE;
-        out.bound_y += moved * (v + y) * at.sine / MU_MIDDLE;
-        out.stick_bound += moved * last * MU_LINE_ROUNDING;
+        const double moved = mu_min(MU_LINE_ROUNDING * ill * last / sqrt(room), 1.0);
+        out.bound_v += moved * (v + y) * at.c;
+        out.bound_y += moved * (v + y) * at.sine;
     }
     sum->mu = mu_min(mu_max(sum->mu, 0.0), 1.0);
     sum->power += v * (1.0 - sum->mu);
